@@ -220,26 +220,6 @@ def on_cube(pose_b: np.ndarray) -> Pairs:
     return Pairs(np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(pose_b), 1)), pose_b, sizes, sizes)
 
 
-def coplanar(rng: np.random.Generator, n: int) -> Pairs:
-    """Draw cubes of edge 2 on each other, faces in one plane to the last bit.
-
-    One in ten stands exactly on top; the others anywhere on it, half of them with their sides
-    parallel, half under any yaw.
-    """
-    exactly = np.zeros((-(-n // 10), 7))
-    exactly[:, 2], exactly[:, 6] = CUBE[2], 1.0
-    parallel = (n - len(exactly)) // 2
-    parts = [exactly]
-    for count, largest in ((parallel, 0.0), (n - len(exactly) - parallel, np.pi)):
-        b = np.zeros((2 * count + 10, 7))  # some are placed beside the cube, and left out
-        b[:, :2] = 0.98 * rng.uniform(-CUBE[0], CUBE[0], (len(b), 2))
-        b[:, 2] = CUBE[2]
-        yaw = largest * rng.uniform(-1.0, 1.0, len(b))
-        b[:, 5], b[:, 6] = np.sin(0.5 * yaw), np.cos(0.5 * yaw)
-        parts.append(b[on_cube(b).contacts().colliding][:count])
-    return on_cube(rng.permutation(np.concatenate(parts)))
-
-
 def containers(rng: np.random.Generator, n: int) -> Pairs:
     """40 ft containers with sway: roll, pitch, yaw within ±5°, met anywhere, 0.1–10 % deep."""
     sizes = np.tile(CONTAINER, (n, 1))

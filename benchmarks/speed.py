@@ -3,16 +3,18 @@
 
 """Program `speed`: calls, batches, threads and the first contact of our models, from Python.
 
-`python -m benchmarks.speed` writes speed.md and speed.csv. Each instruction set of the machine is
-measured in a subprocess, on one pinned core. The contestants take turns, so a disturbance hits all
-of them, and the figures to read are ratios to MuJoCo's signed distance. Two threads and the start
-of a new process follow.
+`python -m benchmarks.speed` writes speed.md, speed.csv and speed_cold.csv. Each instruction set of
+the machine is measured in a subprocess, on one pinned core. The contestants take turns, so a
+disturbance hits all of them, and the figures to read are ratios to MuJoCo's signed distance. Calls
+with cold caches, two threads and the start of a new process follow.
 """
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
@@ -20,7 +22,7 @@ from box_contact_ros.core import instruction_sets, native
 
 from . import output
 from .arguments import report_parser
-from .contestant import CORE_MODELS, in_subprocess, ours
+from .contestant import CORE_MODELS, Contestant, in_subprocess, ours
 from .engines import installed
 from .output import markdown_table, number
 from .pose_sets import FLUSH, SETS, drawn
@@ -39,6 +41,9 @@ PACKAGES = ('numpy', 'mujoco')
 BATCH, QUICK_BATCH = 100_000, 1_000
 """Pairs of a batch that threads share: at 20,000, waking a second core takes a tenth."""
 STARTS, QUICK_STARTS = 20, 2  # new processes
+TOUCHED = (0.0, 0.5, 2.0, 8.0, 48.0)
+"""Memory that other work reads and writes between two calls [MB]; 0: the same call right before."""
+COLD_SET, COLD_CALLS, QUICK_COLD_CALLS = 'containers', 300, 10
 FIRST_CONTACT = """\
 from box_contact_ros import ContactSolver
 cube = (2, 2, 2)
@@ -47,11 +52,51 @@ print(ContactSolver(cube, cube)((0, 0, 0, 0, 0, 0, 1), (0, 0, 1.9, 0, 0, 0, 1)),
 """The program whose start is timed, with the default model."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class ColdRow:
+    """Calls of a contestant with other work in between."""
+
+    name: str
+    megabytes: float  # that the work touches
+    call_p50: float  # [ns]
+    call_by_unit: float  # relative to the unit's call on the same pair; NaN: no MuJoCo
+
+
 def measure_core(seed: int, plan: Plan) -> list[FrontierRow]:
     """Measure the unit and the models in C++, by the instruction set of this process."""
-    unit = [engine for engine in installed(('mujoco',))[0] if engine.name == UNIT]
     with pinned({usable_cores()[-1]}):
-        return measure_all([*unit, *map(ours, CORE_MODELS)], SETS | FLUSH, seed=seed, plan=plan)
+        return measure_all(contestants(), SETS | FLUSH, seed=seed, plan=plan)
+
+
+def contestants() -> list[Contestant]:
+    """Return the unit, where MuJoCo is installed, and the models in C++."""
+    unit = [engine for engine in installed(('mujoco',))[0] if engine.name == UNIT]
+    return [*unit, *map(ours, CORE_MODELS)]
+
+
+def measure_cold(seed: int, count: int) -> list[ColdRow]:
+    """Return the calls of each contestant on a set, with other work before every call.
+
+    The contestants take turns at every pair. The work evicts their code and data from the caches.
+    """
+    pairs = drawn(SETS[COLD_SET], np.random.default_rng(seed), count)
+    prepared = {one.name: one.prepare(pairs) for one in contestants()}
+    rows = []
+    with pinned({usable_cores()[-1]}), no_garbage_collection():
+        for megabytes in TOUCHED:
+            memory = np.zeros(int(1e6 * megabytes) // 8)
+            times: dict[str, list[int]] = {name: [] for name in prepared}
+            for row in range(count):
+                for name, calls in prepared.items():
+                    if not len(memory):
+                        calls[row]()
+                    memory += 1.0
+                    times[name].append(nanoseconds(calls[row])[0])
+            unit = times.get(UNIT, [math.nan] * count)
+            rows += [ColdRow(name=name, megabytes=megabytes, call_p50=float(np.median(took)),
+                             call_by_unit=float(by_round(took, unit)))
+                     for name, took in times.items()]
+    return rows
 
 
 def measure_threads(model: str, pairs: int, rounds: int) -> tuple[list[float], list[float]]:
@@ -112,6 +157,14 @@ def threads_table(threads: Mapping[str, tuple[list[float], list[float]]]) -> str
         for model, (alone, shared) in p50.items()])
 
 
+def cold_table(rows: Sequence[ColdRow]) -> str:
+    """Return the calls with other work in between, in µs and relative to the unit."""
+    by = {(row.name, row.megabytes): row for row in rows}
+    return markdown_table(['', *(f'{megabytes:g} MB' for megabytes in TOUCHED)], [
+        [name, *(f'{number(by[name, m].call_p50 / 1e3)} ({number(by[name, m].call_by_unit)})'
+                 for m in TOUCHED)] for name in dict.fromkeys(row.name for row in rows)])
+
+
 def csv_rows(rows: Sequence[FrontierRow]) -> Iterator[dict[str, object]]:
     """Yield a row for each contestant and set; times [ns]."""
     for row in rows:
@@ -124,25 +177,28 @@ def csv_rows(rows: Sequence[FrontierRow]) -> Iterator[dict[str, object]]:
 def main(args: Sequence[str] | None = None) -> int:
     """Measure, print, write."""
     parser = report_parser('speed', __doc__, quick='few calls and rounds, to try it out', seed=1,
-                           out='speed.md, speed.csv')
+                           out='speed.md, speed.csv, speed_cold.csv')
     options = parser.parse_args(args)
     folder, machine = output.results_folder(parser, options), output.machine(native, PACKAGES)
     plan, pairs, count = ((QUICK, QUICK_BATCH, QUICK_STARTS) if options.quick
                           else (FULL, BATCH, STARTS))
     rows = [row for name in reversed(instruction_sets()) for row in in_subprocess(
         measure_core, options.seed, plan, patience=LONGEST_RUN, instruction_set=name)]
+    cold = in_subprocess(measure_cold, options.seed, QUICK_COLD_CALLS if options.quick
+                         else COLD_CALLS, patience=LONGEST_RUN)
     threads = {model: measure_threads(model, pairs, plan.rounds) for model in CORE_MODELS}
     starts = measure_starts(count)
     text = output.page(
         'benchmarks/pages/speed', command=output.command_line('benchmarks.speed', args),
         machine=machine, rounds=plan.rounds, calls=plan.timed_pairs, batch=plan.batch_pairs,
         shared_batch=pairs, threads=threads_table(threads), starts=count,
-        start=1e-9 * float(np.median(starts)),
+        start=1e-9 * float(np.median(starts)), cold=cold_table(cold), cold_set=COLD_SET,
         tables='\n\n'.join(f'## {name}\n\n{table(rows, name)}'
                            for name in dict.fromkeys(row.instruction_set for row in rows)))
     print(text)
     (folder / 'speed.md').write_text(text, encoding='utf-8')
     output.write_csv(folder / 'speed.csv', csv_rows(rows), about=machine)
+    output.write_csv(folder / 'speed_cold.csv', map(asdict, cold), about=machine)
     return 0
 
 

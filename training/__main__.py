@@ -9,7 +9,8 @@ Measured on a machine with two cores, of which a training uses one:
   containers        two boxes of 12.192 x 2.438 x 2.591 m          2 minutes
   paper-continuous  without discontinuities, a network per subset  8 minutes
   paper-committee   a classifier, and a network for each class     7 minutes
-  table-1-...       each of the four columns of Table 1, 5 seeds   5 minutes
+  table-1-...       each of the three columns of Table 1, 5 seeds  5 minutes
+  table-2-by-signs  without discontinuities, by signs of angles   10 minutes
 
 The first three are shipped with the package. The others are for the tables of benchmarks.paper.
 """

@@ -19,24 +19,41 @@ FILLING = 4
 FAR = (1e6, 0.0, 0.0)
 
 
-def points(persistent: bool) -> Contestant:
-    """Return `getClosestPoints` at distance 0, or `getContactPoints` of the filled manifold."""
+def closest() -> Contestant:
+    """Return `getClosestPoints` at distance 0, of shapes and poses: no body is placed."""
     def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
-        client = bullet.connect(bullet.DIRECT)  # other boxes in its world would slow it down
+        client, (one, two) = _shapes(p, q)
+        near = partial(bullet.getClosestPoints, bodyA=-1, bodyB=-1, distance=0.0,
+                       collisionShapeA=one, collisionShapeB=two, physicsClientId=client)
+
+        def ask(a: Any, b: Any, quat_a: Any, quat_b: Any) -> Any:
+            return near(collisionShapePositionA=a, collisionShapePositionB=b,
+                        collisionShapeOrientationA=quat_a, collisionShapeOrientationB=quat_b)
+
+        weakref.finalize(ask, bullet.disconnect, client).atexit = False
+        return ask
+
+    return Contestant(
+        name='PyBullet getClosestPoints', package='pybullet', boxes=boxes, at=_at, read=_read,
+        call='getClosestPoints(bodyA=-1, bodyB=-1, distance=0.0), shapes and poses',
+        returns='one point on each box, depth, normal', choices=('its point',), causes={
+            'missed': 'The query rounds edges and corners by a margin of 1 mm: a corner recedes by '
+            'up to 0.7 mm. The same boxes 1,000 times as large miss none.'})
+
+
+def persistent() -> Contestant:
+    """Return `getContactPoints` of the filled manifold."""
+    def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
+        client, shapes = _shapes(p, q)
         place = partial(bullet.resetBasePositionAndOrientation, physicsClientId=client)
         detect = partial(bullet.performCollisionDetection, physicsClientId=client)
-        one, two = (bullet.createMultiBody(1.0, bullet.createCollisionShape(
-            bullet.GEOM_BOX, halfExtents=list(0.5 * size), physicsClientId=client),
-            physicsClientId=client) for size in (p, q))
+        one, two = (bullet.createMultiBody(1.0, shape, physicsClientId=client) for shape in shapes)
 
         def ask(a: Any, b: Any, quat_a: Any, quat_b: Any) -> Any:
             place(one, a, quat_a)
-            if persistent:  # the manifold would keep points of the pair before
-                place(two, FAR, quat_b)
-                detect()
+            place(two, FAR, quat_b)  # the manifold would keep points of the pair before
+            detect()
             place(two, b, quat_b)
-            if not persistent:
-                return bullet.getClosestPoints(one, two, 0.0, physicsClientId=client)
             for _ in range(FILLING):
                 detect()
             return bullet.getContactPoints(one, two, physicsClientId=client)
@@ -44,25 +61,30 @@ def points(persistent: bool) -> Contestant:
         weakref.finalize(ask, bullet.disconnect, client).atexit = False
         return ask
 
-    def at(a: np.ndarray, b: np.ndarray) -> tuple[Any, ...]:
-        return tuple(map(tuple, (a[:3], b[:3], a[3:], b[3:])))
-
-    def read(contacts: Any) -> Manifold:
-        # 5, 6: the points on A and B; 7: the normal on B, towards A; 8: the distance.
-        # The manifold keeps points that are up to its margin apart.
-        return manifold((0.5 * (np.array(c[5]) + np.array(c[6])), -np.array(c[7]), -c[8])
-                        for c in contacts if c[8] <= 0.0)
-
-    engine = partial(Contestant, package='pybullet', boxes=boxes, at=at, read=read)
-    if persistent:
-        return engine(name='PyBullet getContactPoints', returns='up to 4 points with depths, '
-                      'normals', call=f'{FILLING} × performCollisionDetection, getContactPoints',
-                      causes={'invented': 'The axis test adds 1e-5 to every entry of the rotation, '
-                              'so gaps of some 1e-5 of the size count as contact.'})
-    return engine(name='PyBullet getClosestPoints', call='getClosestPoints(a, b, 0.0)',
-                  returns='one point on each box, depth, normal', choices=('its point',), causes={
-                      'missed': 'The query rounds edges and corners by a margin of 1 mm: a corner '
-                      'recedes by up to 0.7 mm. The same boxes 1,000 times as large miss none.'})
+    return Contestant(
+        name='PyBullet getContactPoints', package='pybullet', boxes=boxes, at=_at, read=_read,
+        call=f'{FILLING} × performCollisionDetection, getContactPoints',
+        returns='up to 4 points with depths, normals',
+        causes={'invented': 'The axis test adds 1e-5 to every entry of the rotation, so gaps of '
+                'some 1e-5 of the size count as contact.'})
 
 
-ENGINES = [partial(points, False), partial(points, True)]
+def _shapes(p: np.ndarray, q: np.ndarray) -> tuple[int, list[int]]:
+    """Return a client, as other boxes in its world would slow it down, and two shapes in it."""
+    client = bullet.connect(bullet.DIRECT)
+    return client, [bullet.createCollisionShape(
+        bullet.GEOM_BOX, halfExtents=list(0.5 * size), physicsClientId=client) for size in (p, q)]
+
+
+def _at(a: np.ndarray, b: np.ndarray) -> tuple[Any, ...]:
+    return tuple(map(tuple, (a[:3], b[:3], a[3:], b[3:])))
+
+
+def _read(contacts: Any) -> Manifold:
+    # 5, 6: the points on A and B; 7: the normal on B, towards A; 8: the distance.
+    # The manifold keeps points that are up to its margin apart.
+    return manifold((0.5 * (np.array(c[5]) + np.array(c[6])), -np.array(c[7]), -c[8])
+                    for c in contacts if c[8] <= 0.0)
+
+
+ENGINES = [closest, persistent]

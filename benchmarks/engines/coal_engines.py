@@ -15,7 +15,7 @@ from ..contestant import APART, MOST_CONTACTS, Contestant, Manifold, manifold, m
 
 
 def collision(patches: bool) -> Contestant:
-    """Return Coal's `collide`: the deepest point; or the polygon of its contact patch after it."""
+    """Return Coal's collision: the deepest point; or the polygon of its contact patch after it."""
     request, result = coal.CollisionRequest(), coal.CollisionResult()
     request.enable_contact = True
     request.num_max_contacts = MOST_CONTACTS
@@ -23,19 +23,20 @@ def collision(patches: bool) -> Contestant:
 
     def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
         one, two = coal.Box(*p), coal.Box(*q)
+        collide, cut = coal.ComputeCollision(one, two), coal.ComputeContactPatch(one, two)
         at_one, at_two = coal.Transform3s(), coal.Transform3s()
 
-        def ask(a: np.ndarray, b: np.ndarray, matrix_a: np.ndarray, matrix_b: np.ndarray) -> None:
+        def ask(a: np.ndarray, b: np.ndarray, matrix_a: np.ndarray, matrix_b: np.ndarray,
+                kept: Any = (one, two)) -> None:  # Coal's queries do not keep the shapes alive
             at_one.setTranslation(a)
             at_one.setRotation(matrix_a)
             at_two.setTranslation(b)
             at_two.setRotation(matrix_b)
             result.clear()
-            coal.collide(one, at_one, two, at_two, request, result)
+            collide(at_one, at_two, request, result)
             if patches:
                 patch_result.clear()
-                coal.computeContactPatch(one, at_one, two, at_two, result, patch_request,
-                                         patch_result)
+                cut(at_one, at_two, result, patch_request, patch_result)
         return ask
 
     def read(_: Any) -> Manifold:
@@ -49,11 +50,11 @@ def collision(patches: bool) -> Contestant:
         return manifold((patch.getPoint(k), normal, depth) for k in range(patch.size()))
 
     if patches:
-        return Contestant(name='Coal collide, contact patch',
-                          call='coal.collide, coal.computeContactPatch', returns='polygon, normal',
-                          patch='area', package='coal', choices=('mean', 'patch centroid'),
-                          boxes=boxes, at=matrices, read=read)
-    return Contestant(name='Coal collide', call='coal.collide, enable_contact',
+        return Contestant(name='Coal ComputeCollision, contact patch',
+                          call='coal.ComputeCollision, coal.ComputeContactPatch',
+                          returns='polygon, normal', patch='area', package='coal',
+                          choices=('mean', 'patch centroid'), boxes=boxes, at=matrices, read=read)
+    return Contestant(name='Coal ComputeCollision', call='coal.ComputeCollision, enable_contact',
                       returns='deepest point, depth, normal', choices=('its point',),
                       package='coal', boxes=boxes, at=matrices, read=read)
 

@@ -14,15 +14,17 @@ from ..contestant import MOST_CONTACTS, Contestant, Manifold, manifold, wxyz
 
 
 def collision() -> Contestant:
-    """Return python-fcl's `collide` of two boxes."""
+    """Return python-fcl's raw call, `collide` of two boxes."""
     request = fcl.CollisionRequest(num_max_contacts=MOST_CONTACTS, enable_contact=True)
 
     def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
         one, two = (fcl.CollisionObject(fcl.Box(*size)) for size in (p, q))
 
         def ask(a: np.ndarray, b: np.ndarray, quat_a: np.ndarray, quat_b: np.ndarray) -> Any:
-            one.setTransform(fcl.Transform(quat_a, a))
-            two.setTransform(fcl.Transform(quat_b, b))
+            one.setTranslation(a)
+            one.setQuatRotation(quat_a)
+            two.setTranslation(b)
+            two.setQuatRotation(quat_b)
             result = fcl.CollisionResult()
             fcl.collide(one, two, request, result)
             return result
@@ -31,9 +33,10 @@ def collision() -> Contestant:
     def read(result: Any) -> Manifold:
         return manifold((c.pos, c.normal, c.penetration_depth) for c in result.contacts)
 
-    return Contestant(name='python-fcl collide', call='fcl.collide, enable_contact',
-                      returns='up to 8 points with depths, normals', package='python-fcl',
-                      boxes=boxes, at=wxyz, read=read)
+    return Contestant(name='python-fcl collide', package='python-fcl',
+                      call='setTranslation, setQuatRotation, fcl.collide, enable_contact',
+                      returns='up to 8 points with depths, normals', boxes=boxes, at=wxyz,
+                      read=read)
 
 
 ENGINES = [collision]

@@ -40,8 +40,9 @@ def report(numbers: Collection[int], drawn: Collection[int], folder: Path, *, qu
     if {3, 4} & set(numbers) or 10 in drawn:
         from . import soup_tables  # only here: python-fcl is an extra
 
-        _, sets = tables.with_sets('paper')
-        result = soup_tables.measure(sets['contact']['external'].inputs, quick=quick)
+        written, touching = (tables.with_sets(tables.TABLE_1[name])[1]['seed_1']['external'].inputs
+                             for name in ('as written', 'dropped'))
+        result = soup_tables.measure(written, touching, quick=quick)
         output.write_csv(folder / 'paper_soup.csv', result.rows,
                          about=output.machine(native, ('numpy', 'python-fcl')))
         if 10 in drawn:

@@ -5,15 +5,15 @@
 
 1. Placements. The first box stays at the origin. Its trihedron is its faces +x, +y, +z. The second
    box's trihedron is its faces −x, −y, −z, with the corner (−, −, −) and 7 vertices. Roll, pitch
-   and yaw of the second box are drawn uniformly in [−π/2, π/2], or from a grid of values there.
+   and yaw of the second box are drawn uniformly in [−π/2, π/2].
    - vertex-face: a point is drawn uniformly by area on the first trihedron. One of the 7 vertices
      is placed on the point. The normal is the face's.
    - edge-edge: a point is drawn uniformly by length on the 9 edges of each trihedron. The second
      point is placed on the first. The normal is the cross product of the edges, from the first box
      to the second.
-   The paper does not say that placements in which the boxes interpenetrate are dropped. `Drawing`
-   keeps or drops them. In all others, one plane through the point separates the boxes, so the label
-   depends on the pose alone.
+   The paper does not say whether placements in which the boxes interpenetrate are dropped. `kept`
+   is the share of a set that is placed as the paper writes, where they are not. In all others, one
+   plane through the point separates the boxes, so the label depends on the pose alone.
 2. Patterns. Inputs are the second box's offset t [m], and its roll, pitch and yaw [rad], in the
    first box's frame: R = Rz(yaw) Ry(pitch) Rx(roll). Outputs are azimuth and elevation [rad] of the
    impact point's direction from the first box's centre, then of the normal.
@@ -22,9 +22,9 @@
    - `committee`: for cubes, folded like `paper`. Each expert has placements of one kind. The third
      kind is face-face: see `face_face_candidates`. The classifier has all three kinds, and an
      output for each: 1 for the kind of the placement, 0 for the others.
-   - `continuous`: for cubes. The features that meet, by SAT, choose the subset. The fold
-     `features.to_features` brings them to the reference features. The same pose always falls in
-     the same subset, however it was drawn.
+   - `by_subset`: for cubes. Either the features that meet, by SAT, choose the subset, and the fold
+     `features.to_features` brings them to the reference features. Or the signs of the three angles
+     choose it, and patterns are left as drawn.
 
 Everything is drawn from one seed, every set from a stream of its own. So any set can be made
 without the others.
@@ -34,6 +34,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -50,6 +51,9 @@ from .models import EXPERTS, SUBSETS
 SETS = ('training', 'cross-validation', 'external')
 PAPER_COUNTS = (8000, 5000, 75000)  # patterns per set, with discontinuities
 CONTINUOUS_COUNTS = (10000, 6000, 50000)  # patterns per set and subset, without discontinuities
+SIGNS = {''.join(signs): number for number, signs in enumerate(product('+-', repeat=3))}
+"""Subsets by the signs of roll, pitch and yaw, with their numbers."""
+Kept = float | Sequence[float]  # share of placements as written, of all sets or of each
 NO_FOLD, OCTANT, FEATURES = 'as drawn', 'to the octant', 'to reference features'
 """Ways into a network's domain."""
 
@@ -60,9 +64,6 @@ INTERPENETRATION = 1e-12
 """Depth, as a fraction of the largest extent, from which on boxes interpenetrate. Rounding gives a
 placement made to touch a depth of some 1e-16. Of the random placements that overlap, one in 1e11
 would be let through."""
-
-PARALLEL = 1e-9
-"""Sine of the angle up to which two edges are parallel and have no common normal."""
 
 POLE = 1e-12
 """Sine of the angle to the z axis below which a direction is the pole and its azimuth is 0. It is
@@ -99,25 +100,6 @@ class Placements:
 
 
 @dataclass(frozen=True)
-class Drawing:
-    """How placements are drawn."""
-
-    kept: bool = False  # whether boxes that interpenetrate are kept
-    grid: int = 0
-    """Values of each angle, evenly from −π/2 to π/2; 0: any value."""
-
-    def angles(self, rng: np.random.Generator, count: int) -> np.ndarray:
-        """Return roll, pitch, yaw (count, 3) [rad]."""
-        end = 0.5 * np.pi
-        if self.grid:
-            return rng.choice(np.linspace(-end, end, self.grid), (count, 3))
-        return rng.uniform(-end, end, (count, 3))
-
-
-TOUCHING = Drawing()
-
-
-@dataclass(frozen=True)
 class Patterns:
     """n patterns for a network: see the module's docstring, 2."""
 
@@ -146,8 +128,12 @@ def as_poses(inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return pose_a, np.concatenate([inputs[:, :3], quaternion_from_euler(inputs[:, 3:])], axis=1)
 
 
-def vertex_face_candidates(rng: np.random.Generator, count: int, half: np.ndarray,
-                           drawing: Drawing = TOUCHING) -> Placements:
+def _angles(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Return roll, pitch, yaw (count, 3) [rad]."""
+    return rng.uniform(-0.5 * np.pi, 0.5 * np.pi, (count, 3))
+
+
+def vertex_face_candidates(rng: np.random.Generator, count: int, half: np.ndarray) -> Placements:
     """Put a vertex of the second trihedron on a random point of the first; most interpenetrate."""
     area = np.prod(half) / half
     face = rng.choice(3, count, p=area / area.sum())
@@ -157,22 +143,17 @@ def vertex_face_candidates(rng: np.random.Generator, count: int, half: np.ndarra
     # The bits of 0 … 6 are the seven vertices; 7 would be (+, +, +), which is on none of its faces.
     bits = rng.integers(0, 7, count)[:, None] >> np.arange(3) & 1
     vertex = np.where(bits == 1, half, -half)
-    inputs, _ = _placed(point, vertex, drawing.angles(rng, count))
+    inputs, _ = _placed(point, vertex, _angles(rng, count))
     return Placements(tuple((2.0 * half).tolist()), inputs, point, np.eye(3)[face])
 
 
-def edge_edge_candidates(rng: np.random.Generator, count: int, half: np.ndarray,
-                         drawing: Drawing = TOUCHING) -> Placements:
-    """Put a random point of the second trihedron's edges on one of the first's.
-
-    Parallel edges, which angles of a grid make, have a normal of NaN: `touching` drops them.
-    """
+def edge_edge_candidates(rng: np.random.Generator, count: int, half: np.ndarray) -> Placements:
+    """Put a random point of the second trihedron's edges on one of the first's."""
     point, along_a = _edge_points(rng, count, half)
     on_b, along_b = _edge_points(rng, count, half)
-    inputs, rotation = _placed(point, -on_b, drawing.angles(rng, count))
+    inputs, rotation = _placed(point, -on_b, _angles(rng, count))
     normal = np.cross(np.eye(3)[along_a], rotation[np.arange(count), :, along_b])
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    normal /= np.where(length > PARALLEL, length, np.nan)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     normal *= np.where(np.sum(normal * inputs[:, :3], axis=1) < 0.0, -1.0, 1.0)[:, None]
     return Placements(tuple((2.0 * half).tolist()), inputs, point, normal)
 
@@ -199,12 +180,11 @@ def _placed(point: np.ndarray, on_b: np.ndarray, angles: np.ndarray,
     return np.concatenate([offset, angles], axis=1), rotation
 
 
-def face_face_candidates(rng: np.random.Generator, count: int, half: np.ndarray,
-                         drawing: Drawing = TOUCHING) -> Placements:
+def face_face_candidates(rng: np.random.Generator, count: int, half: np.ndarray) -> Placements:
     """Lay a face of the second trihedron on one of the first's, tilted by up to TILT; for cubes.
 
     Spin and place are uniform, of faces that overlap. The impact point is the middle of the faces'
-    overlap without the tilt. `drawing` does not matter. Where they do not meet, the normal is NaN.
+    overlap without the tilt. Where they do not meet, the normal is NaN.
     """
     rows, axis = np.arange(count), rng.integers(0, 3, count)
     normal = np.eye(3)[axis]
@@ -234,26 +214,32 @@ GENERATORS = (vertex_face_candidates, edge_edge_candidates)
 
 
 def touching(rng: np.random.Generator, count: int, size: Sequence[float],
-             candidates: Callable[[np.random.Generator, int, np.ndarray, Drawing], Placements],
-             drawing: Drawing = TOUCHING) -> Placements:
-    """Return `count` placements of one of the two kinds."""
+             candidates: Callable[[np.random.Generator, int, np.ndarray], Placements],
+             *, as_written: bool = False) -> Placements:
+    """Return `count` placements of a kind; `as_written`: also those that interpenetrate."""
     half = 0.5 * np.asarray(size, dtype=np.float64)
     found: list[Placements] = []
     while sum(map(len, found)) < count:
-        drawn = candidates(rng, CHUNK, half, drawing)
+        drawn = candidates(rng, CHUNK, half)
         wanted = np.isfinite(drawn.normal).all(axis=1)
-        if not drawing.kept:
+        if not as_written:
             wanted &= query(drawn).separation >= -INTERPENETRATION * max(size)
         found.append(drawn[wanted])
     return _joined(found)[:count]
 
 
-def mixed(rng: np.random.Generator, count: int, size: Sequence[float],
-          drawing: Drawing = TOUCHING) -> Placements:
-    """Return `count` placements in random order, half of them of each kind."""
+def mixed(rng: np.random.Generator, count: int, size: Sequence[float], kept: float = 0.0,
+          ) -> Placements:
+    """Return `count` placements in random order, half of them of each kind.
+
+    kept: share that is placed as written. In the rest, boxes that interpenetrate are dropped.
+    """
     edges = round(count / 2)
-    parts = [touching(rng, wanted, size, candidates, drawing)
-             for wanted, candidates in zip((count - edges, edges), GENERATORS) if wanted]
+    parts = []
+    for wanted, candidates in zip((count - edges, edges), GENERATORS):
+        written = round(kept * wanted)
+        parts += [touching(rng, some, size, candidates, as_written=as_written) for some, as_written
+                  in ((written, True), (wanted - written, False)) if some]
     return _joined(parts)[rng.permutation(count)]
 
 
@@ -272,7 +258,8 @@ class Folded:
     inputs: np.ndarray  # (n, 6) t [m]; roll, pitch, yaw [rad]
     point: np.ndarray  # (n, 3) impact point [m]
     normal: np.ndarray  # (n, 3)
-    subset: np.ndarray  # (n,) number of `SUBSETS` after FEATURES, else −1
+    subset: np.ndarray
+    """(n,) number of `SUBSETS` after FEATURES, of `SIGNS` after NO_FOLD, else −1."""
 
     def patterns(self, rows: np.ndarray | slice = slice(None)) -> Patterns:
         """Return the inputs and outputs of some rows."""
@@ -284,6 +271,7 @@ def fold(placements: Placements, how: str) -> Folded:
     """Bring placements into a network's domain by NO_FOLD, OCTANT or FEATURES."""
     subset = np.full(len(placements), -1)
     if how == NO_FOLD:  # inputs are as drawn, zeros keep the signs that tell azimuths ±π apart
+        subset = (placements.inputs[:, 3:] < 0.0) @ (4, 2, 1)
         return Folded(placements.inputs, placements.point, placements.normal, subset)
     sat = query(placements)
     if how == OCTANT:
@@ -308,37 +296,43 @@ def spherical(direction: np.ndarray) -> np.ndarray:
     return np.column_stack([np.where(pole, 0.0, np.arctan2(y, x)), np.arctan2(z, across)])
 
 
-def _streams(seed: int, counts: Sequence[int], sets: Sequence[str],
-             ) -> Iterator[tuple[str, int, np.random.Generator]]:
-    """Yield name, number of patterns and random stream of the sets asked for."""
+def _streams(seed: int, counts: Sequence[int], sets: Sequence[str], kept: Kept = 0.0,
+             ) -> Iterator[tuple[str, int, float, np.random.Generator]]:
+    """Yield name, number of patterns, share kept and random stream of the sets asked for."""
+    shares = np.broadcast_to(kept, len(SETS)).tolist()
     for number, name in enumerate(SETS):
         if name in sets:
-            yield name, counts[number], np.random.default_rng([seed, number])
+            yield name, counts[number], shares[number], np.random.default_rng([seed, number])
 
 
 def paper(seed: int, *, size: Sequence[float] = CUBE, counts: Sequence[int] = PAPER_COUNTS,
-          folded_in: bool = True, sets: Sequence[str] = SETS,
-          drawing: Drawing = TOUCHING) -> dict[str, Patterns]:
+          folded_in: bool = True, sets: Sequence[str] = SETS, kept: Kept = 0.0,
+          ) -> dict[str, Patterns]:
     """Return the sets with discontinuities, for two boxes of full extents `size` [m].
 
     `folded_in`: in the domain of `to_octant`, as at inference; otherwise as drawn.
     """
     how = OCTANT if folded_in else NO_FOLD
-    return {name: fold(mixed(rng, count, size, drawing), how).patterns()
-            for name, count, rng in _streams(seed, counts, sets)}
+    return {name: fold(mixed(rng, count, size, share), how).patterns()
+            for name, count, share, rng in _streams(seed, counts, sets, kept)}
 
 
-def continuous(seed: int, *, counts: Sequence[int] = CONTINUOUS_COUNTS,
-               sets: Sequence[str] = SETS) -> dict[str, dict[str, Patterns]]:
-    """Return the sets of each subset without discontinuities, for two cubes of edge 2."""
-    result: dict[str, dict[str, Patterns]] = {subset: {} for subset in SUBSETS}
-    for name, count, rng in _streams(seed, counts, sets):
-        found: dict[str, list[Patterns]] = {subset: [] for subset in SUBSETS}
-        # Only SAT tells a placement's subset. Placements are drawn until the smaller subset is
-        # full; the larger one is cut to the same number.
+def by_subset(seed: int, how: str, *, counts: Sequence[int] = CONTINUOUS_COUNTS,
+              sets: Sequence[str] = SETS, kept: Kept = 0.0) -> dict[str, dict[str, Patterns]]:
+    """Return the sets of each subset of two cubes of edge 2.
+
+    how: FEATURES, by the features that meet; NO_FOLD, by the signs of the angles, which are the
+    paper's example of a discontinuity.
+    """
+    subsets = SUBSETS if how == FEATURES else SIGNS
+    result: dict[str, dict[str, Patterns]] = {subset: {} for subset in subsets}
+    for name, count, share, rng in _streams(seed, counts, sets, kept):
+        found: dict[str, list[Patterns]] = {subset: [] for subset in subsets}
+        # A placement's subset is known after it is drawn. Placements are drawn until the smallest
+        # subset is full; the larger ones are cut to the same number.
         while min(sum(map(len, parts)) for parts in found.values()) < count:
-            some = fold(mixed(rng, 2 * count, CUBE), FEATURES)
-            for subset, number in SUBSETS.items():
+            some = fold(mixed(rng, len(subsets) * count, CUBE, share), how)
+            for subset, number in subsets.items():
                 found[subset].append(some.patterns(some.subset == number))
         for subset, parts in found.items():
             result[subset][name] = Patterns(np.concatenate([p.inputs for p in parts])[:count],
@@ -354,7 +348,7 @@ def committee(seed: int, *, counts: Sequence[int] = CONTINUOUS_COUNTS,
     """
     kinds = dict(zip(EXPERTS, (*GENERATORS, face_face_candidates)))
     result: dict[str, dict[str, Patterns]] = {'classifier': {}, **{kind: {} for kind in kinds}}
-    for name, count, rng in _streams(seed, counts, sets):
+    for name, count, _, rng in _streams(seed, counts, sets):
         share, inputs = -(-count // len(kinds)), []
         for kind, candidates in kinds.items():
             some = fold(touching(rng, count + share, CUBE, candidates), OCTANT)
@@ -371,11 +365,13 @@ def of_card(card: Mapping[str, Any], sets: Sequence[str] = SETS,
     """Return the sets a model card speaks of, made again: per network, per set."""
     data = card['data']
     counts = [data['counts'][name] for name in SETS]
-    if card['model'] in ('paper-committee', 'paper-continuous'):
-        make = committee if card['model'] == 'paper-committee' else continuous
-        return make(card['seed'], counts=counts, sets=sets)
+    kept = data.get('kept', 0.0)
+    if card['model'] == 'paper-committee':
+        return committee(card['seed'], counts=counts, sets=sets)
+    if card['model'] == 'paper-continuous':
+        how = FEATURES if data['folded_in'] else NO_FOLD
+        return by_subset(card['seed'], how, counts=counts, sets=sets, kept=kept)
     seeds = {f'seed_{seed}': seed for seed in data.get('seeds', ())} or {'contact': card['seed']}
-    drawing = Drawing(data.get('kept', False), data.get('grid', 0))
     return {network: paper(seed, size=card['sizes'][0], counts=counts, sets=sets,
-                           folded_in=data['folded_in'], drawing=drawing)
+                           folded_in=data['folded_in'], kept=kept)
             for network, seed in seeds.items()}

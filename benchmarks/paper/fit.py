@@ -34,6 +34,7 @@ from .dataset import Patterns
 from .errors import difference
 
 CHECKS = 200  # least number of times that the cross-validation error is looked at in a training
+ROWS = 5000  # patterns whose answers are in memory at a time, of all networks
 
 
 @dataclass(frozen=True)
@@ -199,7 +200,9 @@ def tensors(patterns: Patterns, scaling: Scaling) -> tuple[Tensor, Tensor]:
 @torch.no_grad()
 def rmse(networks: Ensemble, x: Tensor, y: Tensor, wrap: bool) -> Tensor:
     """Return the root mean square errors (networks,) [rad]."""
-    return difference(networks(x), y, wrap).square().mean((1, 2)).sqrt()
+    squares = [difference(networks(inputs), outputs, wrap).square().mean(2)
+               for inputs, outputs in zip(x.split(ROWS), y.split(ROWS))]
+    return torch.cat(squares, dim=1).mean(1).sqrt()
 
 
 def fit(training: Patterns, checking: Patterns, settings: PaperSettings, *, progress: str = '',

@@ -38,11 +38,13 @@ from . import dataset
 from .fit import PaperSettings
 from .fit import fit as fit_paper
 from .halving import Candidate, CheckpointError, Rung, Rungs, Scores, Search, ranking
-from .jobs import JOBS, PaperJob
+from .jobs import JOBS, MIXTURE, PaperJob
 
 PACKAGES = ('numpy', 'torch')  # whose versions are named
 
 _CANDIDATES = 1001  # stream of random numbers
+QUICK_COUNTS = (400, 200, 200)  # patterns per set
+SHOWN = 1.5  # errors up to which networks are drawn [rad]: some diverge
 
 
 class PaperSearch(Search):
@@ -76,31 +78,36 @@ class PaperSearch(Search):
         return found
 
     def train(self, rung: Rung, group: Sequence[Candidate], seed: int) -> list[Scores]:
-        """Train by backpropagation with momentum; the error is the cross-validation RMSE [rad]."""
+        """Train by backpropagation with momentum; the error is the cross-validation RMSE [rad].
+
+        Finalists also get their error on the external set.
+        """
         inputs, outputs = self.settings.widths[0], self.settings.widths[-1]
         fitted = fit_paper(self.sets['training'], self.sets['cross-validation'], PaperSettings(
             (inputs, *map(max, zip(*(one.hidden for one in group))), outputs),
             networks=len(group), epochs=rung.effort, batch=rung.batch,
             rate=[one.rate for one in group], momentum=[one.momentum for one in group],
             initial=[one.initial for one in group], hidden=[one.hidden for one in group],
-            seed=seed))
-        return [{'error': inside, 'external': beyond} for inside, beyond in zip(
-            fitted.error.tolist(), fitted.errors(self.sets['external']).tolist())]
+            wrap=self.settings.wrap, seed=seed))
+        scores = [{'error': error} for error in fitted.error.tolist()]
+        if rung == self.rungs[-1]:
+            for score, error in zip(scores, fitted.errors(self.sets['external']).tolist()):
+                score['external'] = error
+        return scores
 
 
 def paper_searches(*, seed: int, count: int, quick: bool) -> list[PaperSearch]:
-    """Return one for the network with discontinuities, one for each subset of that without.
+    """Return one for the network with discontinuities, and one for a subset of that without.
 
-    Half of the candidates are the first's. External sets are cut to what ranks a few finalists.
+    Both are on the patterns of Tables 1 and 2, each with half of the candidates.
     """
-    counts, subset_counts = (((400, 200, 200),) * 2 if quick else
-                             ((8000, 5000, 5000), (10000, 6000, 5000)))
-    common: dict[str, Any] = {'seed': seed, 'quick': quick}
-    subsets = dataset.continuous(seed, counts=subset_counts)
-    return [PaperSearch('paper', JOBS['paper'], dataset.paper(seed, counts=counts),
-                        count=count - 2 * (count // 4), **common),
-            *(PaperSearch(f'paper-continuous, {subset}', JOBS['paper-continuous'], sets,
-                          count=count // 4, **common) for subset, sets in subsets.items())]
+    common: dict[str, Any] = {'seed': seed, 'quick': quick, 'count': count // 2}
+    counts, subset_counts = ((QUICK_COUNTS,) * 2 if quick else
+                             (dataset.PAPER_COUNTS, dataset.CONTINUOUS_COUNTS))
+    whole = dataset.paper(seed, counts=counts, folded_in=False, kept=MIXTURE)
+    subsets = dataset.by_subset(seed, dataset.NO_FOLD, counts=subset_counts, kept=MIXTURE)
+    return [PaperSearch('with discontinuities', JOBS['table-1-mixture'], whole, **common),
+            PaperSearch('without, signs +++', JOBS['table-2-by-signs'], subsets['+++'], **common)]
 
 
 def settings_of(search: Search, one: Candidate) -> dict[str, float]:
@@ -142,21 +149,20 @@ def write_table(path: Path, results: Sequence[tuple[Search, Rungs]]) -> None:
 
 
 def plot(path: Path, results: Sequence[tuple[Search, Rungs]]) -> None:
-    """Draw the error after each rung against the network's size."""
+    """Draw the error of each network after its last rung against its size, where it converged."""
     name = 'multiply-adds'
-    figure, panels = subplots(1, len(results), (3.3 * len(results), 3.3))
+    figure, panels = subplots(1, len(results), (3.3 * len(results), 3.3), sharey=True)
     for panel, (search, done) in zip(panels[0], results):
         some = search.candidates()
         for number, rung in enumerate(done, start=1):
-            left = [one for one in some if one.number in rung]
+            left = [one for one in some if one.number in rung and rung[one.number]['error'] < SHOWN
+                    and not (number < len(done) and one.number in done[number])]
             panel.scatter([settings_of(search, one)[name] for one in left],
                           [rung[one.number]['error'] for one in left], s=5, linewidths=0,
-                          color=f'C{number}', label=f'after rung {number}')
+                          color=f'C{number}', label=f'last rung: {number}')
         panel.plot(settings_of(search, some[0])[name], done[-1][0]['error'], 'k*', markersize=11,
                    label='in use')
-        panel.set(title=search.name, xlabel=f'{name} of the network', yscale='log')
-        panel.yaxis.set_major_formatter('{x:g}')
-        panel.yaxis.set_minor_formatter('')
+        panel.set(title=search.name, xlabel=f'{name} of the network')
     panels[0, 0].set_ylabel('RMSE over the angles [rad]')
     panels[0, 0].legend(fontsize=8)
     figure.savefig(path)
@@ -200,7 +206,8 @@ def main(args: Sequence[str] | None = None) -> int:
             f'{(time.monotonic() - began) / 60.0:.1f} minutes on '
             f'{machine(native, PACKAGES)}.')
     text = page('benchmarks/paper/pages/search', made=made,
-                total=sum(len(done[0]) for _, done in results))
+                total=sum(len(done[0]) for _, done in results), external=' and '.join(
+            f'{len(search.sets["external"]):,} patterns' for search in searches))
     text += f'\n![Settings and errors]({name}.png)\n' + ''.join(
         section(*result) for result in results)
     text += f'\nAll candidates: [{name}.csv]({name}.csv).\n'

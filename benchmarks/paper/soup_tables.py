@@ -3,14 +3,14 @@
 
 """Tables 3 and 4 and Figure 10 of the source paper: what a polygon soup costs, and its errors.
 
-Times are CPU times of one thread on one pinned core, after a warm-up, with garbage collection off.
-Like the paper's gprof, they leave out what other programs take meanwhile. table_3.md says what is
-timed: the step, FCL alone, the answer.
+The patterns are placed as the paper writes: cubes may interpenetrate. Touching and near-parallel
+cubes stand beside them. Times are CPU times of one thread on one pinned core, after a warm-up, with
+garbage collection off. Like the paper's gprof, they leave out what other programs take meanwhile.
 """
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,10 +25,11 @@ from box_contact_ros.soup import soup
 from .. import output
 from ..contestant import Contestant, ours
 from ..errors import degrees_between, distances
-from ..pose_sets import CUBE, Pairs, at_depth, coplanar, drawn, on_cube, stacks
+from ..pose_sets import CUBE, Pairs, at_depth, drawn, on_cube, stacks
 from ..timing import cpu_milliseconds, no_garbage_collection, pinned, usable_cores
 from .dataset import as_poses
 from .models import continuous
+from .tree import count_tests, tree
 
 PAPER = {8: (1.10, 11233, 11.52), 10: (1.47, 14323, 15.47), 12: (1.85, 17911, 19.2),
          14: (1.94, 21789, 23.13), 16: (2.13, 24667, 24.63), 18: (2.31, 26517, 28.0),
@@ -43,7 +44,12 @@ OVERLAP = 1e-3
 touch the soup finds nothing in a part of the patterns."""
 SEED = 20
 WARM_UP = 30      # patterns before any that counts
-REPEATS = 5       # timings of the pattern with the most pairs; their median counts
+REPEATS = 5       # timings of the pattern with the most tests; their median counts
+SIEVE = 4
+"""Divisions at which the tests of all patterns are counted. At each N of the tables, those of the
+patterns with the most tests there are counted: of 4,000, the first had the most at N = 22, too."""
+SIEVED = 200
+COUNTED = 1000  # patterns of which the mean number of tests is taken
 
 
 @dataclass(frozen=True)
@@ -51,14 +57,14 @@ class Counts:
     """How many patterns of a regime are looked at."""
 
     timed: int
-    thin: int  # every so many of them are timed for FCL alone and for the answer
     judged: int  # of how many the accuracy is measured
+    sieved: int = 0  # among how many the one with the most tests is looked for
 
 
-FULL = {'touching': Counts(75_000, 25, 1000), 'near-parallel': Counts(1000, 1, 1000),
-        'coplanar': Counts(1000, 10, 100)}
-QUICK = {'touching': Counts(100, 10, 20), 'near-parallel': Counts(20, 1, 20),
-         'coplanar': Counts(10, 2, 10)}
+FULL = {'as written': Counts(3000, 0, 75_000), 'touching': Counts(3000, 1000),
+        'near-parallel': Counts(1000, 1000)}
+QUICK = {'as written': Counts(60, 0, 300), 'touching': Counts(60, 20),
+         'near-parallel': Counts(20, 20)}
 REGIMES = tuple(FULL)
 
 Row = dict[str, Any]
@@ -79,17 +85,13 @@ class SoupResult:
 
     soups: Mapping[tuple[str, int], Row]  # by regime and N
     networks: Mapping[str, Row]  # on the touching patterns that the soup's accuracy is measured on
-    exact: float  # mean time of a call of model `exact` [ms]
+    exact: float  # time of a pair in a batch of model `exact` [ms]
     counts: Mapping[str, Counts]
 
     @property
     def rows(self) -> list[Row]:
         """Return the rows of paper_soup.csv."""
         return [*self.soups.values(), *self.networks.values()]
-
-    def ends(self, regime: str) -> tuple[Row, Row]:
-        """Return the rows of the least N of Table 3, and of the largest."""
-        return self.soups[regime, min(PAPER)], self.soups[regime, max(PAPER)]
 
 
 def search(first: fcl.CollisionObject, second: fcl.CollisionObject) -> None:
@@ -103,39 +105,39 @@ def pair_count(contacts: Sequence[fcl.Contact]) -> int:
     return len({(contact.b1, contact.b2) for contact in contacts})
 
 
-def time_soup(divisions: int, patterns: Pairs, thin: int, bar: tqdm) -> Row:
+def time_soup(divisions: int, patterns: Pairs, bar: tqdm) -> Row:
     """Return the columns of times of the soup of N divisions, and of its pairs of triangles."""
-    boxes, answer = soup.Soup(divisions), ours(f'soup-{divisions}').prepare(patterns)
+    boxes = soup.Soup(divisions)
     poses = list(zip(patterns.pose_a, patterns.pose_b))
-    for row, (a, b) in enumerate(poses[:WARM_UP]):
+    for a, b in poses[:WARM_UP]:
         pair = boxes.place(a, b, CUBE, CUBE)
-        soup.collide(*pair), search(*pair), answer[row]()
-    step, pairs, alone, answers = np.empty(len(poses)), np.empty(len(poses), np.int64), [], []
+        soup.collide(*pair), search(*pair)
+    step, alone, pairs = np.empty((3, len(poses)))
     for row, (a, b) in enumerate(poses):
         pair = boxes.place(a, b, CUBE, CUBE)
         step[row], contacts = cpu_milliseconds(soup.collide, *pair)
+        alone[row], _ = cpu_milliseconds(search, *pair)
         pairs[row] = pair_count(contacts)
-        if row % thin == 0:
-            alone.append(cpu_milliseconds(search, *pair)[0])
-            answers.append(cpu_milliseconds(answer[row])[0])
         bar.update()
-    most = boxes.place(*poses[int(np.argmax(pairs))], CUBE, CUBE)
-    most_step, most_alone = (
-        float(np.median([cpu_milliseconds(work, *most)[0] for _ in range(REPEATS)]))
-        for work in (soup.collide, search))
     touching = patterns.contacts().colliding
-    p50, p99, longest = output.percentiles(step, 50, 99, 100)
+    p50, p99, longest = output.percentiles(alone, 50, 99, 100)
     return {
         'patterns': len(poses),
         'touching': int(touching.sum()),  # by SAT
         'misses': int((touching & (pairs == 0)).sum()),
-        'step_mean_ms': float(step.mean()), 'step_p50_ms': p50, 'step_p99_ms': p99,
-        'step_max_ms': longest,
-        'alone_patterns': len(alone), 'alone_mean_ms': float(np.mean(alone)),
-        'alone_by_step': float(np.mean(alone) / step[::thin].mean()),  # of the same patterns
-        'answer_mean_ms': float(np.mean(answers)),
-        'most_pairs': int(pairs.max()), 'most_pairs_step_ms': most_step,
-        'most_pairs_alone_ms': most_alone}
+        'step_mean_ms': float(step.mean()), 'alone_mean_ms': float(alone.mean()),
+        'alone_p50_ms': p50, 'alone_p99_ms': p99, 'alone_max_ms': longest}
+
+
+def most_tests(divisions: int, patterns: Pairs) -> Row:
+    """Return the columns of the pattern with the most box tests."""
+    tests = count_tests(tree(divisions), patterns)
+    row = int(tests.argmax())
+    most = soup.Soup(divisions).place(patterns.pose_a[row], patterns.pose_b[row], CUBE, CUBE)
+    step, alone = (float(np.median([cpu_milliseconds(work, *most)[0] for _ in range(REPEATS)]))
+                   for work in (soup.collide, search))
+    return {'most_tests': int(tests[row]), 'most_tests_pairs': pair_count(soup.collide(*most)),
+            'most_tests_step_ms': step, 'most_tests_alone_ms': alone}
 
 
 def judge_soup(divisions: int, patterns: Pairs, exact: Contacts) -> SoupErrors:
@@ -156,23 +158,19 @@ def judge_soup(divisions: int, patterns: Pairs, exact: Contacts) -> SoupErrors:
         depth=np.array(depths) + exact.separation[rows])
 
 
-def time_calls(model: Contestant, patterns: Pairs) -> float:
-    """Return the mean time of a call [ms]; calls are too short for a clock each."""
-    calls = model.prepare(patterns)
-
-    def all_calls() -> None:
-        for call in calls:
-            call()
-
-    all_calls()
-    return cpu_milliseconds(all_calls)[0] / len(calls)
+def time_batch(model: Contestant, patterns: Pairs) -> float:
+    """Return the time of a pair in a batch [ms]: the sums, without the cost of a Python call."""
+    assert model.prepare_batch is not None
+    run = model.prepare_batch(patterns)
+    run()
+    return cpu_milliseconds(run)[0] / len(patterns.size)
 
 
 def judge_network(model: Contestant, patterns: Pairs, exact: Contacts) -> Row:
     """Return a network's row on touching patterns."""
     found, _ = model.solve(patterns)
     return {'model': model.name, 'regime': 'touching',
-            'answer_mean_ms': time_calls(model, patterns),
+            'batch_mean_ms': time_batch(model, patterns),
             'point_error_mean_m': float(distances(found.point, exact.point).mean()),
             'normal_error_mean_deg': float(degrees_between(found.normal, exact.normal).mean())}
 
@@ -193,18 +191,21 @@ def crossing(errors: Mapping[int, float], level: float) -> float:
     return math.inf
 
 
-def measure(inputs: np.ndarray, *, quick: bool = False) -> SoupResult:
-    """Time and judge every N on every regime; inputs: the paper's external set (n, 6)."""
+def measure(written: np.ndarray, touching: np.ndarray, *, quick: bool = False) -> SoupResult:
+    """Time and judge every N on every regime; external sets (n, 6), as written and touching."""
     counts = QUICK if quick else FULL
-    rng = np.random.default_rng(SEED)
-    patterns = {'touching': on_cube(as_poses(inputs[:counts['touching'].timed])[1]),
-                'near-parallel': drawn(stacks, rng, counts['near-parallel'].timed),
-                'coplanar': coplanar(rng, counts['coplanar'].timed)}
-    judged = {name: pairs.rows(slice(counts[name].judged)) for name, pairs in patterns.items()}
+    timed = {name: count.timed for name, count in counts.items()}
+    whole = on_cube(as_poses(written[:counts['as written'].sieved])[1])
+    touch = on_cube(as_poses(touching)[1])
+    patterns = {'as written': whole.rows(slice(timed['as written'])),
+                'touching': touch.rows(slice(timed['touching'])),
+                'near-parallel': drawn(stacks, np.random.default_rng(SEED), timed['near-parallel'])}
+    sieved = whole.rows(np.argsort(-count_tests(tree(SIEVE), whole))[:SIEVED])
     # At exact touch a few are apart by rounding, and left out.
-    some = patterns['touching'].rows(slice(2 * counts['touching'].judged))
-    judged['touching'] = at_depth(some, np.full(len(some.size), OVERLAP)).rows(
-        slice(counts['touching'].judged))
+    pressed = touch.rows(slice(2 * counts['touching'].judged))
+    judged = {'touching': at_depth(pressed, np.full(len(pressed.size), OVERLAP)),
+              'near-parallel': patterns['near-parallel']}
+    judged = {name: pairs.rows(slice(counts[name].judged)) for name, pairs in judged.items()}
     truth = {name: pairs.contacts() for name, pairs in judged.items()}
     soups: dict[tuple[str, int], Row] = {}
     work = len(PAPER) * sum(c.timed + c.judged for c in counts.values())
@@ -217,40 +218,51 @@ def measure(inputs: np.ndarray, *, quick: bool = False) -> SoupResult:
                 row: Row = {'model': 'soup', 'divisions': divisions,
                             'triangles': 12 * divisions**2, 'regime': regime}
                 if divisions in PAPER:
-                    row |= time_soup(divisions, patterns[regime], counts[regime].thin, bar)
-                errors = judge_soup(divisions, judged[regime], truth[regime])
-                soups[regime, divisions] = row | {
-                    'judged': len(errors.point), 'point_error_mean_m': float(errors.point.mean()),
-                    'point_error_max_m': float(errors.point.max()),
-                    'normal_error_mean_deg': float(errors.normal.mean()),
-                    'depth_error_mean_m': float(errors.depth.mean())}
-                bar.update(len(judged[regime].size))
+                    row |= time_soup(divisions, patterns[regime], bar)
+                    row['mean_tests'] = float(count_tests(
+                        tree(divisions), patterns[regime].rows(slice(COUNTED))).mean())
+                if counts[regime].sieved:
+                    row |= most_tests(divisions, sieved)
+                if regime in judged:
+                    errors = judge_soup(divisions, judged[regime], truth[regime])
+                    row |= {
+                        'judged': len(errors.point),
+                        'point_error_mean_m': float(errors.point.mean()),
+                        'point_error_max_m': float(errors.point.max()),
+                        'normal_error_mean_deg': float(errors.normal.mean()),
+                        'depth_error_mean_m': float(errors.depth.mean())}
+                    bar.update(len(judged[regime].size))
+                soups[regime, divisions] = row
         networks = {model.name: judge_network(model, judged['touching'], truth['touching'])
                     for model in (ours('paper'), ours(continuous(), name='paper-continuous'))}
-        exact = time_calls(ours('exact'), judged['touching'])
+        exact = time_batch(ours('exact'), judged['touching'])
     return SoupResult(soups=soups, networks=networks, exact=exact, counts=counts)
 
 
 def _cell(value: float) -> str:
-    """Return a number of pairs, or a time [ms]."""
+    """Return a number of tests or pairs, or a time [ms]."""
     if isinstance(value, int):
         return f'{value:,}'
     return f'{value:.3f}' if value < 0.1 else f'{value:.2f}'
 
 
-def _by_regime(paper: Mapping[str, Callable[[int], str]], ours: Mapping[str, str],
-               result: SoupResult) -> str:
-    """Return a table with a row per N.
+def _with_growth(head: Sequence[str], rows: Sequence[Sequence[float]]) -> str:
+    """Return a table with a row per N, and how many times the last N's figures are the first's."""
+    growth = [f'× {last / first:.2f}' for first, last in zip(rows[0][1:], rows[-1][1:])]
+    return output.markdown_table(head, [*([_cell(value) for value in row] for row in rows),
+                                        ['growth', *growth]], words=0)
 
-    paper: the paper's figures by title, as functions of N; ours: columns of our rows by title.
+
+def share_as_written(result: SoupResult, divisions: int) -> float:
+    """Return the share of placements as written that the paper's times at an N suggest.
+
+    The paper's mean time divided by its longest is the mean number of box tests divided by the
+    largest, where the rest of the patterns only touch.
     """
-    first = next(iter(ours))
-    titles = [f'{regime}: {title}' if title == first else title
-              for regime in REGIMES for title in ours]
-    return output.markdown_table(['N', *paper, *titles], [
-        [n, *(figure(n) for figure in paper.values()),
-         *(_cell(result.soups[regime, n][column]) for regime in REGIMES
-           for column in ours.values())] for n in PAPER], words=0)
+    written, touching = (result.soups[regime, divisions] for regime in ('as written', 'touching'))
+    mean, _, longest = PAPER[divisions]
+    wanted = mean / longest * written['most_tests']
+    return (wanted - touching['mean_tests']) / (written['mean_tests'] - touching['mean_tests'])
 
 
 def table_of_errors(result: SoupResult) -> str:
@@ -258,21 +270,22 @@ def table_of_errors(result: SoupResult) -> str:
     def cell(row: Row, column: str, unit: float, digits: int = 0) -> str:
         return f'{unit * row[column]:.{digits}f}' if column in row else ''
 
-    head = ['N', 'misses at exact touch']
-    for regime in REGIMES:
-        head += [f'{regime}: point, mean', 'max', 'normal, mean']
-    found = {str(n): [result.soups.get((regime, n), {}) for regime in REGIMES]
+    head, regimes = ['N', 'misses at exact touch'], REGIMES[1:]
+    for regime in regimes:
+        head += [f'{regime}: point, mean', 'max', 'normal, mean', 'depth, mean']
+    found = {str(n): [result.soups.get((regime, n), {}) for regime in regimes]
              for n in sorted({n for _, n in result.soups})}
-    found |= {f'`{name}`': [row, {}, {}] for name, row in result.networks.items()}
+    found |= {f'`{name}`': [row, {}] for name, row in result.networks.items()}
     lines = []
-    for label, (touching, parallel, flat) in found.items():
+    for label, (touching, parallel) in found.items():
         line = [label, f'{100 * touching["misses"] / touching["touching"]:.0f} %'
                 if 'misses' in touching else '']
-        for row in (touching, parallel, flat):
+        for row in (touching, parallel):
             line += [cell(row, 'point_error_mean_m', 1e3, 1), cell(row, 'point_error_max_m', 1e3),
-                     cell(row, 'normal_error_mean_deg', 1.0, 1)]
-        lines.append(line + [cell(row, 'depth_error_mean_m', 1e3) for row in (touching, parallel)])
-    return output.markdown_table([*head, 'depth, touching', 'depth, near-parallel'], lines, words=0)
+                     cell(row, 'normal_error_mean_deg', 1.0, 1),
+                     cell(row, 'depth_error_mean_m', 1e3)]
+        lines.append(line)
+    return output.markdown_table(head, lines, words=0)
 
 
 def _touching_errors(result: SoupResult) -> dict[int, float]:
@@ -297,45 +310,40 @@ def in_words(divisions: float) -> str:
 
 def section_3(result: SoupResult) -> str:
     """Return Table 3, mean times by N and regime, with its notes."""
-    table = _by_regime(
-        {'triangles a cube': lambda n: f'{12 * n**2:,}',
-         'paper: touching': lambda n: f'{PAPER[n][0]:.2f}'},
-        {'step': 'step_mean_ms', 'FCL alone': 'alone_mean_ms', 'answer': 'answer_mean_ms'}, result)
-    _, last = result.ends('coplanar')
-    network = result.networks['paper']['answer_mean_ms']
-    touching, coplanar = ([row['step_mean_ms'] / network for row in result.ends(regime)]
-                          for regime in ('touching', 'coplanar'))
+    columns = ('alone_mean_ms', 'step_mean_ms')
+    head = ['N', 'triangles per cube', 'paper', *(
+        f'{regime}: {title}' for regime in REGIMES for title in ('FCL alone', 'step'))]
+    table = _with_growth(head, [
+        [n, 12 * n**2, PAPER[n][0], *(result.soups[regime, n][column] for regime in REGIMES
+                                      for column in columns)] for n in PAPER])
+    network = result.networks['paper']['batch_mean_ms']
+    ends = min(PAPER), max(PAPER)
     return output.page(
-        'benchmarks/paper/pages/table_3', counts=result.counts, table=table,
-        share=100 * (1 - last['alone_by_step']), low=min(PAPER), high=max(PAPER),
-        thin=', '.join(f'{result.ends(regime)[0]["alone_patterns"]:,} {regime}'
-                       for regime in REGIMES),
-        network=1e3 * network, exact=1e3 * result.exact, touching=touching, coplanar=coplanar)
+        'benchmarks/paper/pages/table_3', counts=result.counts, table=table, low=ends[0],
+        high=ends[1], network=1e3 * network, exact=1e3 * result.exact,
+        written=[result.soups['as written', n]['alone_mean_ms'] / network for n in ends],
+        share=[100 * share_as_written(result, n) for n in ends],
+        part=[100 * PAPER[n][0] / PAPER[n][2] for n in ends])
 
 
 def section_4(result: SoupResult) -> str:
-    """Return Table 4, the patterns with the most pairs and their times, with its notes."""
-    table = _by_regime(
-        {'paper: tests': lambda n: f'{PAPER[n][1]:,}', 'paper: ms': lambda n: f'{PAPER[n][2]:.2f}'},
-        {'pairs': 'most_pairs', 'step, ms': 'most_pairs_step_ms',
-         'FCL alone, ms': 'most_pairs_alone_ms'}, result)
-    ends = {regime: result.ends(regime) for regime in REGIMES}
-    low, high = min(PAPER), max(PAPER)
-    return output.page(
-        'benchmarks/paper/pages/table_4', table=table, repeats=REPEATS, low=low, high=high,
-        growth_paper=PAPER[high][2] / PAPER[low][2],
-        growth={regime: last['most_pairs_step_ms'] / first['most_pairs_step_ms']
-                for regime, (first, last) in ends.items()},
-        most={regime: f'{first["most_pairs"]:,} to {last["most_pairs"]:,}'
-              for regime, (first, last) in ends.items()},
-        few=max(result.soups['touching', n]['most_pairs'] for n in PAPER))
+    """Return Table 4, the pattern with the most box tests by N, with its notes."""
+    rows = [result.soups['as written', n] for n in PAPER]
+    table = _with_growth(
+        ['N', 'paper: tests', 'box tests', 'paper: ms', 'FCL alone, ms', 'step, ms',
+         'triangles that meet'],
+        [[n, tests, row['most_tests'], took, row['most_tests_alone_ms'], row['most_tests_step_ms'],
+          row['most_tests_pairs']] for (n, (_, tests, took)), row in zip(PAPER.items(), rows)])
+    by_paper = [row['most_tests'] / PAPER[row['divisions']][1] for row in rows]
+    return output.page('benchmarks/paper/pages/table_4', table=table, repeats=REPEATS, sieve=SIEVE,
+                       sieved=SIEVED, count=result.counts['as written'].sieved,
+                       least=min(by_paper), most=max(by_paper))
 
 
 def section_errors(result: SoupResult) -> str:
     """Return the soup's errors, and what differs from the paper."""
-    along = 1e3 * result.ends('near-parallel')[1]['point_error_mean_m']
-    return output.page('benchmarks/paper/pages/soup_errors',
-                       counts=result.counts, along=along,
+    along = 1e3 * result.soups['near-parallel', max(PAPER)]['point_error_mean_m']
+    return output.page('benchmarks/paper/pages/soup_errors', counts=result.counts, along=along,
                        table=table_of_errors(result))
 
 
@@ -351,42 +359,24 @@ SECTIONS = {3: section_3, 4: section_4, 10: section_figure_10}
 
 
 def draw_figure_10(result: SoupResult, path: Path) -> None:
-    """Draw the mean times and the errors against N."""
-    figure, ((upper,), (lower,)) = output.subplots(2, 1, (7.0, 7.0))
+    """Draw the mean and the longest time of the soup, and the network's, against N."""
+    figure, ((axes,),) = output.subplots(1, 1, (7.0, 4.8))
     divisions = list(PAPER)
-    colours = dict(zip(REGIMES, ('tab:blue', 'tab:green', 'tab:red')))
-    for regime, colour in colours.items():
-        _line(upper, divisions, [result.soups[regime, n]['step_mean_ms'] for n in divisions],
-              f'soup, {regime}', color=colour, marker='o')
-    _line(upper, divisions, [PAPER[n][0] for n in divisions], "the paper's soup", color='0.5')
-    for name, time in (('model paper', result.networks['paper']['answer_mean_ms']),
-                       ("the paper's network", PAPER_NETWORK)):
-        _line(upper, divisions, [time] * len(divisions), name, linestyle='--',
-              color='black' if name == 'model paper' else '0.5')
-    upper.set(yscale='log', ylabel='mean time [ms]', xticks=divisions)
-    errors = _touching_errors(result)
-    _line(lower, list(errors), [1e3 * error for error in errors.values()], 'soup, touching',
-          color=colours['touching'], marker='o')
-    for name, n in equal_at(result).items():
-        error = 1e3 * result.networks[name]['point_error_mean_m']
-        _line(lower, list(errors), [error] * len(errors), name, color='black', linestyle='--')
-        if 0.0 < n < math.inf:
-            lower.plot(n, error, 'k*', markersize=11)
-    lower.set(xscale='log', yscale='log', ylabel='mean point error [mm]')
-    ticks = [2**power for power in range(7)]
-    lower.set_xticks(ticks, [str(tick) for tick in ticks])
-    lower.set_xticks([], minor=True)
-    for axes in (upper, lower):
-        axes.set_xlabel('divisions N of an edge')
-        axes.grid(color='0.9', linewidth=0.6)
-        axes.set_axisbelow(True)
-        axes.spines[['top', 'right']].set_visible(False)
+    rows = [result.soups['as written', n] for n in divisions]
+    network = result.networks['paper']['batch_mean_ms']
+    for who, colour, lines in (
+            ('paper', '0.55', ([PAPER[n][2] for n in divisions], [PAPER[n][0] for n in divisions],
+                               PAPER_NETWORK)),
+            ('here', 'tab:blue', ([row['most_tests_alone_ms'] for row in rows],
+                                  [row['alone_mean_ms'] for row in rows], network))):
+        for what, style, values in zip(('soup, most tests', 'soup, mean', 'network'),
+                                       ('-^', '-o', '--'), lines):
+            axes.plot(divisions, np.broadcast_to(values, len(divisions)), style, color=colour,
+                      markersize=4, label=f'{who}: {what}')
+    axes.set(yscale='log', xticks=divisions, xlabel='divisions N of an edge', ylabel='time [ms]')
+    axes.yaxis.set_major_formatter('{x:g}')
+    axes.grid(color='0.9', linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[['top', 'right']].set_visible(False)
+    figure.legend(loc='outside lower center', ncols=2, frameon=False)
     figure.savefig(path)
-
-
-def _line(axes: Any, divisions: Sequence[int], values: Sequence[float], label: str, *, color: str,
-          marker: str = '', linestyle: str = '-') -> None:
-    """Draw values against N, with their name at the right end."""
-    axes.plot(divisions, values, linestyle, color=color, marker=marker, markersize=3.5)
-    axes.annotate(label, (divisions[-1], values[-1]), (8, 0), textcoords='offset points',
-                  va='center', color=color, annotation_clip=False)

@@ -29,15 +29,17 @@ PAPER = {
         'RMSE': (0.5410, 0.5748, 0.7302)},
 }
 """The paper's figures [rad], by table: training, cross-validation, external validation."""
-TABLE_1 = {'as written': 'table-1-as-written', 'as written, grid': 'table-1-on-grid',
-           'dropped': 'table-1-dropped', 'folded': 'table-1-folded'}
+TABLE_1 = {'as written': 'table-1-as-written', 'mixture': 'table-1-mixture',
+           'dropped': 'table-1-dropped'}
 """Files of Table 1's networks, one network a seed, by what the table calls them."""
+TABLE_2 = {'by signs': 'table-2-by-signs', 'by features': 'paper-continuous'}
+"""Files of Table 2's networks, one network a subset."""
 SHOWN = 150  # patterns in Figure 9
 
 Errors = dict[str, np.ndarray]  # errors (n, 4) [rad] by set
 
 
-@functools.lru_cache(maxsize=4)  # some tables and figures share them; they take seconds to make
+@functools.cache  # some tables and figures share them; they take seconds to make
 def with_sets(name: str) -> tuple[Weights, dict[str, dict[str, Patterns]]]:
     """Return a weights file, and the sets of its card by network and name."""
     weights = load_weights(weights_path(name))
@@ -101,6 +103,12 @@ def by_output(found: Trainings) -> str:
     return output.markdown_table(['', '', *dataset.OUTPUTS], rows, words=2)
 
 
+def spread_of_outputs(seeds: Sequence[Errors]) -> float:
+    """Return the largest MAE of an output on the external set divided by the smallest."""
+    mae = np.mean([np.abs(errors['external']).mean(axis=0) for errors in seeds], axis=0)
+    return float(mae.max() / mae.min())
+
+
 def by_part(columns: Mapping[str, Errors]) -> str:
     """Return our figures on all sets, for all outputs, the point's and the normal's."""
     rows = []
@@ -123,17 +131,23 @@ def sections_1_and_2(tables: Collection[int], step: int) -> list[str]:
     sections, detail = [], {}
     if 1 in tables:
         found = {title: list(evaluate(name, step).values()) for title, name in TABLE_1.items()}
-        card = with_sets(TABLE_1['as written'])[0].card
+        card = with_sets(TABLE_1['mixture'])[0].card
+        shares = card['data']['kept']
         sections.append(_page('table_1', table=table_1(found), by_output=by_output(found),
                               seeds=len(card['data']['seeds']),
+                              inside=100 * shares[0], beyond=100 * shares[2],
+                              spread=spread_of_outputs(found['mixture']),
                               starts=card['training']['seed_1']['starts']))
         detail['paper'] = evaluate('paper', step)['contact']
     if 2 in tables:
-        subsets = evaluate('paper-continuous', step)
-        pooled = {name: np.concatenate([errors[name] for errors in subsets.values()])
-                  for name in SETS}
-        detail |= subsets
-        sections.append(_page('table_2', table=beside_paper(2, {'ours, easier': pooled})))
+        pooled = {title: {name: np.concatenate([errors[name] for errors in
+                                                evaluate(file, step).values()]) for name in SETS}
+                  for title, file in TABLE_2.items()}
+        above = [100.0 * (figures(pooled['by signs'][name])[figure] / theirs[place] - 1.0)
+                 for figure, theirs in PAPER[2].items() if figure != 'ME'
+                 for place, name in enumerate(SETS)]
+        sections.append(_page('table_2', table=beside_paper(2, pooled), least=min(above),
+                              most=max(above)))
     if 1 in tables:
         detail['containers'] = evaluate('paper-12.192x2.438x2.591', step)['contact']
         sections.append(committee.section(step))
@@ -141,20 +155,16 @@ def sections_1_and_2(tables: Collection[int], step: int) -> list[str]:
 
 
 def draw_figure_9(path: Path) -> None:
-    """Draw the first output, desired and modelled."""
-    picture, panels = output.subplots(2, 1, (8.0, 7.6), sharex=True)
-    for axes, (name, network) in zip(panels.flat, (('paper', 'contact'),
-                                                   ('paper-continuous', 'vertex_face'))):
-        weights, sets = with_sets(name)
-        patterns = sets[network]['external']
-        wanted = patterns.outputs[:SHOWN, 0]
-        order = np.argsort(wanted, kind='stable')
-        said = predict(weights.networks[network], patterns.inputs[:SHOWN])[:, 0]
-        axes.plot(wanted[order], color='black', label='desired')
-        axes.plot(said[order], '.', color='tab:red', markersize=5, label='modelled')
-        axes.set(title=name if network == 'contact' else f'{name}, {network}',
-                 ylabel='azimuth of the point [rad]')
-        axes.grid(color='0.9', linewidth=0.6)
-    panels[0, 0].legend()
-    axes.set_xlabel('pattern of the external set, sorted')
+    """Draw the first output of the first seed, desired and modelled."""
+    weights, sets = with_sets(TABLE_1['mixture'])
+    patterns = sets['seed_1']['external']
+    wanted = patterns.outputs[:SHOWN, 0]
+    order = np.argsort(wanted, kind='stable')
+    said = predict(weights.networks['seed_1'], patterns.inputs[:SHOWN])[:, 0]
+    picture, ((axes,),) = output.subplots(1, 1, (7.0, 4.2))
+    axes.plot(wanted[order], color='black', label='desired')
+    axes.plot(said[order], '.', color='tab:red', markersize=5, label='modelled')
+    axes.set(ylabel='azimuth of the point [rad]', xlabel='pattern of the external set, sorted')
+    axes.grid(color='0.9', linewidth=0.6)
+    axes.legend()
     picture.savefig(path)

@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The report `accuracy`: contact classes by the definition, rows and their limits."""
+"""The report `accuracy`: contact classes by the definition, rows and their errors."""
 from __future__ import annotations
 
 import csv
@@ -13,10 +13,11 @@ import poses
 import pytest
 
 from benchmarks import accuracy, searched
-from benchmarks.accuracy import CLASSES, AccuracyRow, Summary
+from benchmarks.accuracy import CLASSES
 from benchmarks.contestant import Solved, ours
 from benchmarks.errors import ContactErrors, contact_errors
 from benchmarks.pose_sets import CUBE, LOADS, SETS, Pairs
+from box_contact_ros import ContactSolver
 
 
 def on_a_cube(turn: np.ndarray, depth: float = 1e-3) -> Pairs:
@@ -57,36 +58,7 @@ def test_crossing_edges() -> None:
     assert CLASSES[classes[0]] == 'edge-edge' and winners[0] == 1
 
 
-# --- rows and limits ------------------------------------------------------------------------------
-
-
-def row_of(**changes: object) -> AccuracyRow:
-    """Return a row of model `mlp` on containers without an error, but for what is changed."""
-    none = {name: {'all': Summary(200, *[0.0] * 4)} for name in ContactErrors._fields}
-    return AccuracyRow(**{'model': 'mlp', 'set': 'containers', 'errors': none, 'pairs': 200,
-                          'fallback_share': 0.0, 'outside': 0.0, **changes})
-
-
-@pytest.mark.parametrize(('name', 'value'), [
-    ('fallback_share', 0.021), ('outside', 1e-12), ('outside', np.nan)])
-def test_a_broken_limit_is_named(name: str, value: float) -> None:
-    assert row_of().broken() == []
-    text, = row_of(**{name: value}).broken()
-    assert text.startswith('mlp, containers: ')
-    assert row_of(**{name: value, 'model': 'paper'}).broken() == []
-
-
-@pytest.mark.parametrize('quantity', ContactErrors._fields)
-@pytest.mark.parametrize('name', ['containers', 'landings', 'touching', 'random sizes'])
-def test_limits_of_errors_break(quantity: str, name: str) -> None:
-    """At the 99th percentile, and of a NaN; loads have narrower ones than boxes in any pose."""
-    limit = accuracy.limit_of(quantity, name)
-    assert limit == getattr(accuracy.ANY_POSE_LIMIT if name in accuracy.ANY_POSE
-                            else accuracy.LOAD_LIMIT, quantity)
-    for p99, holds in ((0.999 * limit, True), (1.001 * limit, False), (np.nan, False)):
-        errors = {**row_of().errors, quantity: {'all': Summary(200, 0.0, 0.0, p99, p99)}}
-        broken = row_of(set=name, errors=errors).broken()
-        assert (broken == []) is holds and all(quantity in text for text in broken)
+# --- rows -----------------------------------------------------------------------------------------
 
 
 def test_in_plane_eigenvalues_are_those_across_the_normal() -> None:
@@ -113,36 +85,42 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+P99 = {'point': (0.05, 0.15), 'volume': (0.5, 1.0), 'covariance': (1.0, 3.0),
+       'in_plane': (3.0, 8.0)}
+"""Largest 99th percentile of `mlp` [%]: of loads on what they stand on, of boxes in any pose."""
+ANY_POSE = ('random cubes', 'touching', 'random sizes')
+
+
 def test_quick_run(quick: Path) -> None:
-    assert 'All limits of `mlp` hold.' in (quick / 'accuracy.md').read_text('utf-8')
     assert (quick / 'accuracy.png').stat().st_size > 10_000
     with (quick / 'accuracy.csv').open() as file:
         rows = [row for row in csv.DictReader(file) if row['part'] == 'all']
     assert [(row['set'], row['quantity']) for row in rows] == [
         (name, quantity) for name in SETS | LOADS for quantity in ContactErrors._fields]
     for row in rows:
-        assert float(row['p99']) <= float(row['limit_p99'])
+        assert float(row['p99']) <= P99[row['quantity']][row['set'] in ANY_POSE]
         if row['quantity'] == 'point':
-            assert float(row['outside']) <= accuracy.OUTSIDE
+            assert float(row['outside']) <= 2.0**-44
             assert float(row['fallback_share']) <= (0.12 if row['set'] == 'crossed bars' else 0.02)
 
 
 def test_searched_for_the_worst(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """On one set with every network; a planted miss is named."""
+    """The page says for how long. The worst of a search is no less than that of the draw."""
     pytest.importorskip('tqdm')
     for name, value in (('SETS', {'containers': SETS['containers']}), ('LOADS', {}),
                         ('DRAWN', 3_000), ('PATHS', 5)):
         monkeypatch.setattr(searched, name, value)
-    assert searched.main(['--minutes', '0.02', '--out', str(tmp_path)]) == 0
+    assert searched.main(['--minutes', '0.02', '--seed', '3', '--out', str(tmp_path)]) == 0
     with (tmp_path / 'searched.csv').open() as file:
-        rows = list(csv.DictReader(file))
-    assert len(rows) == 2 * 3 * 3  # seeds, networks, quantities
-    shipped, garbage = ({row['quantity']: float(row['worst']) for row in rows
-                         if row['network'] == network} for network in ('shipped', 'least within'))
-    assert 0.0 < shipped['volume'] <= garbage['volume'] <= 3.0 * searched.LIMITS['volume']
-    monkeypatch.setitem(searched.LIMITS, 'volume', 1e-6)
-    assert searched.main(['--minutes', '0.01', '--out', str(tmp_path)]) == 1
-    assert 'Goals missed: mlp, containers' in (tmp_path / 'searched.md').read_text('utf-8')
+        worst = {row['quantity']: float(row['worst']) for row in csv.DictReader(file)}
+    pairs = SETS['containers'](np.random.default_rng([3, 0]), 3_000)
+    found = pairs.contacts(ContactSolver((1, 1, 1), (1, 1, 1), model='mlp'))
+    errors = contact_errors(found, pairs.contacts(), pairs.edge)
+    for quantity, value in worst.items():
+        assert value >= 0.999 * getattr(errors, quantity).max()
+        assert value <= {'point': 1.0, 'volume': 5.0, 'covariance': 15.0}[quantity]
+    page = (tmp_path / 'searched.md').read_text('utf-8')
+    assert '0.02 minutes on one core: 1 s on each set' in page
 
 
 def test_points_and_depths_of_a_known_contestant_have_known_errors() -> None:
@@ -161,8 +139,6 @@ def test_points_and_depths_of_a_known_contestant_have_known_errors() -> None:
     assert row.errors['point']['all'].pairs == len(pairs.size)
     assert row.errors['volume']['all'].worst == row.errors['covariance']['all'].worst == 0.0
     assert row.fallback_share == pytest.approx(7 / len(pairs.size))
-    assert [text.split()[3] for text in row.broken()] == ['point,', 'points', 'left']
-    assert 'point, p99 0.5 > 0.15' in row.broken()[0]
 
 
 # --- a model of your own --------------------------------------------------------------------------

@@ -102,17 +102,24 @@ def test_impact_point_is_what_the_solver_calls_the_point(placements: Placements)
 
 
 @pytest.mark.parametrize('kind', GENERATORS)
-def test_kept_placements_interpenetrate_and_grids_hold_their_values(kind) -> None:
-    """As the paper writes it: some are deep; angles are multiples of 30°; no normal is missing."""
-    drawing = dataset.Drawing(kept=True, grid=7)
-    kept = dataset.touching(np.random.default_rng(2), COUNT, CUBE, kind, drawing)
+def test_placements_as_written_interpenetrate(kind) -> None:
+    """As the paper writes it: some are deep; the point is on both cubes; no normal is missing."""
+    kept = dataset.touching(np.random.default_rng(2), COUNT, CUBE, kind, as_written=True)
     assert (dataset.query(kept).separation < -0.1).mean() > 0.3
     assert np.isfinite(kept.normal).all()
-    steps = dataset.fold(kept, NO_FOLD).inputs[:, 3:] / (np.pi / 6)
-    assert np.array_equal(np.unique(np.round(steps, 9)), np.arange(-3, 4))
-    half = np.ones(3)
     for point in (kept.point, in_second_box(kept)):
-        assert np.all(np.abs(point).max(axis=1) <= half[0] + 1e-12)
+        assert np.all(np.abs(point).max(axis=1) <= 1.0 + 1e-12)
+
+
+def test_a_mixture_has_its_share_of_each_kind() -> None:
+    """Of placements as written some do not interpenetrate, so fewer than the share are deep."""
+    def deep(**how) -> float:
+        some = dataset.mixed(np.random.default_rng(3), COUNT, CUBE, **how)
+        assert len(some) == COUNT
+        return float((dataset.query(some).separation < -1e-9).mean())
+
+    assert deep() == 0.0
+    assert deep(kept=0.3) == pytest.approx(0.3 * deep(kept=1.0), abs=0.02)
 
 
 def test_faces_lie_on_faces() -> None:
@@ -251,16 +258,26 @@ def test_paper_sets() -> None:
 
 def test_continuous_sets() -> None:
     """The paper's sizes per subset, all patterns distinct."""
-    made = dataset.continuous(1)
+    made = dataset.by_subset(1, FEATURES)
     assert set(made) == {'vertex_face', 'edge_edge'}
     for sets in made.values():
         assert [len(sets[name]) for name in dataset.SETS] == [10000, 6000, 50000]
         assert len(np.unique(all_inputs(sets), axis=0)) == 66000
 
 
+def test_sets_by_signs_have_the_signs_of_their_names() -> None:
+    made = dataset.by_subset(1, NO_FOLD, counts=SMALL, kept=0.5)
+    assert len(made) == 8
+    for signs, sets in made.items():
+        assert [len(sets[name]) for name in dataset.SETS] == list(SMALL)
+        wanted = [1.0 if sign == '+' else -1.0 for sign in signs]
+        assert np.all(np.sign(all_inputs(sets)[:, 3:]) == wanted)
+
+
 def test_sets_come_from_the_seed_alone() -> None:
     """Again the same; each set without the others; another seed, nothing in common."""
-    for make in (lambda *a, **k: {'paper': dataset.paper(*a, **k)}, dataset.continuous):
+    for make in (lambda *a, **k: {'paper': dataset.paper(*a, **k)},
+                 lambda seed, **k: dataset.by_subset(seed, FEATURES, **k)):
         first, again = make(7, counts=SMALL), make(7, counts=SMALL)
         alone = make(7, counts=SMALL, sets=('external',))
         other = make(8, counts=SMALL)

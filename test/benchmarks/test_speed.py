@@ -41,6 +41,13 @@ def test_quick_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         core) == len(instruction_sets()) * len(CORE_MODELS) * len(SETS | FLUSH)
     assert all(float(row[column]) > 0.0 for row in core for column in ('call_p50', 'batch_p50'))
     assert {row['processor'] for row in rows} == {processor()}
+    with (tmp_path / 'speed_cold.csv').open(encoding='utf-8') as file:
+        cold = list(csv.DictReader(file))
+    assert {(row['name'], float(row['megabytes'])) for row in cold} == {
+        (name, megabytes) for name in (speed.UNIT, *CORE_MODELS) for megabytes in speed.TOUCHED}
+    p50 = {(row['name'], float(row['megabytes'])): float(row['call_p50']) for row in cold}
+    for name in CORE_MODELS:  # caches that are cold cost more than they are hot
+        assert p50[name, max(speed.TOUCHED)] > 1.5 * p50[name, 0.0] > 0.0
     text = (tmp_path / 'speed.md').read_text('utf-8')
     assert versions(speed.PACKAGES) in text and 'nan' not in text
     assert text in capsys.readouterr().out

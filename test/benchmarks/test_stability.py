@@ -33,6 +33,8 @@ def planted(fault: str) -> stability.StabilityRow:
             found.point[row] = np.nan
         elif fault == 'depth':
             found.separation[row] *= 1.001
+        elif fault in ('volume', 'covariance'):
+            getattr(found, fault)[row] *= 1.001
         return found
 
     return stability.examine('exact', 'c1_depths', CASES['c1_depths'], solve)
@@ -45,8 +47,10 @@ def test_planted_faults_are_counted(fault: str) -> None:
     assert stability.gates([row]) == [f'exact, c1_depths: 1 {fault}']
 
 
-def test_a_planted_depth_is_seen() -> None:
+def test_planted_errors_are_seen() -> None:
     assert planted('depth').depth > 1e-6
+    assert planted('volume').volume > 0.09 > 1e-6 > planted('depth').volume
+    assert planted('covariance').covariance > 0.05 > 1e-6 > planted('depth').covariance
 
 
 def test_the_program(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -60,7 +64,7 @@ def test_the_program(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         (model, family) for model in stability.MODELS for family in families]
     assert int(rows[-1]['normals']) > 0 and int(rows[0]['normals']) == 0
     assert 'every verdict and normal is right' in (tmp_path / 'stability.md').read_text()
-    assert '**all**' in capsys.readouterr().out
+    assert '| `exact` |' in capsys.readouterr().out
 
 
 def test_the_committed_report_is_complete() -> None:

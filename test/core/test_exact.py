@@ -238,16 +238,9 @@ def test_slivers_that_are_cut_off_obliquely():
     check('ridges', 99, *(part[SLIVERS] for part in pairs))
 
 
-NEEDLE = ((0, 0, 0, -.6680072783375012, -.5329684740396613, -.003947982704248489,
-           -.5193219571715855),
-          (.3551259815683192, .1129042864546822, -.4845977124395742, -.6966290338400403,
-           -.516764130576864, -.06430381572748332, -.49348540185411327),
-          (1, 2.5298221281347034e-06, 3.162277660168379e-06), (3.162277660168379e-06, .7, 1))
-
-
 def test_a_needle_whose_covariance_clipping_had_wrong():
     """Found by a search; clipping was wrong by 4.5 % of the trace."""
-    check('needle', 0, *(np.array([part], dtype=float) for part in NEEDLE))
+    check('needle', 0, *(np.array([part], dtype=float) for part in poses.NEEDLE))
 
 
 @pytest.mark.parametrize('aspect', [1e3, 1e4, 1e5])

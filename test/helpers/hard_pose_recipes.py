@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from poses import NEEDLE, needles
 
 from benchmarks.pose_sets import CONTAINER as FORTY
 from benchmarks.pose_sets import (
@@ -373,13 +374,31 @@ def h7_bay(rng: np.random.Generator) -> Iterator[Case]:
         yield moved(case, np.full(3, 100.3), UPRIGHT)
 
 
+def c7_almost_coincident(rng: np.random.Generator) -> Iterator[Case]:
+    """Yield a box and its twin, displaced, turned or grown by 1e-16 to 1e-3 of its size."""
+    for size in (CUBE, FORTY, (3.0, 2.0, 1.0)):
+        for step in (1e-16, 1e-14, 1e-12, 1e-9, 1e-6, 1e-3):
+            yield at(step * max(size) * unit(rng.normal(size=3)), UPRIGHT, size)
+            yield at(np.zeros(3), turned(AXES[rng.integers(5)], step), size)
+            yield at(step * max(size) * unit(rng.normal(size=3)),
+                     turned(rng.normal(size=3), step), size, (1.0 + step) * np.array(size))
+
+
+def e5_needles(rng: np.random.Generator) -> Iterator[Case]:
+    """Yield rods and plates of aspects 1e3 to 1e8, deep in each other, many almost parallel."""
+    a, b, size_a, size_b = (np.array(part, dtype=np.float64) for part in NEEDLE)
+    yield a, b, size_a, size_b
+    for aspect in (1e3, 1e5, 1e6, 1e7, 1e8):
+        yield from zip(*needles(rng, 12, aspect))
+
+
 FAMILIES: dict[str, Family] = {function.__name__: function for function in (
     a1_tilted_faces, a2_tilted_gaps, a3_parallel_edges, a4_ridges, a5_right_angles,
     a6_float32_quaternions, b1_exact_touch, b2_shared_lines, b3_ladder, b4_one_axis,
     b5_beyond_an_end, b6_spin, b7_corner_gaps, c1_depths, c2_half_through, c3_contained,
     c4_concentric, c5_identical, c6_bars_through, d1_two_axes, d2_three_axes, d3_eighth_turns,
     d4_diagonals, d5_edge_against_face, e1_thin, e2_small_on_large, e3_scales, e4_shallow_in_big,
-    f_far, h1_stacks, h3_between_stacks, h6_spreader, h7_bay)}
+    f_far, h1_stacks, h3_between_stacks, h6_spreader, h7_bay, c7_almost_coincident, e5_needles)}
 """By name; the letter is the group: A parallel, B touching, C deep, D tied, E aspect and scale, F
 far from the origin, H a container yard. G is input that is no pose, and I is motion: tests of their
 own."""

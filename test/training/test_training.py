@@ -114,7 +114,7 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def one_answer(job: PaperJob, network: str) -> bool:
     """Whether the inputs tell the outputs: not where boxes interpenetrate, hardly of a class."""
-    return not job.drawing.kept and network != 'classifier'
+    return not job.kept and network != 'classifier'
 
 
 @pytest.mark.parametrize('job', JOBS.values(), ids=lambda job: job.name)
