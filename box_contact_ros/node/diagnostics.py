@@ -161,7 +161,7 @@ class Diagnostics:
             summary, [name.partition(': ')[2] for name in new if name.startswith('refused')],
             unseen, stale, scene, pairing, topics))
         self._log(findings)
-        self.publish(findings, state=state, model=solver.model, pairs=len(scene.pairs),
+        self.publish(findings, state=state, model=solver.model, pairs=scene.pair_count,
                      stale_boxes=' '.join(stale), boxes_that_never_came=' '.join(unseen),
                      unanswered_pairs=len(summary.unanswered))
 

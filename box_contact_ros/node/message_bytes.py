@@ -16,9 +16,9 @@ import numpy as np
 
 from ..core import LENGTH_MAX, QUATERNION_MAX, QUATERNION_MIN
 from ..scene.pairing import StampedPose
-from ..scene.scene_solver import Answer, Pair
+from ..scene.scene_solver import Answer, Pair, Scene
 from ..solver.checks import pose_fault
-from ..solver.contact import patch_area
+from ..solver.contact import Contacts, patch_areas
 from .messages import NANOSECONDS, Refused
 
 ENCAPSULATION = 4
@@ -35,7 +35,11 @@ _LAYOUT = '<2s2xiI{}s{}x7d'
 """Of a whole little-endian pose, by the sizes of frame_id, its length included, and of what aligns
 the numbers."""
 _COUNT = struct.Struct('<I')
-_DEPTH_VOLUME_AREA = struct.Struct('<3d')
+CONTACT_NUMBERS = np.dtype([('point', '<f8', 3), ('normal', '<f8', 3), ('depth', '<f8'),
+                            ('volume', '<f8'), ('area', '<f8'), ('upper', '<f8', 6)])
+"""The numbers of a contact, in the order of its message."""
+MOST_NAMES = 2**16
+"""Pairs whose names are kept as bytes, some 10 MB."""
 FRAME_AT = ENCAPSULATION + _STAMP.size + 4
 """Where frame_id's characters are: behind stamp and length."""
 _LEAST, _MOST = 2.0 * QUATERNION_MIN, 0.5 * QUATERNION_MAX
@@ -150,8 +154,9 @@ class PoseReader:
 class ContactWriter:
     """Makes the messages of one scene; the bytes of its names are made once."""
 
-    def __init__(self) -> None:
-        self._names_of: dict[tuple[Pair, int], bytes] = {}
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._names_of: dict[tuple[int, int, int], bytes] = {}
 
     def vector(self, header: bytes, vector: np.ndarray) -> bytes:
         """Return a PointStamped or a Vector3Stamped of a header and three numbers."""
@@ -159,18 +164,22 @@ class ContactWriter:
 
     def contacts(self, header: bytes, answer: Answer) -> bytes:
         """Return the `Contacts` of an answer."""
-        names_of, listed = self._names_of, answer.listed
-        parts = [header, _COUNT.pack(len(listed))]
+        names_of, numbers = self._names_of, _numbers_of(answer.contacts)
+        if len(names_of) > MOST_NAMES:
+            names_of.clear()
+        parts = [header, _COUNT.pack(len(answer.pairs))]
         at = (len(header) + _COUNT.size - ENCAPSULATION) % 8
-        for pair, c in listed:
-            names = names_of.get((pair, at)) or names_of.setdefault((pair, at), _names(pair, at))
-            parts.append(
-                names + c.point.tobytes() + c.normal.tobytes()
-                + _DEPTH_VOLUME_AREA.pack(-c.separation, c.volume, patch_area(c))
-                + _upper(c.covariance.tobytes()))
+        end = 0
+        for a, b in answer.pairs.tolist():
+            names = names_of.get((a, b, at))
+            if names is None:
+                names = names_of[a, b, at] = _names(self._scene.pair_of(a, b), at)
+            begin, end = end, end + CONTACT_NUMBERS.itemsize
+            parts += names, numbers[begin:end]
             at = 0  # doubles end each contact, so the next one begins at a multiple of 8
-        parts.append(_COUNT.pack(len(answer.stale)))
-        parts.append(b''.join([_string(pair.label) for pair in answer.stale]))
+        stale = answer.named_stale()
+        parts.append(_COUNT.pack(len(stale)))
+        parts.append(b''.join([_string(pair.label) for pair in stale]))
         return b''.join(parts)
 
 
@@ -199,6 +208,13 @@ def _names(pair: Pair, at: int) -> bytes:
     return names + b'\0' * (-(at + len(names)) % 8)
 
 
-def _upper(square: bytes) -> bytes:
-    """Return the upper triangle, row by row, of a (3, 3) array of float64."""
-    return square[:24] + square[32:48] + square[64:]
+def _numbers_of(contacts: Contacts) -> bytes:
+    """Return the numbers of contacts as a message has them, row by row."""
+    rows = np.empty(len(contacts.separation), CONTACT_NUMBERS)
+    rows['point'], rows['normal'] = contacts.point, contacts.normal
+    np.negative(contacts.separation, out=rows['depth'])
+    rows['volume'], rows['area'] = contacts.volume, patch_areas(contacts)
+    rows['upper'][:, :3] = contacts.covariance[:, 0]
+    rows['upper'][:, 3:5] = contacts.covariance[:, 1, 1:]
+    rows['upper'][:, 5] = contacts.covariance[:, 2, 2]
+    return rows.tobytes()

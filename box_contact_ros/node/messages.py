@@ -13,9 +13,9 @@ import numpy as np
 from builtin_interfaces.msg import Time
 from std_msgs.msg import Header
 
-from ..scene.scene_solver import Answer, Scene
+from ..scene.scene_solver import ALONE, Answer, Scene
 from ..solver.checks import short_repr
-from ..solver.contact import Contact
+from ..solver.contact import Contact, Contacts
 
 NANOSECONDS = 1_000_000_000
 UPPER = np.triu_indices(3)
@@ -49,15 +49,20 @@ def read_answer(message: Any, scene: Scene) -> Answer:
 
     scene: that of the node. Raises Refused for a pair that the scene lacks.
     """
-    pair_of = {pair.label: pair for pair in scene.pairs}
-    for name in (*(entry.pair for entry in message.contacts), *message.stale):
-        if name not in pair_of:
+    index, rows = scene.index_of, {pair.label: row for pair, row in zip(scene.pairs, scene.rows)}
+    if scene.patterns:
+        rows = {name: (number, ALONE) for name, number in index.items()} | rows
+    pairs = [(index.get(entry.box_a), index.get(entry.box_b)) for entry in message.contacts]
+    for name, is_known in (*((entry.pair, None not in pair and scene.has_pair(*pair))
+                             for entry, pair in zip(message.contacts, pairs)),
+                           *((name, name in rows) for name in message.stale)):
+        if not is_known:
             raise Refused('unknown pair', f'{short_repr(name)} is no pair of the scene: read the '
                                           'scene file that the node has')
-    listed = [(pair_of[name], contact) for name, contact in contacts_by_pair(message).items()]
-    return Answer([entry for entry in listed if entry[1].colliding],
-                  [pair_of[name] for name in message.stale], len(listed),
-                  [entry for entry in listed if not entry[1].colliding])
+    boxes, stale = (np.array(part, np.int64).reshape(-1, 2)
+                    for part in (pairs, [rows[name] for name in message.stale]))
+    contacts = [_contact(entry) for entry in message.contacts]
+    return Answer(boxes, Contacts.of(contacts), len(boxes), stale, scene)
 
 
 def _contact(entry: Any) -> Contact:

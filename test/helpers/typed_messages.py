@@ -23,7 +23,7 @@ from box_contact_msgs.msg import Contact as ContactMessage
 from box_contact_msgs.msg import Contacts
 from box_contact_ros.node.messages import NANOSECONDS, UPPER, Refused, make_header
 from box_contact_ros.scene.pairing import StampedPose
-from box_contact_ros.scene.scene_solver import Answer, Pair
+from box_contact_ros.scene.scene_solver import Pair
 from box_contact_ros.solver.checks import pose_fault
 from box_contact_ros.solver.contact import Contact, patch_area
 
@@ -83,22 +83,22 @@ def make_normal(header: Header, contact: Contact) -> Vector3Stamped:
     return Vector3Stamped(header=header, vector=_vector(contact.normal))
 
 
-def make_contacts(header: Header, answer: Answer) -> Contacts:
+def make_contacts(header: Header, listed: Iterable[tuple[Pair, Contact]],
+                  stale: Iterable[str] = ()) -> Contacts:
     """Return `contacts`: the pairs in contact, then the close ones, and the names of the stale."""
     return Contacts(
-        header=header, stale=[pair.label for pair in answer.stale],
+        header=header, stale=list(stale),
         contacts=[ContactMessage(
             pair=pair.label, box_a=pair.a, box_b=pair.b, point=_point(c.point),
             normal=_vector(c.normal), depth=-float(c.separation), volume=float(c.volume),
-            area=patch_area(c), covariance=c.covariance[UPPER]) for pair, c in answer.listed])
+            area=patch_area(c), covariance=c.covariance[UPPER]) for pair, c in listed])
 
 
 def named_contacts(touching: Mapping[str, Contact], stale: Sequence[str] = (), *, stamp: int,
                    frame_id: str = 'yard') -> Contacts:
     """Return `contacts` of contacts by the names of their pairs; stamp [ns]."""
-    return make_contacts(make_header(stamp, frame_id), Answer(
-        [(Pair(name, 'a', 'b'), contact) for name, contact in touching.items()],
-        [Pair(name, 'a', 'b') for name in stale], len(touching)))
+    return make_contacts(make_header(stamp, frame_id), [
+        (Pair(name, 'a', 'b'), contact) for name, contact in touching.items()], stale)
 
 
 def _point(numbers: np.ndarray) -> Point:
