@@ -52,8 +52,9 @@ def read_answer(message: Any, scene: Scene) -> Answer:
     index, rows = scene.index_of, {pair.label: row for pair, row in zip(scene.pairs, scene.rows)}
     if scene.patterns:
         rows = {name: (number, ALONE) for name, number in index.items()} | rows
-    pairs = [(index.get(entry.box_a), index.get(entry.box_b)) for entry in message.contacts]
-    for name, is_known in (*((entry.pair, None not in pair and scene.has_pair(*pair))
+    pairs = [(index.get(entry.box_a, ALONE), index.get(entry.box_b, ALONE))
+             for entry in message.contacts]
+    for name, is_known in (*((entry.pair, min(pair) >= 0 and scene.has_pair(*pair))
                              for entry, pair in zip(message.contacts, pairs)),
                            *((name, name in rows) for name in message.stale)):
         if not is_known:

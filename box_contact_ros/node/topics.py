@@ -62,8 +62,8 @@ class SceneTopics:
         """
         self._node, self._prefix = node, prefix
         if pair_topics and scene.pair_count > MOST_PAIRS_WITH_TOPICS:
-            raise ValueError(f'scene: {scene.pair_count} pairs are too many for topics of their own '
-                             f'(at most {MOST_PAIRS_WITH_TOPICS}): set pair_topics to false')
+            raise ValueError(f'scene: {scene.pair_count} pairs are too many for topics of their '
+                             f'own (at most {MOST_PAIRS_WITH_TOPICS}): set pair_topics to false')
         pairs = tuple(scene.every_pair()) if pair_topics else ()
         self._check(scene, pairs)
         self._subscriptions: dict[str, Subscription] = {}

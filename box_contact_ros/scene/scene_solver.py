@@ -29,6 +29,8 @@ POSE_ARRAY = 'poses'
 """Topic of the poses of all moving boxes, where they come as one message."""
 ALL_BOXES = 'all boxes'
 """Source of these poses: no box of a scene file can have this name."""
+NOWHERE = np.full(7, np.nan)
+"""In place of the pose of a box that is not there."""
 EVERY_PAIR = (('*', '*'),)
 """Patterns of a scene in which each two boxes are a pair, if one of them moves."""
 ALONE = -1
@@ -169,7 +171,7 @@ class Scene:
         group, allowed = self.groups
         if not self.patterns:
             return np.zeros(len(self.boxes), bool)
-        met = (allowed[group[index]] > 0)[group]
+        met: np.ndarray = allowed[group[index]][group] > 0
         met[index] = False
         if self.is_fixed[index]:
             met[self.is_fixed] = False
@@ -434,7 +436,7 @@ class SceneSolver:
             return
         for index, pose in zip(self._moving, poses):
             if pose is None:
-                pose = np.nan
+                pose = NOWHERE
             elif type(pose) is not np.ndarray or pose.dtype != np.float64 or pose.shape != (7,):
                 pose = as_floats(pose, f'pose of {self.scene.names[index]}',
                                  'a pose (x y z qx qy qz qw)', (7,))

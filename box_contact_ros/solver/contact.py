@@ -73,7 +73,7 @@ class Contacts(NamedTuple):
 
 
 def patch_areas(contacts: Contacts) -> np.ndarray:
-    """Return the areas (n,) of contacts' patches [m²]: 12·√(e₁·e₂), NaN where there is no covariance.
+    """Return the areas (n,) of contacts' patches [m²]: 12·√(e₁·e₂), NaN without a covariance.
 
     e₁ and e₂ are the eigenvalues of the covariance across the normal. The area is exact where the
     overlap is a cuboid along the normal.

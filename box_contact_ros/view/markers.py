@@ -29,7 +29,7 @@ from ..node.topics import contact_qos
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import two_boxes
 from . import style
-from .listener import DrawnContacts, Listener, SceneRows, Tick
+from .listener import DrawnContacts, Listener, Tick
 
 PARAMETERS = {name: CONTACT_PARAMETERS[name] for name in ('size_a', 'size_b', 'scene')}
 PERIOD = 1 / 30  # time [s] between marker arrays

@@ -75,7 +75,7 @@ def refused(kind: type[Exception], call: Callable[..., Any], *args: Any) -> None
 
 
 def places_of_no_box() -> None:
-    """A broad phase reads and writes at boxes and groups that it is given."""
+    """`BroadPhase` reads and writes at boxes and groups that it is given."""
     assert native.BroadPhase(*phase_arguments()).find(rows(), 9)[0].tolist() == [
         [1, 0], [2, 1], [2, 3]]
     for argument in (3, 4):

@@ -136,7 +136,7 @@ def test_what_is_found_depends_on_the_poses_alone(kind):
 
 
 def exact_touch(rng, n):
-    """Return sizes and poses (2, n, …): faces that touch exactly, all moved rigidly, far and near."""
+    """Return sizes and poses (2, n, …) of faces that touch exactly, moved rigidly, near and far."""
     size = np.exp(rng.uniform(-3, 3, (2, n, 3)))
     pair = np.zeros((2, n, 7))
     pair[..., 6] = 1.0
@@ -277,7 +277,7 @@ def test_a_crowd_in_one_place_costs_no_memory():
     """Of 8,000 boxes in one place, 32 million pairs are near; the search ends early."""
     ended = subprocess.run([sys.executable, '-c', CROWD], capture_output=True, text=True)
     words, _, megabytes = ended.stdout.strip().rpartition(' ')
-    assert words == ('more than 1000 pairs are near each other, and so many are not answered'), ended
+    assert words == 'more than 1000 pairs are near each other, and so many are not answered', ended
     assert int(megabytes) < 50
 
 

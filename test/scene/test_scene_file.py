@@ -57,7 +57,7 @@ def test_a_box_in_no_pair_is_not_listened_to(scene_of):
 
 
 def test_patterns_stand_for_pairs_of_which_one_box_moves(scene_of):
-    """Listed ones, then in the order of the boxes; a pair that is listed by its names keeps its name."""
+    """Listed ones, which keep their names, then those of patterns in the order of the boxes."""
     boxes = GOOD.partition('pairs:')[0] + '  s2: {size: [1, 1, 1], pose: [9, 0, 0, 0, 0, 0, 1]}\n'
     listed = '  - {name: grip, a: spreader, b: load}\n'
     for pairs, wanted in (

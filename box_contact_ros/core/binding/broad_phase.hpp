@@ -44,11 +44,13 @@ inline PyObject* broad_phase_new(PyTypeObject* type, PyObject* args, PyObject*) 
       !read(groups_given, "groups", {count}, groups))
     return nullptr;
   allowed.take(PyArray_FROM_OTF(allowed_given, NPY_UINT8, NPY_ARRAY_CARRAY_RO));
-  if (!allowed.object) return nullptr;
-  npy_intp group_count = allowed.length(0);
-  if (!has_shape(reinterpret_cast<PyArrayObject*>(allowed.object.get()), "allowed",
-                 {group_count, group_count}))
+  if (!allowed.object ||
+      !has_shape(reinterpret_cast<PyArrayObject*>(allowed.object.get()), "allowed",
+                 {any_length, any_length}))
     return nullptr;
+  npy_intp group_count = allowed.length(0);
+  if (allowed.length(1) != group_count || group_count > count)
+    return fail(PyExc_ValueError, "allowed must be square, and of no more groups than boxes");
   std::unique_ptr<bool[]> is_fixed(new bool[size_t(count) + 1]);
   for (npy_intp box = 0; box < count; ++box) is_fixed[size_t(box)] = fixed.numbers[box] != 0;
   boxes.size = sizeof boxes;
