@@ -171,7 +171,7 @@ class Scene:
         group, allowed = self.groups
         if not self.patterns:
             return np.zeros(len(self.boxes), bool)
-        met: np.ndarray = allowed[group[index]][group] > 0
+        met: np.ndarray = np.greater(allowed[group[index]][group], 0)
         met[index] = False
         if self.is_fixed[index]:
             met[self.is_fixed] = False
