@@ -10,10 +10,12 @@ array costs in transport alone is its share of a core.
 from __future__ import annotations
 
 import contextlib
+import os
+import random
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -140,9 +142,8 @@ def stream(client: Client, executor: Any, prefix: str, arguments: Sequence[str],
         stamps.clear()
         began, spent = time.monotonic(), cpu_seconds(process.pid)
         for tick in range(round(rate * seconds)):
-            wait(lambda: time.monotonic() >= began + tick / rate
-                 and len(stamps) - sum(stamp in arrived for stamp in stamps[-50:]) < ahead + max(
-                     0, len(stamps) - 50))
+            due = began + tick / rate
+            wait(lambda due=due: time.monotonic() >= due and is_near(stamps, arrived, ahead))
             send()
         with contextlib.suppress(RuntimeError):  # what does not come is lost
             wait(lambda: stamps[-1] in arrived)
@@ -153,6 +154,11 @@ def stream(client: Client, executor: Any, prefix: str, arguments: Sequence[str],
     return Streamed('echo' if prefix else 'contact', 0, len(stamps), len(stamps) - len(latencies),
                     len(client.last), len(answer.contacts), 100.0 * core,
                     *output.percentiles(latencies, 50, 99))
+
+
+def is_near(stamps: Sequence[int], arrived: Collection[int], ahead: float) -> bool:
+    """Return whether fewer than `ahead` of the last 50 stamps are unanswered."""
+    return sum(stamp not in arrived for stamp in stamps[-50:]) < ahead
 
 
 @contextlib.contextmanager
@@ -167,17 +173,12 @@ def running(arguments: Sequence[str]) -> Iterator[Any]:
 
 def cpu_seconds(pid: int) -> float:
     """Return the processor time of a process so far [s] (Linux)."""
-    import os
-
     fields = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Stream, print, write."""
-    import os
-    import random
-
     parser = report_parser('scene_node', __doc__, quick='two seconds, to try it out',
                            out='scene_node.md, scene_node.csv')
     parser.add_argument('--echo', type=int, metavar='BYTES', help='run the echo node')
@@ -188,7 +189,8 @@ def main(args: Sequence[str] | None = None) -> int:
     os.environ |= on_this_host(random.choice(DOMAINS))
     rows = streams(BOXES, RATE, QUICK_SECONDS if options.quick else SECONDS)
     text = output.page(
-        'benchmarks/pages/scene_node', machine=f'{output.processor()}, {output.versions(("rclpy",))}',
+        'benchmarks/pages/scene_node',
+        machine=f'{output.processor()}, {output.versions(("rclpy",))}',
         command=output.command_line('benchmarks.scene_node', args), boxes=BOXES, rate=RATE,
         rows=markdown_table(
             ['node', 'arrays', 'lost', 'pairs in contact', 'answer [kB]', 'core [%]',

@@ -14,19 +14,27 @@ import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from box_contact_ros import Box, Pair, Scene, SceneSolver, read_scene
+from box_contact_ros import Box, ContactSolver, Pair, Scene, SceneSolver, read_scene
 from box_contact_ros.core import native
 from box_contact_ros.scene.scene_solver import EVERY_PAIR
 
 from . import output
 from .arguments import report_parser
 from .output import markdown_table, number
-from .timing import by_round, nanoseconds, pinned, take_turns, usable_cores
+from .timing import (
+    by_round,
+    cpu_milliseconds,
+    nanoseconds,
+    pinned,
+    take_turns,
+    usable_cores,
+)
 
 PACKAGES = ('numpy', 'mujoco')
 PLANS = output.ROOT / 'docs' / 'examples' / 'pallets' / 'packing_plans.json'
@@ -126,7 +134,7 @@ class MuJoCo:
 
 
 class Compared(NamedTuple):
-    """A scene beside MuJoCo: times of a tick [ms], and which pairs touch."""
+    """A scene beside MuJoCo: processor times of a tick [ms], and which pairs touch."""
 
     scene: str
     pairs: str  # how the pairs are asked for
@@ -152,14 +160,14 @@ def compare(name: str, boxes: Boxes, rounds: int) -> list[Compared]:
     turn = iter(range(10**9))
 
     def timed(asked: str, work: Callable[[], Any]) -> None:
-        times[asked].append(1e-6 * nanoseconds(work)[0])
+        times[asked].append(cpu_milliseconds(work)[0])
 
     def round_of_all() -> None:
         place = places[next(turn) % PLACES]
         engine.place(place)
         timed('mujoco', engine.collide)
         for asked, solver in solvers.items():
-            timed(asked, lambda: solver(place))
+            timed(asked, partial(solver, place))
 
     with pinned({usable_cores()[-1]}):
         take_turns([round_of_all], PLACES)
@@ -181,7 +189,6 @@ def farthest(boxes: Boxes, place: np.ndarray, pairs: set[tuple[int, ...]]) -> fl
         return np.nan
     pose = boxes.pose.copy()
     pose[~boxes.fixed] = place
-    from box_contact_ros import ContactSolver
     contacts = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(
         pose, sizes=boxes.size, pairs=np.array(sorted(pairs)))
     return float(np.abs(contacts.separation).max())
@@ -213,13 +220,13 @@ def grow(counts: Sequence[int], rounds: int) -> list[Grown]:
             rng = np.random.default_rng(1)
             places = [boxes.shaken(rng) for _ in range(PLACES)]
             phase = solver._broad_phase
-            times: list[tuple[int, int]] = []
+            times: list[tuple[float, float]] = []
             for turn in range(PLACES + rounds):
-                took, answer = nanoseconds(solver, places[turn % PLACES])
-                found = nanoseconds(phase.find, places[(turn + 1) % PLACES], sys.maxsize)[0]
+                took, answer = cpu_milliseconds(solver, places[turn % PLACES])
+                found, _ = cpu_milliseconds(phase.find, places[(turn + 1) % PLACES], sys.maxsize)
                 times.append((took, found))
         tick, found = np.median(times[PLACES:], axis=0)
-        rows.append(Grown(count, answer.touching, 1e-6 * tick, tick / count, found / tick,
+        rows.append(Grown(count, answer.touching, tick, 1e6 * tick / count, found / tick,
                           resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1e-9 * read))
     return rows
 

@@ -212,7 +212,7 @@ class Scene:
         asked[self.rows.ravel()] = True
         if self.patterns:
             group, allowed = self.groups
-            asked |= (allowed.any(axis=0) | allowed.any(axis=1))[group]
+            asked |= np.logical_or(allowed.any(axis=0), allowed.any(axis=1))[group]
         return tuple(name for name, is_asked, is_fixed in zip(self.boxes, asked, self.is_fixed)
                      if not is_fixed and (self.pose_array or is_asked))
 
