@@ -14,11 +14,10 @@ from math import hypot
 
 import numpy as np
 
-from ..core import LENGTH_MAX, QUATERNION_MAX, QUATERNION_MIN
+from ..core import LENGTH_MAX, QUATERNION_MAX, QUATERNION_MIN, native
 from ..scene.pairing import StampedPose
 from ..scene.scene_solver import Answer, Pair, Scene
 from ..solver.checks import pose_fault
-from ..solver.contact import Contacts, patch_areas
 from .messages import NANOSECONDS, Refused
 
 ENCAPSULATION = 4
@@ -35,9 +34,8 @@ _LAYOUT = '<2s2xiI{}s{}x7d'
 """Of a whole little-endian pose, by the sizes of frame_id, its length included, and of what aligns
 the numbers."""
 _COUNT = struct.Struct('<I')
-CONTACT_NUMBERS = np.dtype([('point', '<f8', 3), ('normal', '<f8', 3), ('depth', '<f8'),
-                            ('volume', '<f8'), ('area', '<f8'), ('upper', '<f8', 6)])
-"""The numbers of a contact, in the order of its message."""
+CONTACT_BYTES = 8 * 15
+"""Of a contact behind its names: point, normal, depth, volume, area and covariance."""
 MOST_NAMES = 2**16
 """Pairs whose names are kept as bytes, some 10 MB."""
 FRAME_AT = ENCAPSULATION + _STAMP.size + 4
@@ -164,7 +162,9 @@ class ContactWriter:
 
     def contacts(self, header: bytes, answer: Answer) -> bytes:
         """Return the `Contacts` of an answer."""
-        names_of, numbers = self._names_of, _numbers_of(answer.contacts)
+        names_of, contacts = self._names_of, answer.contacts
+        numbers = native.message_numbers(contacts.point, contacts.normal, contacts.separation,
+                                         contacts.volume, contacts.covariance).tobytes()
         if len(names_of) > MOST_NAMES:
             names_of.clear()
         parts = [header, _COUNT.pack(len(answer.pairs))]
@@ -174,7 +174,7 @@ class ContactWriter:
             names = names_of.get((a, b, at))
             if names is None:
                 names = names_of[a, b, at] = _names(self._scene.pair_of(a, b), at)
-            begin, end = end, end + CONTACT_NUMBERS.itemsize
+            begin, end = end, end + CONTACT_BYTES
             parts += names, numbers[begin:end]
             at = 0  # doubles end each contact, so the next one begins at a multiple of 8
         stale = answer.named_stale()
@@ -206,15 +206,3 @@ def _names(pair: Pair, at: int) -> bytes:
     """
     names = b''.join(map(_string, (pair.label, pair.a, pair.b)))
     return names + b'\0' * (-(at + len(names)) % 8)
-
-
-def _numbers_of(contacts: Contacts) -> bytes:
-    """Return the numbers of contacts as a message has them, row by row."""
-    rows = np.empty(len(contacts.separation), CONTACT_NUMBERS)
-    rows['point'], rows['normal'] = contacts.point, contacts.normal
-    np.negative(contacts.separation, out=rows['depth'])
-    rows['volume'], rows['area'] = contacts.volume, patch_areas(contacts)
-    rows['upper'][:, :3] = contacts.covariance[:, 0]
-    rows['upper'][:, 3:5] = contacts.covariance[:, 1, 1:]
-    rows['upper'][:, 5] = contacts.covariance[:, 2, 2]
-    return rows.tobytes()

@@ -368,6 +368,7 @@ class SceneSolver:
         self._size = np.array([box.size for box in boxes], dtype=float)
         self._poses = np.array([box.pose or [np.nan] * 7 for box in boxes], dtype=float)
         self._moving = np.array([scene.index_of[name] for name in scene.moving])
+        self._places = [self._poses[index] for index in self._moving]  # faster than rows by index
         self._broad_phase = native.BroadPhase(self._size, scene.is_fixed, margin, scene.rows,
                                               *scene.groups)
         a, b = scene.rows[0] if scene.pairs else (0, 0)
@@ -434,10 +435,10 @@ class SceneSolver:
         if isinstance(poses, np.ndarray):
             self._poses[self._moving] = as_floats(poses, 'poses', 'poses (n, 7)', (None, 7))
             return
-        for index, pose in zip(self._moving, poses):
+        for place, index, pose in zip(self._places, self._moving, poses):
             if pose is None:
                 pose = NOWHERE
             elif type(pose) is not np.ndarray or pose.dtype != np.float64 or pose.shape != (7,):
                 pose = as_floats(pose, f'pose of {self.scene.names[index]}',
                                  'a pose (x y z qx qy qz qw)', (7,))
-            self._poses[index] = pose
+            place[:] = pose

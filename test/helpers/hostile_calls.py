@@ -211,6 +211,8 @@ def random_calls(seed: int, rounds: int) -> None:
         (native.stages, [rows(), rows(), one, one, ['axis', 'upper_points']], {}),
         (native.BroadPhase, phase_arguments(), {}),
         (native.BroadPhase(*phase_arguments()).find, [rows(), 10], {}),
+        (native.message_numbers, [np.ones((4, 3)), np.ones((4, 3)), np.ones(4), np.ones(4),
+                                  np.ones((4, 3, 3))], {}),
         (native.patch_areas, [np.ones((4, 3)), np.ones((4, 3, 3))], {}),
         (native.Law, [np.ones(2), np.ones((2, 3)), np.zeros((2, 3)), 200.0, 0.0, 0.001, 0.5, 9.81],
          {}),

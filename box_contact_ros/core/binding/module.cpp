@@ -548,6 +548,9 @@ PyMethodDef module_methods[] = {
     {"use_contact_types", method<use_contact_types>(), METH_FASTCALL,
      "use_contact_types(single, many)\n--\n\nSet the named tuples that calls and batches return."},
     {"stages", method<stages>(), METH_FASTCALL, "See core.stages."},
+    {"message_numbers", method<message_numbers>(), METH_FASTCALL,
+     "message_numbers(point, normal, separation, volume, covariance)\n--\n\n"
+     "Return rows (n, 15) of contacts: point, normal, depth, volume, area, upper covariance."},
     {"patch_areas", method<patch_areas>(), METH_FASTCALL,
      "patch_areas(normal, covariance)\n--\n\nReturn areas (n,) of normals (n, 3), covariances (n, 3, 3)."},
     {nullptr, nullptr, 0, nullptr}};

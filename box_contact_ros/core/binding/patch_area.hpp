@@ -1,7 +1,7 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// The areas of contacts' patches, as messages have them.
+// The areas of contacts' patches, and all numbers of contacts as messages have them.
 #pragma once
 
 #include <algorithm>
@@ -31,6 +31,32 @@ inline PyObject* patch_areas(PyObject*, PyObject* const* args, Py_ssize_t count)
   for (npy_intp row = 0; row < rows; ++row)
     area.numbers[row] = patch_area(normal.numbers + 3 * row, covariance.numbers + 9 * row);
   return area.object.release();
+}
+
+// Numbers of a contact in a message: point, normal, depth, volume, area, upper covariance.
+constexpr npy_intp message_numbers_count = 15;
+
+inline PyObject* message_numbers(PyObject*, PyObject* const* args, Py_ssize_t count) {
+  if (count != 5)
+    return fail(PyExc_TypeError, "message_numbers(point, normal, separation, volume, covariance)");
+  Array<double> point, normal, separation, volume, covariance, numbers;
+  if (!read(args[0], "point", {any_length, 3}, point)) return nullptr;
+  npy_intp rows = point.length(0);
+  if (!read(args[1], "normal", {rows, 3}, normal) ||
+      !read(args[2], "separation", {rows}, separation) ||
+      !read(args[3], "volume", {rows}, volume) ||
+      !read(args[4], "covariance", {rows, 3, 3}, covariance) ||
+      !make({rows, message_numbers_count}, numbers))
+    return nullptr;
+  double* to = numbers.numbers;
+  for (npy_intp row = 0; row < rows; ++row) {
+    const double *n = normal.numbers + 3 * row, *c = covariance.numbers + 9 * row;
+    to = std::copy_n(n, 3, std::copy_n(point.numbers + 3 * row, 3, to));
+    for (double number : {-separation.numbers[row], volume.numbers[row], patch_area(n, c), c[0],
+                          c[1], c[2], c[4], c[5], c[8]})
+      *to++ = number;
+  }
+  return numbers.object.release();
 }
 
 }  // namespace box_contact::binding
