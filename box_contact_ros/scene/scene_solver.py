@@ -160,11 +160,16 @@ class Scene:
             allowed[group[min(a, b)], group[max(a, b)]] == (1 if a < b else 2)))
 
     @cached_property
+    def _is_asked(self) -> np.ndarray:
+        """Which boxes (n,) patterns pair with others."""
+        group, allowed = self.groups
+        return allowed.max(axis=1)[group] > 0 if self.patterns else np.zeros(len(group), bool)
+
+    @cached_property
     def watched(self) -> tuple[Pair, ...]:
         """What may be stale: the listed pairs, then each moving box that patterns ask for."""
-        boxes = [self.index_of[name] for name in self.moving] if self.patterns else []
-        return (*self.pairs, *(self.pair_of(box, ALONE) for box in boxes
-                               if self._partners(box).any()))
+        boxes = np.flatnonzero(self._is_asked & ~self.is_fixed).tolist()
+        return (*self.pairs, *(self.pair_of(box, ALONE) for box in boxes))
 
     def _partners(self, index: int) -> np.ndarray:
         """Return which boxes (n,) patterns pair a box with, beside those of listed pairs."""
@@ -190,10 +195,15 @@ class Scene:
     @cached_property
     def pair_count(self) -> int:
         """How many pairs the scene has."""
+        group, allowed = self.groups
         if not self.patterns:
             return len(self.pairs)
-        met = (int(self._partners(index).sum()) for index in range(len(self.boxes)))
-        return len(self.pairs) + sum(met) // 2
+        boxes, fixed = (np.bincount(group[of], minlength=len(allowed))
+                        for of in (slice(None), self.is_fixed))
+        both = (allowed > 0) * (np.outer(boxes, boxes) - np.outer(fixed, fixed))
+        with_itself = ((boxes - fixed) * (np.diag(allowed) > 0)).sum()
+        listed = np.count_nonzero(allowed[group[self.rows[:, 0]], group[self.rows[:, 1]]])
+        return len(self.pairs) + int(both.sum() - with_itself) // 2 - int(listed)
 
     def partners(self, name: str) -> set[str]:
         """Return the moving boxes that a moving box has a pair with; itself if one is fixed."""
@@ -208,11 +218,8 @@ class Scene:
     @cached_property
     def moving(self) -> tuple[str, ...]:
         """Names of the moving boxes in their order; without an array, only of those in a pair."""
-        asked = np.zeros(len(self.boxes), bool)
+        asked = self._is_asked.copy()
         asked[self.rows.ravel()] = True
-        if self.patterns:
-            group, allowed = self.groups
-            asked |= np.logical_or(allowed.any(axis=0), allowed.any(axis=1))[group]
         return tuple(name for name, is_asked, is_fixed in zip(self.boxes, asked, self.is_fixed)
                      if not is_fixed and (self.pose_array or is_asked))
 
@@ -299,12 +306,10 @@ def _check_pattern(scene: Scene, number: int, is_a: np.ndarray, is_b: np.ndarray
         if not is_matched.any():
             raise Fault(('patterns', number, side),
                         f'{short_repr(pattern)} is the name of no box')
-    moves = ~scene.is_fixed
-    is_either = is_a | is_b
-    # Two boxes, one of them moving, that differ: a box with itself is no pair.
-    if is_either.sum() < 2 or not (
-            (is_a & moves).any() and (is_b.sum() > 1 or (is_a & moves & ~is_b).any())
-            or (is_b & moves).any() and (is_a.sum() > 1 or (is_b & moves & ~is_a).any())):
+    # Ordered pairs of different boxes, less those of two fixed ones.
+    every, fixed = (int(a.sum() * b.sum() - (a & b).sum()) for a, b in (
+        (is_a, is_b), (is_a & scene.is_fixed, is_b & scene.is_fixed)))
+    if every == fixed:
         raise Fault(('patterns', number), 'no two boxes of this pattern are a pair of which one '
                                           'moves')
 
