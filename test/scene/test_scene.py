@@ -19,6 +19,7 @@ from box_contact_ros.scene.scene_solver import (
     SceneSolver,
     two_boxes,
 )
+from box_contact_ros.solver.exact import Exact
 
 IDENTITY = (0, 0, 0, 0, 0, 0, 1)
 
@@ -210,6 +211,21 @@ def test_two_boxes_is_the_solver():
         assert answer.touching == wanted.colliding
         if wanted.colliding:
             assert np.array_equal(answer.contacts.point[0], wanted.point)
+
+
+class Upwards:
+    """A model of a user's own: the answers of exact, every normal upwards."""
+
+    def solve(self, a, b, size_a, size_b, threads=1):
+        contacts, refused = Exact().solve(a, b, size_a, size_b, threads)
+        return contacts._replace(normal=np.tile([0.0, 0, 1], (len(a), 1))), refused
+
+
+def test_a_model_object_answers_a_scene():
+    scene = Scene({name: Box(name, poses.CUBE) for name in 'abc'}, patterns=EVERY_PAIR)
+    answer = SceneSolver(scene, model=Upwards())(
+        [poses.IDENTITY, np.array([1.9, 0, 0, 0, 0, 0, 1]), None])
+    assert answer.pairs.tolist() == [[0, 1]] and answer.contacts.normal.tolist() == [[0, 0, 1]]
 
 
 def test_models_that_do_not_know_a_size_refuse_the_scene():

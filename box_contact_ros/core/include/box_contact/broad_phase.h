@@ -8,7 +8,8 @@
  *   bc_near near = {sizeof(bc_near)};
  *   bc_broad_phase_create(&boxes, &broad_phase);
  *   bc_broad_phase_find(broad_phase, poses, INT64_MAX, &near);     at each tick
- *   bc_rows rows = {sizeof(bc_rows), near.count, poses, poses, sizes, sizes, near.pairs, 10000};
+ *   bc_rows rows = {sizeof(bc_rows), near.count, 10000, poses, poses, sizes, sizes, 10000, 10000,
+ *                   near.pairs};
  *   bc_broad_phase_destroy(broad_phase);
  *
  * No pair that touches is left out. One thread at a time may use a broad phase. The order of one call
