@@ -11,11 +11,11 @@ standard deviations.
 For each order it names the boxes that are not supported, by number, and tells how far inside its
 patches the centre of the worst one is. It prints:
 
-    00100408: 26 contacts, worst -87 mm, not supported: 25
-    00100001: 56 contacts, worst -95 mm, not supported: 5 7 9 12 20 27 28 29 36 42
-    00100002: 46 contacts, worst -65 mm, not supported: 4 10 11 17 34
-    00100003: 34 contacts, worst -118 mm, not supported: 17 27 28 29
-    00100004: 94 contacts, worst -191 mm, not supported: 22 24 30 31 39 42 50 51 53 56
+    00100408: 26 contacts, worst -87.5 mm, not supported: 25
+    00100001: 56 contacts, worst -95.0 mm, not supported: 5 7 9 12 20 27 28 29 36 42
+    00100002: 46 contacts, worst -65.0 mm, not supported: 4 10 11 17 34
+    00100003: 34 contacts, worst -117.7 mm, not supported: 17 27 28 29
+    00100004: 94 contacts, worst -191.4 mm, not supported: 22 24 30 31 39 42 50 51 53 56
 
 With PICTURE, such as pallets.png, it draws them: the less support, the redder. That needs
 Matplotlib.
@@ -91,7 +91,7 @@ def main() -> None:
         answer = SceneSolver(scene, model='exact')(pose)
         left = support(pose, answer.pairs, answer.contacts)
         numbers = ' '.join(names[row].split()[0] for row in np.flatnonzero(left < 0.0))
-        print(f'{order}: {answer.touching} contacts, worst {1e3 * left.min():.0f} mm, '
+        print(f'{order}: {answer.touching} contacts, worst {1e3 * left.min():.1f} mm, '
               f'not supported: {numbers}')
         plans.append((size, pose, left))
     if len(sys.argv) > 1:
