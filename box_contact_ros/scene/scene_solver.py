@@ -12,9 +12,9 @@ from __future__ import annotations
 import fnmatch
 import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -379,7 +379,13 @@ class SceneSolver:
         a, b = scene.rows[0] if scene.pairs else (0, 0)
         self._solver = ContactSolver(self._size[a], self._size[b], model=model, weights=weights,
                                      margin=margin)
+        self._again = partial(SceneSolver, model=model, weights=weights, margin=margin,
+                              most_near=most_near)
         self._warm_up()
+
+    def __reduce__(self) -> tuple[Callable[..., SceneSolver], tuple[Scene]]:
+        """Pickle the arguments."""
+        return self._again, (self.scene,)
 
     @property
     def fallbacks(self) -> int:

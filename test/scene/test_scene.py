@@ -4,7 +4,9 @@
 """Scenes: what a tick computes against every pair by itself, and files that are refused."""
 from __future__ import annotations
 
+import copy
 import math
+import pickle
 
 import numpy as np
 import poses
@@ -226,6 +228,14 @@ def test_a_model_object_answers_a_scene():
     answer = SceneSolver(scene, model=Upwards())(
         [poses.IDENTITY, np.array([1.9, 0, 0, 0, 0, 0, 1]), None])
     assert answer.pairs.tolist() == [[0, 1]] and answer.contacts.normal.tolist() == [[0, 0, 1]]
+
+
+def test_a_solver_can_be_copied_and_pickled():
+    scene = Scene({name: Box(name, poses.CUBE) for name in 'ab'}, patterns=EVERY_PAIR)
+    solver = SceneSolver(scene, model='exact', margin=1.0)
+    where = [poses.IDENTITY, np.array([2.5, 0, 0, 0, 0, 0, 1])]
+    for twin in (copy.deepcopy(solver), pickle.loads(pickle.dumps(solver))):
+        assert twin(where).named()[0][1].separation == solver(where).contacts.separation[0] == 0.5
 
 
 def test_models_that_do_not_know_a_size_refuse_the_scene():
