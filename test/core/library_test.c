@@ -103,7 +103,7 @@ static void check_refusals(void) {
   check(bc_collide(&a, &a, &query, &contact) == BC_BAD_ABI, "another query");
 }
 
-/* A tower of 100 cubes: each is near the next one, and the pairs are those that bc_collide_rows takes. */
+/* A tower of 100 cubes: each is near the next one, and bc_collide_rows takes the pairs. */
 static void check_broad_phase(void) {
   enum { count = 100 };
   static bc_size sizes[count];

@@ -552,7 +552,8 @@ PyMethodDef module_methods[] = {
      "message_numbers(point, normal, separation, volume, covariance)\n--\n\n"
      "Return rows (n, 15) of contacts: point, normal, depth, volume, area, upper covariance."},
     {"patch_areas", method<patch_areas>(), METH_FASTCALL,
-     "patch_areas(normal, covariance)\n--\n\nReturn areas (n,) of normals (n, 3), covariances (n, 3, 3)."},
+     "patch_areas(normal, covariance)\n--\n\n"
+     "Return areas (n,) of normals (n, 3), covariances (n, 3, 3)."},
     {nullptr, nullptr, 0, nullptr}};
 
 struct Whole {

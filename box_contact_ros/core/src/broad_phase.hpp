@@ -3,9 +3,9 @@
 
 // Which pairs of many boxes may touch: sweep and prune of bounding boxes, tile by tile.
 //
-// Two axes are divided into tiles twice as wide as a typical box, and a box is an entry of each tile
-// that it reaches. Along the third axis the boxes are sorted by where they begin. In each tile, a box
-// meets those that begin before it ends. The cost per box does not grow with their number.
+// Two axes are divided into tiles twice as wide as a typical box. A box is an entry of each tile it
+// reaches. Along the third axis the boxes are sorted by where they begin. In each tile, a box meets
+// those that begin before it ends. The cost per box does not grow with their number.
 #pragma once
 
 #include <algorithm>
@@ -86,8 +86,8 @@ class BroadPhase {
 
   size_t count() const { return half_.size(); }
 
-  // Find the pairs that may touch at `poses` (boxes, 7); seven NaN: the box is not there. The poses of
-  // fixed boxes are read once. Stops with more than `most` pairs. Returns −1, or a box without a
+  // Find the pairs that may touch at `poses` (boxes, 7); seven NaN: the box is not there. The poses
+  // of fixed boxes are read once. Stops with more than `most` pairs. Returns −1, or a box without a
   // valid pose; nothing is found then.
   int64_t find(const double* poses, int64_t most) {
     pairs_.clear();
@@ -166,7 +166,7 @@ class BroadPhase {
     }
   }
 
-  // Take two boxes whose bounds overlap, if they are asked for. Returns false when there are too many.
+  // Take two boxes whose bounds overlap, if they are asked for. Returns false with too many pairs.
   bool add(int32_t a, int32_t b) {
     if (fixed_[size_t(a)] && fixed_[size_t(b)]) return true;
     if (a > b) std::swap(a, b);

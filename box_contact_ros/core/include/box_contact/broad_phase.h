@@ -12,9 +12,9 @@
  *                   near.pairs};
  *   bc_broad_phase_destroy(broad_phase);
  *
- * No pair that touches is left out. One thread at a time may use a broad phase. The order of one call
- * is where the next begins, so boxes that move little cost least. What is found depends on the poses
- * alone. Memory is taken for boxes and for pairs that are near, and kept. */
+ * No pair that touches is left out. One thread at a time may use a broad phase. A call begins with
+ * the order of the last one, so boxes that move little cost least. What is found depends on the
+ * poses alone. Memory is taken for boxes and for pairs that are near, and kept. */
 #ifndef BOX_CONTACT_BROAD_PHASE_H
 #define BOX_CONTACT_BROAD_PHASE_H
 
@@ -35,9 +35,9 @@ typedef struct bc_boxes {
   int64_t listed_count;
   const int32_t* groups; /* the group of each box, or NULL */
   int32_t group_count;
-  const uint8_t* allowed; /* (group_count, group_count), by the groups of the box of lower and of that
-                             of higher index: 0: their pairs are not asked for; 1: they are, and
-                             box A is the lower; 2: box A is the higher */
+  const uint8_t* allowed; /* (group_count, group_count), by the groups of the box of lower and of
+                             that of higher index: 0: their pairs are not asked for; 1: they are,
+                             and box A is the lower; 2: box A is the higher */
 } bc_boxes;
 
 typedef struct bc_near {
@@ -55,9 +55,9 @@ typedef struct bc_broad_phase bc_broad_phase;
 BC_API bc_status bc_broad_phase_create(const bc_boxes* boxes, bc_broad_phase** broad_phase);
 BC_API void bc_broad_phase_destroy(bc_broad_phase* broad_phase);
 
-/* Find the pairs that may touch with the boxes at `poses`. Seven NaN: the box is not there. Poses of
- * fixed boxes are read once. The search ends with more than `most` pairs. The arrays of *near belong
- * to the broad phase, and are valid until its next call. */
+/* Find the pairs that may touch with the boxes at `poses`. Seven NaN: the box is not there. Poses
+ * of fixed boxes are read once. The search ends with more than `most` pairs. The arrays of *near
+ * belong to the broad phase, and are valid until its next call. */
 BC_API bc_status bc_broad_phase_find(bc_broad_phase* broad_phase, const bc_pose* poses,
                                      int64_t most, bc_near* near);
 
