@@ -114,7 +114,7 @@ class BuildCore(build_ext):
                                     extra_postargs=[*FLAGS, *flags])
 
         jobs = {name: ('kernel.cpp', flags) for name, flags in INSTRUCTION_SETS.items()}
-        jobs |= {name: (f'library/{name}.cpp', []) for name in ('library', 'force')}
+        jobs |= {name: (f'library/{name}.cpp', []) for name in ('library', 'broad_phase', 'force')}
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             # The longest first.
             running = [pool.submit(compiled, name, *job) for name, job in reversed(jobs.items())]

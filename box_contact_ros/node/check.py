@@ -35,7 +35,7 @@ class Checker:
         """Take the scene and the model; requests may name the scene's boxes without sizes."""
         self.solver, self._scene, self._model = solver, solver.scene, solver.model
         self._labels = {(pair.a, pair.b): pair.label for pair in self._scene.pairs}
-        self._most_pairs = min(MOST_PAIRS, most_near(self._model))
+        self._most_pairs = min(MOST_PAIRS, most_near(str(self._model)))
         self._solvers: dict[bool, ContactSolver] = {}  # by whether pairs apart have a normal
 
     def answer(self, request: Check.Request, response: Check.Response) -> Check.Response:

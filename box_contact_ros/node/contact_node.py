@@ -152,7 +152,7 @@ class ContactNode(GuardedNode, LifecycleNode):
         # What start-up made stays for good. No full collection (10 ms) has to look at it.
         gc.collect()
         gc.freeze()
-        self._monitor.restart(self._tick.solver.scene.pairs)
+        self._monitor.restart(self._tick.solver.scene.watched)
         self._tick.active = True
         self._say_ready()
         return super().on_activate(state)
@@ -226,7 +226,7 @@ class ContactNode(GuardedNode, LifecycleNode):
         assert self._topics is not None
         solver, topics = self._tick.solver, self._topics.pose_topics()
         scene = solver.scene
-        pairs, more = len(scene.pairs), len(topics) - NAMED_TOPICS
+        pairs, more = scene.pair_count, len(topics) - NAMED_TOPICS
         frame = f' in frame {short_repr(scene.frame_id)}' if scene.frame_id else ''
         self.get_logger().info(
             f'ready: model {solver.model!r}, pairing {self._values["pairing"]!r}, {pairs} '

@@ -189,7 +189,7 @@ class Diagnostics:
             findings += _lateness(load, sent, new[OVERTAKEN])
         self._log(findings)
         self.publish(findings, state=state, load=load, values={
-            'model': solver.model, 'pairs': len(scene.pairs), 'stale boxes': ' '.join(stale),
+            'model': solver.model, 'pairs': scene.pair_count, 'stale boxes': ' '.join(stale),
             'boxes that never came': ' '.join(unseen),
             'unanswered pairs': len(summary.unanswered), 'waiting ticks': pairing.waiting_ticks,
             'lost since the last report': load.lost,

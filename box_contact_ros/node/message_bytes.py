@@ -10,16 +10,14 @@ Bytes halve the latency: docs/contributing/decisions/contact-node.md.
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
 from math import hypot
 
 import numpy as np
 
-from ..core import LENGTH_MAX, QUATERNION_MAX, QUATERNION_MIN
+from ..core import LENGTH_MAX, QUATERNION_MAX, QUATERNION_MIN, native
 from ..scene.pairing import StampedPose
-from ..scene.scene_solver import Answer, Pair
+from ..scene.scene_solver import Answer, Pair, Scene
 from ..solver.checks import pose_fault
-from ..solver.contact import Contact, patch_area
 from .messages import NANOSECONDS, Refused
 
 ENCAPSULATION = 4
@@ -36,7 +34,10 @@ _LAYOUT = '<2s2xiI{}s{}x7d'
 """Of a whole little-endian pose, by the sizes of frame_id, its length included, and of what aligns
 the numbers."""
 _COUNT = struct.Struct('<I')
-_DEPTH_VOLUME_AREA = struct.Struct('<3d')
+CONTACT_BYTES = 8 * 15
+"""Of a contact behind its names: point, normal, depth, volume, area and covariance."""
+MOST_NAMES = 2**16
+"""Pairs whose names are kept as bytes, some 10 MB."""
 FRAME_AT = ENCAPSULATION + _STAMP.size + 4
 """Where frame_id's characters are: behind stamp and length."""
 _LEAST, _MOST = 2.0 * QUATERNION_MIN, 0.5 * QUATERNION_MAX
@@ -151,8 +152,9 @@ class PoseReader:
 class ContactWriter:
     """Makes the messages of one scene; the bytes of its names are made once."""
 
-    def __init__(self) -> None:
-        self._names_of: dict[tuple[Pair, int], bytes] = {}
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._names_of: dict[tuple[int, int, int], bytes] = {}
 
     def vector(self, header: bytes, vector: np.ndarray) -> bytes:
         """Return a PointStamped or a Vector3Stamped of a header and three numbers."""
@@ -160,29 +162,27 @@ class ContactWriter:
 
     def contacts(self, header: bytes, answer: Answer) -> bytes:
         """Return the `Contacts` of an answer."""
-        parts, at = [header], (len(header) - ENCAPSULATION) % 8
-        for listed in (answer.touching, answer.close):
-            at = self._entries(parts, at, listed)
-        parts.append(_COUNT.pack(len(answer.stale)))
-        parts.append(b''.join([_string(pair.label) for pair in answer.stale]))
+        names_of, contacts = self._names_of, answer.contacts
+        numbers = native.message_numbers(contacts.point, contacts.normal, contacts.separation,
+                                         contacts.volume, contacts.covariance).tobytes()
+        if len(names_of) > MOST_NAMES:
+            names_of.clear()
+        pairs, touching = answer.pairs.tolist(), answer.touching
+        parts, at, end = [header], (len(header) - ENCAPSULATION) % 8, 0
+        for listed in (pairs[:touching], pairs[touching:]):  # `contacts` and `near`
+            parts.append(_COUNT.pack(len(listed)))
+            at = (at + _COUNT.size) % 8
+            for a, b in listed:
+                names = names_of.get((a, b, at))
+                if names is None:
+                    names = names_of[a, b, at] = _names(self._scene.pair_of(a, b), at)
+                begin, end = end, end + CONTACT_BYTES
+                parts += names, numbers[begin:end]
+                at = 0  # doubles end each contact, so the next one begins at a multiple of 8
+        stale = answer.named_stale()
+        parts.append(_COUNT.pack(len(stale)))
+        parts.append(b''.join([_string(pair.label) for pair in stale]))
         return b''.join(parts)
-
-    def _entries(self, parts: list[bytes], at: int, listed: Sequence[tuple[Pair, Contact]]) -> int:
-        """Append a list of contacts; `at` is the distance from a multiple of 8, before and after.
-
-        A contact ends with doubles, so the next one begins at a multiple of 8.
-        """
-        names_of = self._names_of
-        parts.append(_COUNT.pack(len(listed)))
-        at = (at + _COUNT.size) % 8
-        for pair, c in listed:
-            names = names_of.get((pair, at)) or names_of.setdefault((pair, at), _names(pair, at))
-            parts.append(
-                names + c.point.tobytes() + c.normal.tobytes()
-                + _DEPTH_VOLUME_AREA.pack(-c.separation, c.volume, patch_area(c))
-                + _upper(c.covariance.tobytes()))
-            at = 0
-        return at
 
 
 def header_bytes(stamp: int, frame_id: str) -> bytes:
@@ -208,8 +208,3 @@ def _names(pair: Pair, at: int) -> bytes:
     """
     names = b''.join(map(_string, (pair.label, pair.a, pair.b)))
     return names + b'\0' * (-(at + len(names)) % 8)
-
-
-def _upper(square: bytes) -> bytes:
-    """Return the upper triangle, row by row, of a (3, 3) array of float64."""
-    return square[:24] + square[32:48] + square[64:]

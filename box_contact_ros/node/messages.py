@@ -15,9 +15,9 @@ from std_msgs.msg import Header
 
 from box_contact_msgs.msg import Contact as ContactMessage
 
-from ..scene.scene_solver import Answer, Scene
+from ..scene.scene_solver import ALONE, Answer, Scene
 from ..solver.checks import short_repr
-from ..solver.contact import Contact, patch_area
+from ..solver.contact import Contact, Contacts, patch_area
 
 NANOSECONDS = 1_000_000_000
 UPPER = np.triu_indices(3)
@@ -63,15 +63,21 @@ def read_answer(message: Any, scene: Scene) -> Answer:
 
     scene: that of the node. Raises Refused for a pair that the scene lacks.
     """
-    pair_of = {pair.label: pair for pair in scene.pairs}
-    for name in (*(entry.pair for entry in (*message.contacts, *message.near)), *message.stale):
-        if name not in pair_of:
+    index, rows = scene.index_of, {pair.label: row for pair, row in zip(scene.pairs, scene.rows)}
+    if scene.patterns:
+        rows = {name: (number, ALONE) for name, number in index.items()} | rows
+    entries = [*message.contacts, *message.near]
+    pairs = [(index.get(entry.box_a, ALONE), index.get(entry.box_b, ALONE)) for entry in entries]
+    for name, is_known in (*((entry.pair, min(pair) >= 0 and scene.has_pair(*pair))
+                             for entry, pair in zip(entries, pairs)),
+                           *((name, name in rows) for name in message.stale)):
+        if not is_known:
             raise Refused('unknown pair', f'{short_repr(name)} is no pair of the scene: read the '
                                           'scene file that the node has')
-    touching, near = ([(pair_of[entry.pair], _contact(entry)) for entry in entries]
-                      for entries in (message.contacts, message.near))
-    return Answer(touching, [pair_of[name] for name in message.stale],
-                  len(touching) + len(near), near)
+    boxes, stale = (np.array(part, np.int64).reshape(-1, 2)
+                    for part in (pairs, [rows[name] for name in message.stale]))
+    return Answer(boxes, Contacts.of([_contact(entry) for entry in entries]), len(boxes), stale,
+                  scene)
 
 
 def _contact(entry: Any) -> Contact:

@@ -72,13 +72,14 @@ class TickAnswerer:
         self.solver, self._topics, self._monitor, self._counts = solver, topics, monitor, counts
         self.pairing: Pairing = PAIRINGS[settings['pairing']](solver.scene, counts=counts)
         self.set_times(settings)
-        self._reader, self._writer = PoseReader(), ContactWriter()
         self._queues: dict[str, PoseQueue] = {}  # by box
         scene = solver.scene
-        place = {box: number for number, box in enumerate(scene.streams)}
-        self._sides = {pair: [place[box] for box in (pair.a, pair.b) if box in place]
-                       for pair in scene.pairs}
-        """Places in a tick of the moving boxes of a pair."""
+        self._reader, self._writer = PoseReader(), ContactWriter(scene)
+        place = {scene.index_of[box]: number for number, box in enumerate(scene.streams)
+                 if box != ALL_BOXES}
+        self._sides = {pair: [place[box] for box in pair if box in place]
+                       for pair in topics.of_pair}
+        """Places in a tick of the moving boxes of a pair that has topics."""
         self.active = False
 
     def set_times(self, settings: Mapping[str, Any]) -> None:
@@ -146,21 +147,21 @@ class TickAnswerer:
         took = time.perf_counter_ns() - started
         writer, of_pair = self._writer, self._topics.of_pair
         header = header_bytes(stamp, frame_id)
-        for pair, contact in answer.touching:
-            publishers = of_pair.get(pair)
-            if publishers is not None:
-                own = stamp if is_array else max(
-                    [pose.stamp for side in self._sides[pair] if (pose := tick[side])])
-                head = header if own == stamp else header_bytes(own, frame_id)
-                publishers[0].publish(writer.vector(head, contact.point))
-                publishers[1].publish(writer.vector(head, contact.normal))
+        touching, contacts = answer.touching, answer.contacts
+        for row, (a, b) in enumerate(answer.pairs[:touching].tolist() if of_pair else ()):
+            publishers = of_pair[a, b]
+            own = stamp if is_array else max(
+                [pose.stamp for side in self._sides[a, b] if (pose := tick[side])])
+            head = header if own == stamp else header_bytes(own, frame_id)
+            publishers[0].publish(writer.vector(head, contacts.point[row]))
+            publishers[1].publish(writer.vector(head, contacts.normal[row]))
         self._topics.contacts.publish(writer.contacts(header, answer))
         # What nobody waits for comes last. A box that an array leaves out is not there: nobody
         # asks for its pairs.
         age = time.time_ns() - arrived if arrived else 0
-        self._monitor.evaluated(took, age, [] if is_array else answer.stale)
+        self._monitor.evaluated(took, age, [] if is_array else answer.named_stale())
         counts = self._counts
-        counts['contacts'] += len(answer.touching)
+        counts['contacts'] += touching
         counts['evaluations'] += 1
         counts['stale pairs'] += len(answer.stale)
 

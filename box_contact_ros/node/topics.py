@@ -4,6 +4,7 @@
 """Topics of a scene: pose subscriptions of its moving boxes, contact publishers of its pairs."""
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -53,7 +54,8 @@ def contact_qos() -> QoSProfile:
 class SceneTopics:
     """The topics of a node from configure to cleanup.
 
-    contacts: the publisher of all contacts. of_pair: those of point and normal, by pair.
+    contacts: the publisher of all contacts. of_pair: those of point and normal, by the indices of
+    the boxes of a pair; none without topics of their own.
     """
 
     def __init__(self, node: Node, prefix: str, scene: Scene, *, pair_topics: bool) -> None:
@@ -62,20 +64,21 @@ class SceneTopics:
         Raises ValueError for a scene whose names can be no topics here.
         """
         self._node, self._prefix = node, prefix
-        pairs = scene.pairs if pair_topics else ()
-        if len(pairs) > MOST_PAIRS_WITH_TOPICS:
-            raise ValueError(f'scene: {len(pairs)} pairs are too many for topics of their own (at '
-                             f'most {MOST_PAIRS_WITH_TOPICS}): set pair_topics to false')
+        if pair_topics and scene.pair_count > MOST_PAIRS_WITH_TOPICS:
+            raise ValueError(f'scene: {scene.pair_count} pairs are too many for topics of their '
+                             f'own (at most {MOST_PAIRS_WITH_TOPICS}): set pair_topics to false')
+        pairs = tuple(scene.every_pair()) if pair_topics else ()
         self._check(scene, pairs)
         self._subscriptions: dict[str, Subscription] = {}
-        self.of_pair: dict[Pair, tuple[Publisher, Publisher]] = {}
+        self.of_pair: dict[tuple[int, int], tuple[Publisher, Publisher]] = {}
         with qos_refused():
             self.contacts = self._publisher(Contacts, f'{prefix}contacts',
                                             qos_overriding_options=QOS_OVERRIDES)
         for pair in pairs:
             topic = self._topic_of(pair)
-            self.of_pair[pair] = (self._publisher(PointStamped, f'{topic}/point'),
-                                  self._publisher(Vector3Stamped, f'{topic}/normal'))
+            boxes = scene.index_of[pair.a], scene.index_of[pair.b]
+            self.of_pair[boxes] = (self._publisher(PointStamped, f'{topic}/point'),
+                                   self._publisher(Vector3Stamped, f'{topic}/normal'))
 
     def subscribe(self, scene: Scene, callback_of: Callable[[str, str], PoseCallback]) -> None:
         """Subscribe to all poses, with the callback for the bytes of a box and its topic."""
@@ -122,11 +125,15 @@ class SceneTopics:
         return f'{topic} has {len(offers)} of {wanted}, silent so far'
 
     def _check(self, scene: Scene, pairs: tuple[Pair, ...]) -> None:
-        """Raise ValueError where a pose topic is one of the node's own, which have other types."""
+        """Raise ValueError where a pose topic is one of the node's own, or two pairs share one."""
         own = [f'{self._prefix}contacts', *NODE_TOPICS]
         own += [f'{self._topic_of(pair)}/{vector}' for pair in pairs
                 for vector in ('point', 'normal')]
         taken = {self._resolved(topic) for topic in own}
+        labels = Counter(pair.label for pair in pairs)
+        if len(labels) < len(pairs):
+            raise ValueError(f'scene: {labels.most_common(1)[0][0]} is the name of two pairs: list '
+                             'one of them with a name of its own')
         for box, topic in scene.sources.items():
             if self._resolved(topic) in taken:
                 raise ValueError(f'scene: pose_topic {short_repr(topic)} of box {box} is a topic '

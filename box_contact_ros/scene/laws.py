@@ -191,7 +191,7 @@ class SceneLaw(_Law):
     def __init__(self, law: native.Law, scene: Scene, moving: Sequence[str]) -> None:
         """Take over a native law of the boxes `scene.moving`; see `at_rate`."""
         self._law, self._scene, self._free = law, scene, frozenset(moving)
-        self._numbers = {pair: number for number, pair in enumerate(scene.pairs)}
+        self._numbers: dict[Pair, int] = {}  # of pairs, as they come
         self._place = dict.fromkeys(scene.boxes, FIXED) | {
             name: place for place, name in enumerate(scene.moving)}
 
@@ -232,14 +232,14 @@ class SceneLaw(_Law):
         """
         place = self._place
         contacts: list[tuple[Pair, Contact | None]] = [
-            *answer.touching, *((pair, None) for pair in answer.stale)]
-        try:
-            touches = [(pair.label, self._numbers[pair], place[pair.a], place[pair.b], contact)
-                       for pair, contact in contacts
-                       if pair.a in self._free or pair.b in self._free]
-        except KeyError as error:
-            raise ValueError(f'{short_repr(error.args[0])} is no pair of the scene of this law'
-                             ) from None
+            *answer.named()[:answer.touching], *((pair, None) for pair in answer.named_stale())]
+        for pair, _ in contacts:
+            if pair.a not in place or pair.b not in place:
+                raise ValueError(f'{short_repr(pair)} is no pair of the scene of this law')
+        touches = [(pair.label, self._numbers.setdefault(pair, len(self._numbers)),
+                    place[pair.a], place[pair.b], contact)
+                   for pair, contact in contacts
+                   if pair.a in self._free or pair.b in self._free]
         try:
             _hold(self._law, touches, poses)
         except ValueError as error:

@@ -144,12 +144,8 @@ class Pairing(ABC):
         """The last pose of each kind that is counted. Whoever logs them clears them."""
         self._scene = scene
         self._boxes = {box: BoxState() for box in scene.streams}
-        self._partners: dict[str, set[str]] = {
-            box: {box} if box == ALL_BOXES else set() for box in self._boxes}
-        for pair in scene.pairs:
-            for box, partner in ((pair.a, pair.b), (pair.b, pair.a)):
-                if box in self._boxes:
-                    self._partners[box].add(partner if partner in self._boxes else box)
+        self._partners = {box: {box} if box == ALL_BOXES else scene.partners(box)
+                          for box in self._boxes}
 
     @abstractmethod
     def add(self, box: str, pose: StampedPose) -> list[Tick]:

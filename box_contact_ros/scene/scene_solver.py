@@ -3,38 +3,38 @@
 
 """A scene: boxes, fixed or moving, the pairs of them that matter, and what one tick computes.
 
-Nothing outside the listed pairs is answered. A broad phase leaves the pairs whose axis-aligned
-bounding boxes come near each other. These go through the solver as one batch.
+Pairs are listed by name, or asked for by patterns of names. A broad phase in the core finds those
+whose bounding boxes meet. These go through the solver as one batch. An answer is arrays, in which a
+box is its index in the scene. Names are made where somebody asks for them.
 """
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import fnmatch
+import re
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from operator import itemgetter
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
 
 from ..core import LENGTH_MAX, native
-from ..solver.checks import absent_poses, as_floats, pose_fault, short_repr, size_fault
-from ..solver.contact import Contact
-from ..solver.contact_solver import ContactSolver
+from ..solver.checks import as_floats, pose_fault, short_repr, size_fault
+from ..solver.contact import Contact, Contacts
+from ..solver.contact_solver import BY_PLACE, ContactSolver
+from ..solver.models import Model
 
 POSE_ARRAY = 'poses'
 """Topic of the poses of all moving boxes, where they come as one message."""
 ALL_BOXES = 'all boxes'
 """Source of these poses: no box of a scene file can have this name."""
-
-SWEPT_FROM = 64
-"""Pairs a box: above this the broad phase sweeps the boxes, below it tests each pair. Measured: the
-two take as long there."""
-SWEPT_MOST = 2**22
-"""Comparisons of a sweep. Of more, as where thousands of boxes are in one place, testing each
-listed pair is faster, and needs no room for the others."""
-
-_new_tuple = tuple.__new__  # a named tuple's own constructor is Python code
-
+NOWHERE = np.full(7, np.nan)
+"""In place of the pose of a box that is not there."""
+EVERY_PAIR = (('*', '*'),)
+"""Patterns of a scene in which each two boxes are a pair, if one of them moves."""
+ALONE = -1
+"""In place of box b, in rows of boxes: all pairs of box a that patterns ask for."""
 
 CONTAINER = (12.192, 2.438, 2.591)
 """Full extents of an ISO 40 ft container [m]."""
@@ -68,26 +68,160 @@ class Pair(NamedTuple):
         return cls(f'{a}_{b}', a, b)
 
 
+Pattern = tuple[str, str]
+"""Names of the boxes a and b of some pairs, with `*`, `?` and `[..]`."""
+
+
 @dataclass(frozen=True)
 class Scene:
-    """Boxes by name, and the pairs. Raises Fault for anything that cannot be computed."""
+    """Boxes by name, and which pairs matter. Raises Fault for anything that cannot be computed.
+
+    A pattern asks for all pairs of two boxes that it matches and of which one moves. If both sides
+    match both boxes, a is the one that comes first in the scene.
+    """
 
     boxes: Mapping[str, Box]
-    pairs: tuple[Pair, ...]
+    pairs: tuple[Pair, ...] = ()
+    """The pairs that are listed by the names of their boxes."""
     frame_id: str = ''
     """The common frame that all poses must be in; empty: any, as long as it is the same."""
     pose_array: bool = False
     """Whether one message has the poses of all moving boxes; else each box has a topic."""
+    patterns: tuple[Pattern, ...] = ()
 
     def __post_init__(self) -> None:
-        _check(self.boxes, self.pairs)
+        _check_boxes(self.boxes)
+        _check_pairs(self.boxes, self.pairs)
+        for number, (a, b) in enumerate(self.patterns):
+            _check_pattern(self, number, self.matching(a), self.matching(b))
+        if not self.pairs and not self.patterns:
+            raise Fault(('pairs',), 'a scene needs at least one pair')
+
+    def matching(self, pattern: str) -> np.ndarray:
+        """Return which boxes (n,) have names that a pattern matches."""
+        is_alike = re.compile(fnmatch.translate(pattern)).match
+        return np.array([is_alike(name) is not None for name in self.boxes])
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the boxes by index."""
+        return tuple(self.boxes)
+
+    @cached_property
+    def index_of(self) -> Mapping[str, int]:
+        """Indices of the boxes by name."""
+        return {name: index for index, name in enumerate(self.boxes)}
+
+    @cached_property
+    def is_fixed(self) -> np.ndarray:
+        """Which boxes (n,) never move."""
+        return np.array([box.pose is not None for box in self.boxes.values()])
+
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """The listed pairs (m, 2) as indices of their boxes."""
+        index = self.index_of
+        return np.array([(index[pair.a], index[pair.b]) for pair in self.pairs],
+                        dtype=np.int64).reshape(-1, 2)
+
+    @cached_property
+    def groups(self) -> tuple[np.ndarray, np.ndarray]:
+        """The group of each box (n,), and which groups meet by patterns (g, g): 0, 1 or 2.
+
+        The rows of the latter are the group of the box that comes first in the scene: 1 if it is
+        box a, 2 if it is box b. Boxes of a group match the same sides of the same patterns.
+        """
+        if not self.patterns:
+            return np.zeros(len(self.boxes), np.int32), np.zeros((0, 0), np.uint8)
+        sides = np.array([self.matching(side) for pattern in self.patterns for side in pattern])
+        kinds, group = np.unique(sides, axis=1, return_inverse=True)
+        allowed = np.zeros((kinds.shape[1], kinds.shape[1]), np.uint8)
+        for a, b in zip(kinds[::2], kinds[1::2]):
+            asked = a[:, None] & b
+            allowed = np.where(allowed, allowed, np.where(asked, 1, 2 * asked.T))
+        return group.ravel().astype(np.int32), allowed.astype(np.uint8)
+
+    @cached_property
+    def _listed(self) -> Mapping[tuple[int, int], Pair]:
+        return {(a, b): pair for (a, b), pair in zip(self.rows.tolist(), self.pairs)}
+
+    def pair_of(self, a: int, b: int) -> Pair:
+        """Return the pair of two boxes by index; b ALONE: box a with itself, under its own name."""
+        pair = self._listed.get((a, b))
+        if pair is not None:
+            return pair
+        name = self.names[a]
+        return Pair(name, name, name) if b == ALONE else Pair.between(name, self.names[b])
+
+    def has_pair(self, a: int, b: int) -> bool:
+        """Return whether boxes a and b, by index, are a pair in this order."""
+        group, allowed = self.groups
+        return (a, b) in self._listed or bool(self.patterns and a != b and (
+            allowed[group[min(a, b)], group[max(a, b)]] == (1 if a < b else 2)))
+
+    @cached_property
+    def _is_asked(self) -> np.ndarray:
+        """Which boxes (n,) patterns pair with others."""
+        group, allowed = self.groups
+        return allowed.max(axis=1)[group] > 0 if self.patterns else np.zeros(len(group), bool)
+
+    @cached_property
+    def watched(self) -> tuple[Pair, ...]:
+        """What may be stale: the listed pairs, then each moving box that patterns ask for."""
+        boxes = np.flatnonzero(self._is_asked & ~self.is_fixed).tolist()
+        return (*self.pairs, *(self.pair_of(box, ALONE) for box in boxes))
+
+    def _partners(self, index: int) -> np.ndarray:
+        """Return which boxes (n,) patterns pair a box with, beside those of listed pairs."""
+        group, allowed = self.groups
+        if not self.patterns:
+            return np.zeros(len(self.boxes), bool)
+        met: np.ndarray = np.greater(allowed[group[index]][group], 0)
+        met[index] = False
+        if self.is_fixed[index]:
+            met[self.is_fixed] = False
+        met[self.rows[(self.rows == index).any(axis=1)]] = False
+        return met
+
+    def every_pair(self) -> Iterator[Pair]:
+        """Yield the listed pairs, then those that patterns ask for, by index."""
+        yield from self.pairs
+        group, allowed = self.groups
+        for index in range(len(self.boxes) if self.patterns else 0):
+            for other in (index + 1 + np.flatnonzero(self._partners(index)[index + 1:])).tolist():
+                is_a = allowed[group[index], group[other]] == 1
+                yield self.pair_of(*((index, other) if is_a else (other, index)))
+
+    @cached_property
+    def pair_count(self) -> int:
+        """How many pairs the scene has."""
+        group, allowed = self.groups
+        if not self.patterns:
+            return len(self.pairs)
+        boxes, fixed = (np.bincount(group[of], minlength=len(allowed))
+                        for of in (slice(None), self.is_fixed))
+        both = (allowed > 0) * (np.outer(boxes, boxes) - np.outer(fixed, fixed))
+        with_itself = ((boxes - fixed) * (np.diag(allowed) > 0)).sum()
+        listed = np.count_nonzero(allowed[group[self.rows[:, 0]], group[self.rows[:, 1]]])
+        return len(self.pairs) + int(both.sum() - with_itself) // 2 - int(listed)
+
+    def partners(self, name: str) -> set[str]:
+        """Return the moving boxes that a moving box has a pair with; itself if one is fixed."""
+        index = self.index_of[name]
+        met = self._partners(index)
+        met[self.rows[(self.rows == index).any(axis=1)]] = True
+        met[index] = False
+        if met[self.is_fixed].any():
+            return {name}
+        return {self.names[other] for other in np.flatnonzero(met)}
 
     @cached_property
     def moving(self) -> tuple[str, ...]:
         """Names of the moving boxes in their order; without an array, only of those in a pair."""
-        listed = {name for pair in self.pairs for name in (pair.a, pair.b)}
-        return tuple(name for name, box in self.boxes.items()
-                     if box.pose is None and (self.pose_array or name in listed))
+        asked = self._is_asked.copy()
+        asked[self.rows.ravel()] = True
+        return tuple(name for name, is_asked, is_fixed in zip(self.boxes, asked, self.is_fixed)
+                     if not is_fixed and (self.pose_array or is_asked))
 
     @cached_property
     def streams(self) -> tuple[str, ...]:
@@ -126,8 +260,8 @@ class Fault(ValueError):
         self.path, self.reason = path, reason
 
 
-def _check(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
-    """Raise Fault for the first thing that is wrong with a scene."""
+def _check_boxes(boxes: Mapping[str, Box]) -> None:
+    """Raise Fault for the first thing that is wrong with a box."""
     for name, box in boxes.items():
         for key, given, count in (('size', box.size, 3), ('pose', box.pose, 7)):
             if given is not None and (not isinstance(given, tuple | list) or len(given) != count):
@@ -141,8 +275,10 @@ def _check(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
         fault = pose_fault(box.pose) if box.pose else None
         if fault:
             raise Fault(('boxes', name, 'pose'), fault)
-    if not pairs:
-        raise Fault(('pairs',), 'a scene needs at least one pair')
+
+
+def _check_pairs(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
+    """Raise Fault for the first thing that is wrong with listed pairs."""
     for number, pair in enumerate(pairs):
         path = ('pairs', number)
         for side, name in (('a', pair.a), ('b', pair.b)):
@@ -164,6 +300,20 @@ def _check(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
                             f'the same {what} as that of {short_repr(a)} and {short_repr(b)}')
 
 
+def _check_pattern(scene: Scene, number: int, is_a: np.ndarray, is_b: np.ndarray) -> None:
+    """Raise Fault for a pattern without a pair; is_a, is_b: the boxes (n,) that its sides match."""
+    for side, is_matched, pattern in zip('ab', (is_a, is_b), scene.patterns[number]):
+        if not is_matched.any():
+            raise Fault(('patterns', number, side),
+                        f'{short_repr(pattern)} is the name of no box')
+    # Ordered pairs of different boxes, less those of two fixed ones.
+    every, fixed = (int(a.sum() * b.sum() - (a & b).sum()) for a, b in (
+        (is_a, is_b), (is_a & scene.is_fixed, is_b & scene.is_fixed)))
+    if every == fixed:
+        raise Fault(('patterns', number), 'no two boxes of this pattern are a pair of which one '
+                                          'moves')
+
+
 class TooManyNear(ValueError):
     """A tick with more pairs near each other than the solver was to answer."""
 
@@ -171,24 +321,42 @@ class TooManyNear(ValueError):
 
 
 class Answer(NamedTuple):
-    """What one tick found."""
+    """What one tick found, as arrays. Boxes are their indices in `scene`."""
 
-    touching: list[tuple[Pair, Contact]]  # the pairs in contact
-    stale: list[Pair]
-    """The pairs that could not be evaluated, because a box has no pose that is recent enough."""
+    pairs: np.ndarray
+    """(k, 2) boxes a and b of the pairs in contact: those listed, then the others by index. Behind
+    them, in the same order, the pairs apart whose separation is at most the solver's margin."""
+    contacts: Contacts
+    """(k,) their contacts; those of pairs apart are not colliding."""
     near: int  # how many pairs the broad phase left to the solver
-    close: Sequence[tuple[Pair, Contact]] = ()
-    """The pairs apart whose separation is at most `margin`; their contacts are not colliding."""
+    stale: np.ndarray
+    """(m, 2) boxes of the listed pairs that could not be evaluated, because one has no pose that is
+    recent enough. (box, ALONE): all pairs of a box that patterns ask for."""
+    scene: Scene
+
+    @property
+    def touching(self) -> int:
+        """Return how many pairs are in contact: the first rows."""
+        return int(np.count_nonzero(self.contacts.colliding))
+
+    def named(self) -> list[tuple[Pair, Contact]]:
+        """Return each pair with its contact, by name."""
+        return [(self.scene.pair_of(a, b), self.contacts.row(row))
+                for row, (a, b) in enumerate(self.pairs.tolist())]
+
+    def named_stale(self) -> list[Pair]:
+        """Return the stale pairs by name; a box whose pairs all are is paired with itself."""
+        return [self.scene.pair_of(a, b) for a, b in self.stale.tolist()]
 
 
 class SceneSolver:
     """Contacts of all pairs of a scene, one tick at a time.
 
-    Raises ValueError for a model that does not go with one of the pairs' sizes. Keeps the last
-    poses: use one per thread.
+    Raises ValueError for a model that does not go with the sizes. Keeps the last order of the
+    boxes: use one per thread.
     """
 
-    def __init__(self, scene: Scene, *, model: str = 'exact', weights: str | None = None,
+    def __init__(self, scene: Scene, *, model: str | Model = 'exact', weights: str | None = None,
                  margin: float = 0.0, most_near: int | None = None) -> None:
         """Begin without poses.
 
@@ -200,90 +368,47 @@ class SceneSolver:
         self.scene = scene
         self.model = model
         self.margin = margin
-        self._most_near = len(scene.pairs) if most_near is None else most_near
-        numbers = {name: number for number, name in enumerate(scene.boxes)}
+        self._most_near = sys.maxsize if most_near is None else most_near
         boxes = list(scene.boxes.values())
         self._size = np.array([box.size for box in boxes], dtype=float)
-        self._bounded = np.minimum(self._size + margin, LENGTH_MAX)
-        """Extents that bounding boxes are made of: those of two close boxes meet."""
-        self._first = np.array([numbers[pair.a] for pair in scene.pairs])
-        self._second = np.array([numbers[pair.b] for pair in scene.pairs])
-        self._moving = np.array([numbers[name] for name in scene.moving])
-        self._poses = np.array([box.pose or (0, 0, 0, 0, 0, 0, 1) for box in boxes], dtype=float)
-        self._known = np.array([box.pose is not None for box in boxes])
-        self._low, self._high = np.empty((2, len(boxes), 3))
-        self._near, self._unknown = np.empty((2, len(scene.pairs)), dtype=np.int64)
-        self._moves = ~self._known
-        # Fixed boxes are bounded here, once and for all.
-        self._near_pairs(np.flatnonzero(self._known))
-        self._is_swept = len(scene.pairs) > SWEPT_FROM * len(boxes)
-        if self._is_swept:
-            keys = self._key(self._first, self._second)
-            self._by_key = np.argsort(keys)
-            self._keys = keys[self._by_key]
-        pair = scene.pairs[0]
-        self._solver = ContactSolver(scene.boxes[pair.a].size, scene.boxes[pair.b].size,
-                                     model=model, weights=weights, margin=margin)
-        # A single pair needs no test and no batch. Its sides are among the poses, then fixed ones.
-        self._only = pair if len(scene.pairs) == 1 else None
-        self._in_order = scene.moving == (pair.a, pair.b)
-        names = [*scene.moving, pair.a, pair.b]
-        self._sides = itemgetter(names.index(pair.a), names.index(pair.b))
-        self._fixed = [self._poses[numbers[name]] for name in (pair.a, pair.b)]
+        self._poses = np.array([box.pose or [np.nan] * 7 for box in boxes], dtype=float)
+        self._moving = np.array([scene.index_of[name] for name in scene.moving])
+        self._places = [self._poses[index] for index in self._moving]  # faster than rows by index
+        self._broad_phase = native.BroadPhase(self._size, scene.is_fixed, margin, scene.rows,
+                                              *scene.groups)
+        a, b = scene.rows[0] if scene.pairs else (0, 0)
+        self._solver = ContactSolver(self._size[a], self._size[b], model=model, weights=weights,
+                                     margin=margin)
+        self._again = partial(SceneSolver, model=model, weights=weights, margin=margin,
+                              most_near=most_near)
         self._warm_up()
+
+    def __reduce__(self) -> tuple[Callable[..., SceneSolver], tuple[Scene]]:
+        """Pickle the arguments."""
+        return self._again, (self.scene,)
 
     @property
     def fallbacks(self) -> int:
         """Contacts so far that the model handed to `exact`: see `mlp`."""
         return self._solver.fallbacks - self._warm_up_answers
 
-    def _near_pairs(self, moved: np.ndarray, *, listed: bool = True) -> tuple[int, int]:
-        """Bound the boxes `moved` anew, then, if `listed`, write to `_near` which pairs may touch.
-
-        Pairs without poses go to `_unknown`. Returns how many there are of each; or −1, and the
-        number of a box whose pose is not valid.
-        """
-        pairs = slice(None) if listed else slice(0)
-        return native.near_pairs(
-            self._poses, self._bounded, moved, self._low, self._high, self._known,
-            self._first[pairs], self._second[pairs], self._near, self._unknown)
-
-    def _key(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Return a number for every two boxes, the same for both orders."""
-        return np.minimum(first, second) * len(self._known) + np.maximum(first, second)
-
-    def _broad_phase(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the pairs that may touch and those without poses; ValueError for a bad pose."""
-        count, left_out = self._near_pairs(self._moving, listed=not self._is_swept)
-        if count < 0:
-            box = list(self.scene.boxes)[left_out]
-            raise ValueError(f'pose of {box}: {pose_fault(self._poses[left_out])}')
-        swept = native.near_boxes(self._low, self._high, self._known, self._moves,
-                                  SWEPT_MOST) if self._is_swept else None
-        if self._is_swept and swept is None:
-            count, left_out = self._near_pairs(self._moving[:0])
-        if swept is None:
-            return self._near[:count], self._unknown[:left_out]
-        # Sorted keys are looked up several times faster.
-        keys = np.sort(self._key(*swept.T))
-        at = np.searchsorted(self._keys, keys)
-        is_pair = self._keys[np.minimum(at, len(self._keys) - 1)] == keys
-        unknown = self._unknown[:0] if self._known.all() else np.flatnonzero(
-            ~(self._known[self._first] & self._known[self._second]))
-        return np.sort(self._by_key[at[is_pair]]), unknown
-
     def _warm_up(self) -> None:
         """Let the model refuse sizes that it has no answer for.
 
         Only a corner overlaps: where faces coincide, a soup takes seconds.
         """
-        sizes = {name: tuple(box.size) for name, box in self.scene.boxes.items()}
-        kinds = dict.fromkeys((sizes[pair.a], sizes[pair.b]) for pair in self.scene.pairs)
-        size_a, size_b = np.array(list(kinds), dtype=float).transpose(1, 0, 2)
-        a, b = np.zeros((2, len(kinds), 7))
+        kinds = np.unique(self._size, axis=0)
+        listed = np.unique(self._size[self.scene.rows].reshape(-1, 6), axis=0)
+        both = [listed]
+        if self.scene.patterns:
+            first = np.broadcast_to(kinds[0], kinds.shape)
+            both += [np.hstack((first, kinds)), np.hstack((kinds, first))]
+        size_a, size_b = np.split(np.concatenate(both), 2, axis=1)
+        a, b = np.zeros((2, len(size_a), 7))
         a[:, 6] = b[:, 6] = 1.0
         b[:, :3] = 0.5 * (size_a + size_b) - 0.02 * np.minimum(size_a, size_b)
-        self._solver.batch(a, b, size_a=size_a, size_b=size_b)
+        self._solver.batch(a, b, size_a=np.ascontiguousarray(size_a),
+                           size_b=np.ascontiguousarray(size_b))
         self([None] * len(self.scene.moving))
         self._warm_up_answers = self._solver.fallbacks
 
@@ -293,52 +418,38 @@ class SceneSolver:
         Or an array (n, 7) with a row for each, all NaN for None.
         Raises ValueError for numbers that are no pose, and for more or fewer poses than that.
         """
-        if len(poses) != len(self.scene.moving):
-            raise ValueError(f'{len(poses)} poses, but {len(self.scene.moving)} boxes move: '
+        self._set_poses(poses)
+        pairs, stale, refused = self._broad_phase.find(self._poses, self._most_near)
+        if refused >= 0:
+            raise ValueError(f'pose of {self.scene.names[refused]}: '
+                             f'{pose_fault(self._poses[refused])}')
+        near = len(pairs)
+        if near > self._most_near:
+            raise TooManyNear(f'more than {self._most_near} pairs are near each other, and so many '
+                              'are not answered')
+        contacts = self._solver._solve(self._poses, self._poses, self._size, self._size,
+                                       BY_PLACE, places=pairs)
+        listed = contacts.separation <= self.margin if self.margin else contacts.colliding
+        if np.count_nonzero(listed) < near or self.margin:
+            rows = np.flatnonzero(listed)
+            if self.margin:
+                rows = rows[np.argsort(~contacts.colliding[rows], kind='stable')]
+            pairs, contacts = pairs[rows], Contacts(*(column[rows] for column in contacts))
+        return Answer(pairs, contacts, near, stale, self.scene)
+
+    def _set_poses(self, poses: Sequence[np.ndarray | None] | np.ndarray) -> None:
+        """Take the poses of the moving boxes."""
+        if len(poses) != len(self._moving):
+            raise ValueError(f'{len(poses)} poses, but {len(self._moving)} boxes move: '
                              f'{short_repr(list(self.scene.moving))}; give a list of a pose or '
                              'None for each')
         if isinstance(poses, np.ndarray):
-            rows = as_floats(poses, 'poses', 'poses (n, 7)', (None, 7))
-            absent = absent_poses(rows)
-            if self._only is None:
-                self._poses[self._moving], self._known[self._moving] = rows, ~absent
-                return self._tick()
-            poses = [None if gone else pose for pose, gone in zip(rows, absent)]
-        if self._only is not None:
-            a, b = poses if self._in_order else self._sides((*poses, *self._fixed))
-            if a is None or b is None:
-                return Answer([], [self._only], 0)
-            contact = self._solver(a, b)
-            entries = [(self._only, contact)]
-            if contact.colliding:
-                return _new_tuple(Answer, (entries, [], 1, ()))
-            return _new_tuple(
-                Answer, ([], [], 1, entries if contact.separation <= self.margin else ()))
-        for number, pose in zip(self._moving, poses, strict=True):
-            self._known[number] = pose is not None
-            if pose is not None:
-                if type(pose) is not np.ndarray or pose.dtype != np.float64 or pose.shape != (7,):
-                    box = list(self.scene.boxes)[number]
-                    pose = as_floats(pose, f'pose of {box}', 'a pose (x y z qx qy qz qw)', (7,))
-                self._poses[number] = pose
-        return self._tick()
-
-    def _tick(self) -> Answer:
-        """Return the answer to the poses that are set."""
-        near, unknown = self._broad_phase()
-        pairs = self.scene.pairs
-        if len(near) > self._most_near:
-            raise TooManyNear(f'{len(near)} pairs are near each other: more than '
-                              f'{self._most_near} are not answered')
-        stale = [pairs[i] for i in unknown]
-        touching: list[tuple[Pair, Contact]] = []
-        close: list[tuple[Pair, Contact]] = []
-        if len(near):
-            first, second = self._first[near], self._second[near]
-            contacts = self._solver.batch(self._poses[first], self._poses[second],
-                                          size_a=self._size[first], size_b=self._size[second])
-            for row in np.flatnonzero(contacts.separation <= self.margin if self.margin
-                                      else contacts.colliding):
-                contact = contacts.row(int(row))
-                (touching if contact.colliding else close).append((pairs[near[row]], contact))
-        return Answer(touching, stale, len(near), close)
+            self._poses[self._moving] = as_floats(poses, 'poses', 'poses (n, 7)', (None, 7))
+            return
+        for place, index, pose in zip(self._places, self._moving, poses):
+            if pose is None:
+                pose = NOWHERE
+            elif type(pose) is not np.ndarray or pose.dtype != np.float64 or pose.shape != (7,):
+                pose = as_floats(pose, f'pose of {self.scene.names[index]}',
+                                 'a pose (x y z qx qy qz qw)', (7,))
+            place[:] = pose

@@ -4,7 +4,7 @@
 """What a solver returns: one contact, or the contacts of many pairs as arrays."""
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -38,21 +38,6 @@ class Contact(NamedTuple):
     """
 
 
-def patch_area(contact: Contact) -> float:
-    """Return the area of a contact's patch [m²]: 12·√(e₁·e₂), NaN where there is no covariance.
-
-    e₁ and e₂ are the eigenvalues of the covariance across the normal. Their product is
-    n·adj(C)·n. The area is exact where the overlap is a cuboid along the normal.
-    """
-    xx, xy, xz, _, yy, yz, _, _, zz = contact.covariance.ravel().tolist()
-    x, y, z = contact.normal.tolist()
-    product = (x * x * (yy * zz - yz * yz) + y * y * (xx * zz - xz * xz)
-               + z * z * (xx * yy - xy * xy) + 2.0 * (
-                   x * y * (xz * yz - xy * zz) + x * z * (xy * yz - xz * yy)
-                   + y * z * (xy * xz - xx * yz)))
-    return 12.0 * math.sqrt(max(product, 0.0))  # rounding may leave a line's product below zero
-
-
 class Contacts(NamedTuple):
     """The contacts of n pairs: the fields of `Contact` as arrays."""
 
@@ -71,11 +56,35 @@ class Contacts(NamedTuple):
     axis: np.ndarray
     """(n,) int32."""
 
+    @classmethod
+    def of(cls, contacts: Sequence[Contact]) -> Contacts:
+        """Return single contacts as arrays."""
+        n = len(contacts)
+        columns = [np.array(column) for column in zip(*contacts)] or [np.empty(0)] * 7
+        return cls(*(column.reshape(n, *shape).astype(kind) for column, shape, kind in zip(
+            columns, ((), (), (3,), (3,), (), (3, 3), ()),
+            (bool, float, float, float, float, float, np.int32))))
+
     def row(self, number: int) -> Contact:
         """Return the contact of one pair."""
         return Contact(bool(self.colliding[number]), float(self.separation[number]),
                        self.normal[number], self.point[number], float(self.volume[number]),
                        self.covariance[number], int(self.axis[number]))
+
+
+def patch_areas(contacts: Contacts) -> np.ndarray:
+    """Return the areas (n,) of contacts' patches [m²]: 12·√(e₁·e₂), NaN without a covariance.
+
+    e₁ and e₂ are the eigenvalues of the covariance across the normal. The area is exact where the
+    overlap is a cuboid along the normal.
+    """
+    return native.patch_areas(contacts.normal, contacts.covariance)
+
+
+def patch_area(contact: Contact) -> float:
+    """Return the area of one contact's patch [m²], as `patch_areas` does."""
+    areas = native.patch_areas(contact.normal[None], contact.covariance[None])
+    return float(areas[0])
 
 
 def without_patch(colliding: np.ndarray, separation: np.ndarray, normal: np.ndarray,

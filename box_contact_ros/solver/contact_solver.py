@@ -21,7 +21,7 @@ from .models import NATIVE, Model, check_model, make_model
 Names = tuple[str, str, str, str]  # of poses and sizes of A and B, in a refusal
 _SINGLE: Names = ('pose_a', 'pose_b', 'size_a', 'size_b')
 _MANY: Names = ('poses_a', 'poses_b', 'size_a', 'size_b')
-_BY_PLACE: Names = ('poses', 'poses', 'sizes', 'sizes')
+BY_PLACE: Names = ('poses', 'poses', 'sizes', 'sizes')
 
 
 class ContactSolver(native.PairSolver):
@@ -120,7 +120,7 @@ class ContactSolver(native.PairSolver):
             rows_a = self._sizes(sizes, 'sizes', self._size_a, len(poses))
             rows_b = self._size_b if sizes is None else rows_a
             places = as_places(pairs, 'pairs', len(poses))
-            return self._solve(poses, poses, rows_a, rows_b, _BY_PLACE, threads, patch, places)
+            return self._solve(poses, poses, rows_a, rows_b, BY_PLACE, threads, patch, places)
         if sizes is not None or poses_b is None:
             raise ValueError('batch takes (poses_a, poses_b), or (poses, sizes=…, pairs=…)')
         a = as_floats(poses_a, 'poses_a', 'poses (n, 7) of rows x y z qx qy qz qw', (None, 7))

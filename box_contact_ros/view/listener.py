@@ -49,14 +49,20 @@ class SceneRows:
         self.sizes = np.array([box.size for box in scene.boxes.values()], dtype=float)
         self.poses = np.array([box.pose or [np.nan] * 7 for box in scene.boxes.values()])
         """Poses (n, 7) of the fixed boxes, NaN for boxes that move."""
-        self.boxes_of = {pair.label: (self.row_of[pair.a], self.row_of[pair.b])
-                         for pair in scene.pairs}
-        self.is_a = np.isin(np.arange(len(self.sizes)), [a for a, _ in self.boxes_of.values()])
-        """Which boxes (n,) are box a of a pair: normals point away from them."""
-        longest = self.sizes.max(axis=1)
-        self.edge_of = {pair: float(longest[list(rows)].min())
-                        for pair, rows in self.boxes_of.items()}
-        """Longest edge [m] of each pair's smaller box, by the pair's name."""
+        self.longest = self.sizes.max(axis=1)
+        """Longest edge (n,) [m] of each box."""
+        self.pair_count = scene.pair_count
+        self._has_patterns = bool(scene.patterns)
+        self._boxes_of = {pair.label: row for pair, row in zip(scene.pairs, scene.rows.tolist())}
+        self.is_a = np.any([scene.matching(a) for a, _ in scene.patterns], axis=0) | np.isin(
+            np.arange(len(self.sizes)), scene.rows[:, 0])
+        """Which boxes (n,) may be box a of a pair: normals point away from them."""
+
+    def boxes_of(self, pair: str, *boxes: str) -> list[int] | None:
+        """Return the rows of the boxes of a pair, or of a stale box; None for an unknown one."""
+        rows = [self.row_of[box] for box in boxes or (pair,) if box in self.row_of]
+        is_asked = self._has_patterns and len(rows) == len(boxes or (pair,))
+        return self._boxes_of.get(pair) or (rows if is_asked else None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +76,7 @@ class DrawnContacts:
     depths: np.ndarray  # (k,)
     volumes: np.ndarray  # (k,), NaN from models that give the point alone
     covariances: np.ndarray  # (k, 3, 3), NaN there too
+    edges: np.ndarray  # (k,) longest edge of each pair's smaller box [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +98,9 @@ def read_contacts(message: Any, rows: SceneRows) -> DrawnContacts:
     """
     touching = sorted(message.contacts, key=lambda c: -c.depth)
     pairs, stale = [c.pair for c in touching], list(message.stale)
-    unknown = [pair for pair in (*pairs, *stale) if pair not in rows.boxes_of]
+    boxes = [rows.boxes_of(c.pair, c.box_a, c.box_b) for c in touching]
+    unknown = [pair for pair, row in zip((*pairs, *stale), (*boxes, *map(rows.boxes_of, stale)))
+               if row is None]
     if unknown:
         raise Refused('other scene', f'the contacts have the pair {unknown[0][:100]!r}, which the '
                                      'scene that is drawn has not')
@@ -104,7 +113,8 @@ def read_contacts(message: Any, rows: SceneRows) -> DrawnContacts:
         raise Refused('bad contacts', f'{numbers[~good][0]:g} is among the numbers of a contact')
     return DrawnContacts(pairs, stale, points=numbers[:, :3], normals=numbers[:, 3:6],
                          depths=numbers[:, 6], volumes=numbers[:, 7],
-                         covariances=numbers[:, [[8, 9, 10], [9, 11, 12], [10, 12, 13]]])
+                         covariances=numbers[:, [[8, 9, 10], [9, 11, 12], [10, 12, 13]]],
+                         edges=np.array([rows.longest[row].min() for row in boxes]))
 
 
 class Track:

@@ -29,7 +29,7 @@ from ..node.topics import contact_qos
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import two_boxes
 from . import style
-from .listener import DrawnContacts, Listener, SceneRows, Tick
+from .listener import DrawnContacts, Listener, Tick
 
 PARAMETERS = {name: CONTACT_PARAMETERS[name] for name in ('size_a', 'size_b', 'scene')}
 PERIOD = 1 / 30  # time [s] between marker arrays
@@ -45,7 +45,7 @@ def scene_markers(tick: Tick) -> list[Marker]:
     header = make_header(tick.stamp, tick.frame_id)
     markers = list(_boxes(header, tick))
     if tick.contacts is not None and tick.contacts.pairs:
-        markers += _contacts(header, tick.contacts, tick.rows)
+        markers += _contacts(header, tick.contacts)
     return markers
 
 
@@ -61,11 +61,10 @@ def _boxes(header: Header, tick: Tick) -> Iterator[Marker]:
         yield marker
 
 
-def _contacts(header: Header, contacts: DrawnContacts, rows: SceneRows) -> Iterator[Marker]:
+def _contacts(header: Header, contacts: DrawnContacts) -> Iterator[Marker]:
     """Yield points and patches of all contacts, a normal for each, depths of the deepest."""
-    edges = np.array([rows.edge_of[pair] for pair in contacts.pairs])
-    radii = style.POINT_RADIUS * edges
-    arrows = style.NORMAL_LENGTH * edges[:, None] * contacts.normals
+    radii = style.POINT_RADIUS * contacts.edges
+    arrows = style.NORMAL_LENGTH * contacts.edges[:, None] * contacts.normals
     spheres = make_marker(header, 'points', Marker.SPHERE_LIST, style.CONTACT)
     spheres.points = [_set(Point(), point) for point in contacts.points]
     _set(spheres.scale, [2.0 * radii[0]] * 3)
@@ -80,7 +79,7 @@ def _contacts(header: Header, contacts: DrawnContacts, rows: SceneRows) -> Itera
             depth = make_marker(header, 'depths', Marker.TEXT_VIEW_FACING, WHITE, number=row)
             # At the arrow's tail, where neither point nor arrow is.
             _set(depth.pose.position, point - 0.5 * arrow)
-            depth.scale.z = TEXT_HEIGHT * float(edges[row])
+            depth.scale.z = TEXT_HEIGHT * float(contacts.edges[row])
             depth.text = f'depth {1e3 * contacts.depths[row]:.2f} mm'
             yield depth
     sides = style.patch_sides(contacts.points, contacts.normals, contacts.covariances)

@@ -122,7 +122,7 @@ class Page:
     def _add_boxes(self, rows: SceneRows) -> None:
         """Add the boxes as instances of one cube: a tick moves all of them together."""
         self._rows = rows
-        edge = float(np.median(list(rows.edge_of.values())))
+        edge = float(np.median(rows.longest))
         radius = style.POINT_RADIUS * edge
         self._points.point_size = 2.0 * radius
         self._normals.shaft_radius = 0.45 * radius
@@ -243,9 +243,9 @@ def figures(tick: Tick | None, force: float, *, model: str, awaited: str) -> str
     if tick is not None:
         contacts = tick.contacts
         words = in_words(contacts)
-        if contacts is not None and len(tick.rows.boxes_of) > 1:
+        if contacts is not None and tick.rows.pair_count > 1:
             rows.append(('pairs', 'pairs in contact',
-                         f'{len(contacts.pairs)} of {len(tick.rows.boxes_of)}'))
+                         f'{len(contacts.pairs)} of {tick.rows.pair_count}'))
             rows.append(('stale', 'pairs not evaluated', f'{len(contacts.stale)}'))
         volume = contacts.volumes.sum() if contacts is not None else math.nan
         rows += [('volume', 'volume of the overlap', _text(1e3 * volume, '.3g', 'L')),

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "box_contact/box_contact.h"
+#include "box_contact/broad_phase.h"
 
 static int failures = 0;
 
@@ -102,10 +103,50 @@ static void check_refusals(void) {
   check(bc_collide(&a, &a, &query, &contact) == BC_BAD_ABI, "another query");
 }
 
+/* A tower of 100 cubes: each is near the next one, and bc_collide_rows takes the pairs. */
+static void check_broad_phase(void) {
+  enum { count = 100 };
+  static bc_size sizes[count];
+  static bc_pose poses[count];
+  static bool colliding[count];
+  for (int k = 0; k < count; ++k) {
+    bc_box box = cube_at(1.9 * k);
+    sizes[k] = box.size;
+    poses[k] = box.pose;
+  }
+  bc_boxes boxes = {sizeof boxes, count, sizes, NULL, 0.0, NULL, 0, NULL, 0, NULL};
+  bc_broad_phase* phase;
+  bc_near near = {sizeof near, NULL, 0, NULL, 0, 0};
+  check(bc_broad_phase_create(&boxes, &phase) == BC_OK, "create a broad phase");
+  check(bc_broad_phase_find(phase, poses, INT64_MAX, &near) == BC_OK, "find");
+  check(near.count == count - 1 && near.refused == -1 && near.stale_count == 0, "neighbours");
+  for (int64_t k = 0; k < near.count; ++k)
+    check(near.pairs[2 * k] == k && near.pairs[2 * k + 1] == k + 1, "a neighbour");
+  bc_rows rows = {sizeof rows, near.count, count, poses, poses, sizes, sizes, count, count,
+                  near.pairs};
+  bc_results results = {sizeof results, colliding, NULL, NULL, NULL, NULL, NULL, NULL};
+  check(bc_collide_rows(&rows, NULL, &results, 1, NULL) == BC_OK, "solve what is near");
+  for (int64_t k = 0; k < near.count; ++k) check(colliding[k], "a contact");
+
+  poses[7].quaternion[3] = 0.0;
+  check(bc_broad_phase_find(phase, poses, INT64_MAX, &near) == BC_BAD_POSE, "a bad pose");
+  check(near.refused == 7 && strstr(bc_error_text(), "pose of box 7"), "which box");
+  near.size = 1;
+  check(bc_broad_phase_find(phase, poses, INT64_MAX, &near) == BC_BAD_ABI, "another header");
+  check(bc_broad_phase_find(phase, NULL, 1, NULL) == BC_BAD_ARGUMENT, "no room for an answer");
+  bc_broad_phase_destroy(phase);
+  int64_t outside[2] = {0, count};
+  boxes.listed = outside;
+  boxes.listed_count = 1;
+  check(bc_broad_phase_create(&boxes, &phase) == BC_BAD_ROWS && !phase, "a box that is not there");
+  bc_broad_phase_destroy(NULL);
+}
+
 int main(void) {
   check(bc_abi() == BC_ABI, "ABI");
   check_contacts();
   check_rows();
+  check_broad_phase();
   check_refusals();
   printf("%s, %s: %d failures\n", bc_version(), bc_instruction_set(), failures);
   return failures != 0;

@@ -50,7 +50,8 @@ def test_with_sanitizers(tmp_path: Path) -> None:
         '-fsanitize=address,undefined,float-cast-overflow', '-fno-sanitize-recover=all',
         '-DBOX_CONTACT_VERSION=""', '-ffp-contract=off', '-fno-tree-slp-vectorize',
         f'-I{sysconfig.get_path("include")}', f'-I{np.get_include()}', CORE / 'binding/module.cpp',
-        *(CORE / 'src' / f'{name}.cpp' for name in ('kernel', 'library/library', 'library/force')),
+        *(CORE / 'src' / f'{name}.cpp' for name in (
+            'kernel', 'library/library', 'library/broad_phase', 'library/force')),
         '-o', extension)
     libraries = [run('g++', f'-print-file-name=lib{name}.so').strip() for name in ('asan', 'ubsan')]
     assert min(attack(37, 5000, EXTENSION=str(extension), LD_PRELOAD=' '.join(libraries),

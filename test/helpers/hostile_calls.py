@@ -58,12 +58,10 @@ def a_touch(pair: Any = 1) -> tuple[Any, ...]:
     return pair, 0, 1, contact
 
 
-def near_arguments(n: int = 4) -> list[Any]:
-    """Return what near_pairs takes: n boxes, and all pairs of neighbours."""
-    first = np.arange(n - 1)
-    return [rows(n), np.ones((n, 3)), np.arange(n), np.zeros((n, 3)), np.ones((n, 3)),
-            np.ones(n, bool), first, first + 1, np.zeros(n - 1, np.int64),
-            np.zeros(n - 1, np.int64)]
+def phase_arguments(n: int = 4) -> list[Any]:
+    """Return what BroadPhase takes: n boxes, a listed pair, and two groups that meet."""
+    return [np.ones((n, 3)), np.zeros(n, bool), 0.0, np.array([[1, 0]]),
+            np.arange(n, dtype=np.int32) % 2, np.array([[0, 1], [2, 0]], np.uint8)]
 
 
 def refused(kind: type[Exception], call: Callable[..., Any], *args: Any) -> None:
@@ -78,33 +76,36 @@ def refused(kind: type[Exception], call: Callable[..., Any], *args: Any) -> None
 
 
 def places_of_no_box() -> None:
-    """`near_pairs` reads and writes at places that it is given."""
-    assert native.near_pairs(*near_arguments()) == (3, 0)
-    for argument in (2, 6, 7):
-        for place in (-1, 4, 2**40, -2**63):
-            given = near_arguments()
-            given[argument][1] = place
-            refused(ValueError, native.near_pairs, *given)
+    """`BroadPhase` reads and writes at boxes and groups that it is given."""
+    assert native.BroadPhase(*phase_arguments()).find(rows(), 9)[0].tolist() == [
+        [1, 0], [2, 1], [2, 3]]
+    for argument in (3, 4):
+        for place in (-1, 4, 2**30, -2**31):
+            given = phase_arguments()
+            given[argument].flat[1] = place
+            refused(ValueError, native.BroadPhase, *given)
 
 
 def arrays_too_short() -> None:
-    """`near_pairs` writes as many rows as there are pairs."""
-    for argument in (0, 1, 3, 4, 5, 7, 8, 9):
-        given = near_arguments()
+    for argument in (0, 1, 4, 5):
+        given = phase_arguments()
         given[argument] = given[argument][:1]
-        refused(ValueError, native.near_pairs, *given)
+        refused(ValueError, native.BroadPhase, *given)
+    refused(ValueError, native.BroadPhase(*phase_arguments()).find, rows(3), 9)
 
 
 def bounds_without_an_order() -> None:
-    """Sorting NaN is undefined in C++."""
-    rng = np.random.default_rng(3)
-    low = rng.normal(size=(4000, 3))
-    low[rng.random(4000) < 0.5] = np.nan
-    every = np.ones(4000, bool)
-    refused(ValueError, native.near_boxes, low, low + 1.0, every, every, 10**9)
-    refused(ValueError, native.near_boxes, np.zeros((1, 3)), np.full((1, 3), np.inf), every[:1],
-            every[:1], 10)
-    assert native.near_boxes(low, low + 1.0, ~every, every, 10).shape == (0, 2)
+    """Sorting NaN is undefined in C++: none gets there."""
+    n = 4000
+    phase = native.BroadPhase(np.ones((n, 3)), np.zeros(n, bool), 0.0, np.zeros((0, 2), np.int64),
+                              np.zeros(n, np.int32), np.ones((1, 1), np.uint8))
+    place = rows(n)
+    for number in (np.nan, np.inf, -np.inf, 1e60):
+        bad = place.copy()
+        bad[1234, 1] = number
+        assert phase.find(bad, 10**9)[2] == 1234
+    assert len(phase.find(np.full((n, 7), np.nan), 10**9)[1]) == n
+    assert len(phase.find(place, 10**9)[0]) == n - 1
 
 
 def networks_that_no_file_has() -> None:
@@ -232,8 +233,11 @@ def random_calls(seed: int, rounds: int) -> None:
         (public.batch, [rows()], {'sizes': boxes, 'pairs': places}),
         (solver.solve, [rows(), rows(), one, one, 2, True, places], {}),
         (native.stages, [rows(), rows(), one, one, ['axis', 'upper_points']], {}),
-        (native.near_pairs, near_arguments(), {}),
-        (native.near_boxes, [0.0 * boxes, boxes, np.ones(4, bool), np.ones(4, bool), 10], {}),
+        (native.BroadPhase, phase_arguments(), {}),
+        (native.BroadPhase(*phase_arguments()).find, [rows(), 10], {}),
+        (native.message_numbers, [np.ones((4, 3)), np.ones((4, 3)), np.ones(4), np.ones(4),
+                                  np.ones((4, 3, 3))], {}),
+        (native.patch_areas, [np.ones((4, 3)), np.ones((4, 3, 3))], {}),
         (native.Law, [np.ones(2), np.ones((2, 3)), np.zeros((2, 3)), 200.0, 0.0, 0.001, 0.5, 9.81],
          {}),
         (law.hold, [[a_touch(1), a_touch(2)], rows(2)], {}),

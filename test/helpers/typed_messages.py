@@ -23,7 +23,7 @@ from box_contact_msgs.msg import Box, BoxPair, Contacts
 from box_contact_msgs.msg import Contact as ContactMessage
 from box_contact_ros.node.messages import NANOSECONDS, UPPER, Refused, make_header
 from box_contact_ros.scene.pairing import StampedPose
-from box_contact_ros.scene.scene_solver import Answer, Pair
+from box_contact_ros.scene.scene_solver import Pair
 from box_contact_ros.solver.checks import pose_fault
 from box_contact_ros.solver.contact import Contact, patch_area
 
@@ -93,10 +93,13 @@ def make_normal(header: Header, contact: Contact) -> Vector3Stamped:
     return Vector3Stamped(header=header, vector=_vector(contact.normal))
 
 
-def make_contacts(header: Header, answer: Answer) -> Contacts:
+def make_contacts(header: Header, listed: Iterable[tuple[Pair, Contact]],
+                  stale: Iterable[str] = ()) -> Contacts:
     """Return `contacts`: the pairs in contact, those near, and the names of the stale."""
-    return Contacts(header=header, contacts=_entries(answer.touching), near=_entries(answer.close),
-                    stale=[pair.label for pair in answer.stale])
+    pairs = list(listed)
+    return Contacts(header=header, stale=list(stale),
+                    contacts=_entries(pair for pair in pairs if pair[1].colliding),
+                    near=_entries(pair for pair in pairs if not pair[1].colliding))
 
 
 def _entries(listed: Iterable[tuple[Pair, Contact]]) -> list[ContactMessage]:
@@ -109,9 +112,8 @@ def _entries(listed: Iterable[tuple[Pair, Contact]]) -> list[ContactMessage]:
 def named_contacts(touching: Mapping[str, Contact], stale: Sequence[str] = (), *, stamp: int,
                    frame_id: str = 'yard') -> Contacts:
     """Return `contacts` of contacts by the names of their pairs; stamp [ns]."""
-    return make_contacts(make_header(stamp, frame_id), Answer(
-        [(Pair(name, 'a', 'b'), contact) for name, contact in touching.items()],
-        [Pair(name, 'a', 'b') for name in stale], len(touching)))
+    return make_contacts(make_header(stamp, frame_id), [
+        (Pair(name, 'a', 'b'), contact) for name, contact in touching.items()], stale)
 
 
 def _point(numbers: np.ndarray) -> Point:

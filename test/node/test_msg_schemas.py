@@ -31,7 +31,7 @@ from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
 from box_contact_ros.node.topics import pose_qos
 from box_contact_ros.resources import resource_path
-from box_contact_ros.scene.scene_solver import ALL_BOXES, Answer
+from box_contact_ros.scene.scene_solver import ALL_BOXES
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = resource_path('msg_schemas')
@@ -211,8 +211,8 @@ def live(node, client) -> dict[str, list[Any]]:
     for topic, messages in (('contact/point', client.points), ('contact/normal', client.normals),
                             ('contacts', client.contacts)):
         got[topic] = list(messages.values())
-    got['contacts'].insert(0, make_contacts(make_header(0, 'map'), Answer(
-        [], list(node._tick.solver.scene.pairs), 0)))  # a stale pair
+    got['contacts'].insert(0, make_contacts(
+        make_header(0, 'map'), [], ['box_a_box_b']))  # a stale pair
     got['poses'] = [pose_array([TOUCHING, first], 'map', 0) for first in (ORIGIN, (math.nan,) * 7)]
     return got
 

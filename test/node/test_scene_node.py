@@ -24,8 +24,9 @@ from typed_messages import pose_array
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.messages import contacts_by_pair, make_header
+from box_contact_ros.node.messages import contacts_by_pair, make_header, read_answer
 from box_contact_ros.node.topics import ARRAY_DEPTH, MOST_PAIRS_WITH_TOPICS
+from box_contact_ros.scene.scene_solver import ALONE
 
 MS = 1_000_000  # ns
 SCENE = """\
@@ -129,7 +130,7 @@ def test_many_pairs_have_no_topics_of_their_own(scene_node):
                                          'false'), scene_node(scene):
         pass
     with scene_node(scene, pair_topics=False) as node:
-        assert len(node._tick.solver.scene.pairs) == 1035
+        assert node._tick.solver.scene.pair_count == 1035
 
 
 @pytest.mark.parametrize('topic', [
@@ -265,6 +266,22 @@ def test_a_slow_node_says_so_and_is_late_by_few_ticks(array_node, array_client, 
     future = reset.call_async(Trigger.Request())
     stream(future.done)
     assert future.result().success and len(client.contacts) - answered < 4 * ARRAY_DEPTH
+
+
+def test_pairs_that_no_list_has(array_client, scene_node):
+    """With `pairs: all` as with a list. A box that is not there stands for all of its pairs."""
+    with scene_node(ARRAY.partition('pairs:')[0] + 'pairs: all\n') as node:
+        array_client.offer_until_answered(ON_FLOOR, LORRY)
+        contacts = array_client.answer(ON_LORRY, LORRY)
+        assert list(contacts) == ['load_lorry', 'lorry_floor']
+        assert contacts['load_lorry'].normal[2] == pytest.approx(-1.0)
+        stamp = array_client.ask(ON_FLOOR, LORRY)
+        assert 'load_floor' in contacts_by_pair(array_client.contacts[stamp])
+        stamp = array_client.ask(ON_FLOOR, GONE)
+        answer = read_answer(array_client.contacts[stamp], node._tick.solver.scene)
+        assert array_client.contacts[stamp].stale == ['lorry']
+        assert [pair.label for pair, _ in answer.named()] == ['load_floor']
+        assert answer.stale.tolist() == [[1, ALONE]]
 
 
 def test_bad_arrays_are_refused_and_counted(array_node, array_client):

@@ -21,7 +21,7 @@ from box_contact_ros import (
 )
 from box_contact_ros.scene.laws import GRAVITY
 from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
-from box_contact_ros.scene.scene_solver import Answer, Box, Pair, Scene
+from box_contact_ros.scene.scene_solver import Box, Pair, Scene
 from box_contact_ros.solver.contact import Contact
 
 PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'explanation' / 'force.md'
@@ -548,9 +548,10 @@ def test_a_stale_pair_keeps_its_patch():
     shifted = where + [1e-6, 0, 0, 0, 0, 0, 0]
     expected = law.copy().wrenches(shifted, np.zeros((1, 6)))
     assert expected[0, 0] < 0.0 < expected[0, 2]
-    law.hold(Answer([], [pair], 0), where)
+    solver = SceneSolver(scene, model='exact')
+    law.hold(solver([None]), where)
     assert np.array_equal(law.wrenches(shifted, np.zeros((1, 6))), expected)
-    law.hold(Answer([], [], 0), where)
+    law.hold(solver(where + [0, 0, 1, 0, 0, 0, 0]), where)
     assert not law.wrenches(shifted, np.zeros((1, 6))).any()
 
 
@@ -558,13 +559,13 @@ def test_a_stale_pair_keeps_its_patch():
 def test_a_box_without_a_pose_is_named(absent):
     """A scene's solver takes such a box; a law cannot."""
     boxes = {name: Box(name, (1.0, 1.0, 1.0)) for name in ('left', 'right')}
-    law = SceneLaw.at_rate(Scene(boxes, (Pair.between('left', 'right'),)), {'left': 1.0},
-                           rate_hz=100.0)
+    scene = Scene(boxes, (Pair.between('left', 'right'),))
+    law = SceneLaw.at_rate(scene, {'left': 1.0}, rate_hz=100.0)
     where = [np.array(LEVEL, dtype=float), absent]
     with pytest.raises(ValueError, match="^'right' has no pose, and a law needs one for each of"):
         law.wrenches(where, np.zeros((2, 6)))
     with pytest.raises(ValueError, match="^'right' has no pose"):
-        law.hold(Answer([], [], 0), where)
+        law.hold(SceneSolver(scene, model='exact')(where), where)
 
 
 @pytest.mark.parametrize('rate', [50.0, 200.0, 1000.0])

@@ -4,16 +4,24 @@
 """Scenes: what a tick computes against every pair by itself, and files that are refused."""
 from __future__ import annotations
 
+import copy
 import math
+import pickle
 
 import numpy as np
 import poses
 import pytest
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.core import native
-from box_contact_ros.scene import scene_solver
-from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver, two_boxes
+from box_contact_ros.scene.scene_solver import (
+    EVERY_PAIR,
+    Box,
+    Pair,
+    Scene,
+    SceneSolver,
+    two_boxes,
+)
+from box_contact_ros.solver.exact import Exact
 
 IDENTITY = (0, 0, 0, 0, 0, 0, 1)
 
@@ -43,8 +51,9 @@ def alone(scene, given_poses, model='exact'):
 
 
 def assert_same(answer, wanted):
-    assert {pair for pair, _ in answer.touching} == set(wanted)
-    for pair, contact in answer.touching:
+    assert answer.touching == len(answer.pairs)
+    assert {pair for pair, _ in answer.named()} == set(wanted)
+    for pair, contact in answer.named():
         other = wanted[pair]
         assert contact.separation == other.separation
         assert np.allclose(contact.normal, other.normal, rtol=0, atol=1e-15)
@@ -75,18 +84,17 @@ def test_a_tick_is_every_pair_alone(model, origin):
                        for name in scene.moving}
         answer = solver([given_poses[name] for name in scene.moving])
         assert_same(answer, alone(scene, given_poses, model))
-        assert answer.stale == [pair for pair in pairs if missing in (pair.a, pair.b)]
-        contacts += len(answer.touching)
+        assert answer.named_stale() == [pair for pair in pairs if missing in (pair.a, pair.b)]
+        contacts += answer.touching
         stale += len(answer.stale)
         left_out += len(pairs) - len(answer.stale) - answer.near
     assert contacts > 50 and stale > 30 and left_out > 50
 
 
-@pytest.mark.parametrize('swept_from', [0, 64])
+@pytest.mark.parametrize('patterns', [(), EVERY_PAIR])
 @pytest.mark.parametrize('origin', [0.0, 5e6])
-def test_close_pairs_are_those_within_the_margin(swept_from, origin, monkeypatch):
+def test_close_pairs_are_those_within_the_margin(patterns, origin):
     """Of every pair alone: apart, and by at most the margin. Pairs in contact stay as they are."""
-    monkeypatch.setattr(scene_solver, 'SWEPT_FROM', swept_from)
     rng = np.random.default_rng(5)
     close = 0
     for margin in (0.1, 0.5, 1.0):
@@ -95,56 +103,37 @@ def test_close_pairs_are_those_within_the_margin(swept_from, origin, monkeypatch
         where = np.hstack((origin + rng.uniform(-6, 6, (n, 3)), poses.unit_quaternions(rng, n)))
         boxes = {f'b{i}': Box(f'b{i}', tuple(sizes[i]), pose_topic=f'b{i}/pose') for i in range(n)}
         pairs = tuple(Pair.between(f'b{i}', f'b{j}') for i in range(n) for j in range(i))
-        solver = SceneSolver(Scene(boxes, pairs), model='exact', margin=margin)
-        answer, plain = solver(where), SceneSolver(Scene(boxes, pairs), model='exact')(where)
-        assert [pair for pair, _ in answer.touching] == [pair for pair, _ in plain.touching]
-        found = {pair.name: contact.separation for pair, contact in answer.close}
-        assert all(abs(np.linalg.norm(contact.normal) - 1) < 1e-12 for _, contact in answer.close)
+        scene = Scene(boxes, () if patterns else pairs, patterns=patterns)
+        solver = SceneSolver(scene, model='exact', margin=margin)
+        answer, plain = solver(where), SceneSolver(scene, model='exact')(where)
+        touching = plain.touching
+        assert len(plain.pairs) == touching and not answer.contacts.colliding[touching:].any()
+        assert np.array_equal(answer.pairs[:touching], plain.pairs)
+        assert (abs(np.linalg.norm(answer.contacts.normal, axis=1) - 1) < 1e-12).all()
+        found = {frozenset(pair[1:]): contact.separation
+                 for pair, contact in answer.named()[touching:]}
         wanted = {}
         for pair in pairs:
             a, b = int(pair.a[1:]), int(pair.b[1:])
             contact = ContactSolver(sizes[a], sizes[b], model='exact')(where[a], where[b])
             if not contact.colliding and contact.separation <= margin:
-                wanted[pair.name] = contact.separation
+                wanted[frozenset(pair[1:])] = contact.separation
         assert found.keys() == wanted.keys()
         assert found == pytest.approx(wanted, rel=1e-9, abs=1e-8 if origin else 1e-15)
         close += len(found)
-    assert close > 20 and not plain.close
+    assert close > 20
 
 
 def test_the_only_pair_is_close_up_to_the_margin():
-    """To the bit of the margin; a scene of one pair has a shorter way."""
+    """To the bit of the margin."""
     scene = two_boxes(poses.CUBE, poses.CUBE)
     for gap, listed in ((0.25, 1), (np.nextafter(2.25, 3) - 2.0, 0), (0.0, 0)):
         answer = SceneSolver(scene, model='exact', margin=0.25)(
             [poses.IDENTITY, np.array([2.0 + gap, 0, 0, 0, 0, 0, 1])])
-        assert len(answer.close) == listed and len(answer.touching) == (gap == 0.0)
+        assert len(answer.pairs) == max(listed, answer.touching)
+        assert answer.touching == (gap == 0.0)
     with pytest.raises(ValueError, match='margin must lie within 0 and 1e.50 m, not -1'):
         SceneSolver(scene, margin=-1.0)
-
-
-def test_no_touching_pair_is_left_out():
-    """All stored hard poses, exact touch included: what touches by SAT is near."""
-    hard_poses = pytest.importorskip('benchmarks.hard_poses')
-    touching = 0
-    for entry in hard_poses.load().values():
-        cases = entry.pairs
-        n = len(cases.pose_a)
-        where = np.empty((2 * n, 7))
-        size = np.empty((2 * n, 3))
-        where[0::2], where[1::2] = cases.pose_a, cases.pose_b
-        size[0::2], size[1::2] = cases.size_a, cases.size_b
-        near, unknown = np.empty((2, n), dtype=np.int64)
-        count, none = native.near_pairs(
-            where, size, np.arange(2 * n), np.empty((2 * n, 3)), np.empty((2 * n, 3)),
-            np.ones(2 * n, dtype=bool), np.arange(0, 2 * n, 2), np.arange(1, 2 * n, 2), near,
-            unknown)
-        found = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(
-            cases.pose_a, cases.pose_b, size_a=cases.size_a, size_b=cases.size_b)
-        assert none == 0
-        assert set(np.flatnonzero(found.colliding)) <= set(near[:count])
-        touching += found.colliding.sum()
-    assert touching > 500
 
 
 def test_a_yard_leaves_few_pairs():
@@ -157,7 +146,7 @@ def test_a_yard_leaves_few_pairs():
     answer = solver([down])
     assert 0 < answer.near < 10
     assert_same(answer, alone(scene, {'load': down}))
-    assert len(answer.touching) == 1
+    assert answer.touching == 1
 
 
 def test_one_pair_with_a_fixed_box():
@@ -165,11 +154,11 @@ def test_one_pair_with_a_fixed_box():
                    'load': Box('load', (1, 1, 1), pose_topic='load/pose')},
                   (Pair('down', 'floor', 'load'),))
     solver = SceneSolver(scene, model='exact')
-    (pair, contact), = solver([np.array([1.0, 2.0, 0.4, 0, 0, 0, 1])]).touching
+    (pair, contact), = solver([np.array([1.0, 2.0, 0.4, 0, 0, 0, 1])]).named()
     assert pair.name == 'down' and contact.normal.tolist() == [0, 0, 1]
     assert contact.separation == pytest.approx(-0.1)
     assert contact.point == pytest.approx([1, 2, -0.05])
-    assert solver([None]).stale == [pair]
+    assert solver([None]).named_stale() == [pair]
 
 
 @pytest.mark.parametrize('pose, words', [
@@ -221,9 +210,32 @@ def test_two_boxes_is_the_solver():
     single = ContactSolver(poses.CUBE, poses.CONTAINER)
     for a, b in zip(*poses.random_pairs(rng, 200)[:2]):
         answer, wanted = solver([a, b]), single(a, b)
-        assert len(answer.touching) == wanted.colliding
+        assert answer.touching == wanted.colliding
         if wanted.colliding:
-            assert np.array_equal(answer.touching[0][1].point, wanted.point)
+            assert np.array_equal(answer.contacts.point[0], wanted.point)
+
+
+class Upwards:
+    """A model of a user's own: the answers of exact, every normal upwards."""
+
+    def solve(self, a, b, size_a, size_b, threads=1):
+        contacts, refused = Exact().solve(a, b, size_a, size_b, threads)
+        return contacts._replace(normal=np.tile([0.0, 0, 1], (len(a), 1))), refused
+
+
+def test_a_model_object_answers_a_scene():
+    scene = Scene({name: Box(name, poses.CUBE) for name in 'abc'}, patterns=EVERY_PAIR)
+    answer = SceneSolver(scene, model=Upwards())(
+        [poses.IDENTITY, np.array([1.9, 0, 0, 0, 0, 0, 1]), None])
+    assert answer.pairs.tolist() == [[0, 1]] and answer.contacts.normal.tolist() == [[0, 0, 1]]
+
+
+def test_a_solver_can_be_copied_and_pickled():
+    scene = Scene({name: Box(name, poses.CUBE) for name in 'ab'}, patterns=EVERY_PAIR)
+    solver = SceneSolver(scene, model='exact', margin=1.0)
+    where = [poses.IDENTITY, np.array([2.5, 0, 0, 0, 0, 0, 1])]
+    for twin in (copy.deepcopy(solver), pickle.loads(pickle.dumps(solver))):
+        assert twin(where).named()[0][1].separation == solver(where).contacts.separation[0] == 0.5
 
 
 def test_models_that_do_not_know_a_size_refuse_the_scene():

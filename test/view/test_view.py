@@ -170,6 +170,16 @@ def test_contacts_of_another_scene_are_refused():
             read_contacts(message, ROWS)
 
 
+def test_contacts_of_a_scene_with_patterns():
+    """Its pairs are known by their boxes, and a stale box by its name."""
+    rows = SceneRows(Scene({name: Box(name, CUBE) for name in 'ab'}, patterns=(('*', '*'),)))
+    found = read_contacts(named_contacts({'a_b': EXACT}, ['a'], stamp=1), rows)
+    assert found.pairs == ['a_b'] and found.stale == ['a'] and found.edges.tolist() == [2.0]
+    assert rows.pair_count == 1 and rows.is_a.all()
+    with pytest.raises(Refused, match="'c', which the scene that is drawn has not"):
+        read_contacts(named_contacts({}, ['c'], stamp=1), rows)
+
+
 def test_the_deepest_contact_comes_first():
     """Near pairs are left out; a model without a patch gives NaN."""
     scene = Scene({name: Box(name, CUBE, pose_topic=name) for name in 'abcd'},

@@ -18,8 +18,9 @@
 #include "../src/mlp/mlp_model.hpp"
 #include "../src/mlp/shipped_network.hpp"
 #include "arrays.hpp"  // first, as Python.h wants
-#include "bounding_boxes.hpp"
+#include "broad_phase.hpp"
 #include "law.hpp"
+#include "patch_area.hpp"
 
 namespace {
 
@@ -530,88 +531,6 @@ PyObject* stages(PyObject*, PyObject* const* args, Py_ssize_t count) {
   return Py_BuildValue("(Nl)", found.release(), refused);
 }
 
-// Whether `place` is one of `count` boxes; false with a Python error otherwise.
-bool is_box(int64_t place, npy_intp count, const char* name) {
-  if (place >= 0 && place < count) return true;
-  PyErr_Format(PyExc_ValueError, "%s has the box %lld of %zd", name, (long long)place, count);
-  return false;
-}
-
-PyObject* near_pairs(PyObject*, PyObject* const* args, Py_ssize_t count) {
-  if (count != 10) {
-    return fail(PyExc_TypeError,
-                "near_pairs(poses, sizes, moved, low, high, known, first, second, near, unknown)");
-  }
-  Array<double> poses, sizes, low, high;
-  Array<int64_t> moved, first, second, near, unknown;
-  Array<npy_bool> known;
-  if (!read_in_place(args[0], "poses", {any_length, 7}, poses)) return nullptr;
-  npy_intp n = poses.length(0);
-  if (!read_in_place(args[1], "sizes", {n, 3}, sizes) ||
-      !read_in_place(args[2], "moved", {any_length}, moved) ||
-      !read_in_place(args[3], "low", {n, 3}, low) ||
-      !read_in_place(args[4], "high", {n, 3}, high) ||
-      !read_in_place(args[5], "known", {n}, known) ||
-      !read_in_place(args[6], "first", {any_length}, first) ||
-      !read_in_place(args[7], "second", {first.length(0)}, second) ||
-      !read_in_place(args[8], "near", {any_length}, near) ||
-      !read_in_place(args[9], "unknown", {any_length}, unknown))
-    return nullptr;
-  npy_intp pairs = first.length(0), left = 0, left_out = 0;
-  if (near.length(0) < pairs || unknown.length(0) < pairs)
-    return fail(PyExc_ValueError, "near and unknown must have room for all pairs");
-  BoundingBoxes boxes{poses.numbers, sizes.numbers, low.numbers, high.numbers};
-  for (npy_intp i = 0; i < moved.length(0); ++i) {
-    int64_t box = moved.numbers[i];
-    if (!is_box(box, n, "moved")) return nullptr;
-    if (known.numbers[box] && !boxes.update(box)) return Py_BuildValue("(iL)", -1, box);
-  }
-  // A place is checked when it is read: the arrays may overlap.
-  for (npy_intp i = 0; i < pairs; ++i) {
-    int64_t a = first.numbers[i], b = second.numbers[i];
-    if (!is_box(a, n, "first") || !is_box(b, n, "second")) return nullptr;
-    if (!known.numbers[a] || !known.numbers[b]) {
-      unknown.numbers[left_out++] = i;
-    } else if (boxes.are_near(a, b)) {
-      near.numbers[left++] = i;
-    }
-  }
-  return Py_BuildValue("(nn)", left, left_out);
-}
-
-// near_boxes(low, high, known, moves, most): all near pairs of boxes, whichever are listed.
-PyObject* near_boxes(PyObject*, PyObject* const* args, Py_ssize_t count) {
-  Array<double> low, high;
-  Array<npy_bool> known, moves;
-  if (count != 5) return fail(PyExc_TypeError, "near_boxes(low, high, known, moves, most)");
-  if (!read(args[0], "low", {any_length, 3}, low)) return nullptr;
-  npy_intp n = low.length(0);
-  if (!read(args[1], "high", {n, 3}, high) || !read(args[2], "known", {n}, known) ||
-      !read(args[3], "moves", {n}, moves))
-    return nullptr;
-  long long most = PyLong_AsLongLong(args[4]);
-  if (most == -1 && PyErr_Occurred()) return nullptr;
-  std::vector<int64_t> boxes, found;
-  for (npy_intp box = 0; box < n; ++box) {
-    if (!known.numbers[box]) continue;
-    // Numbers that are not finite have no order to be sorted by.
-    for (npy_intp k = 3 * box; k < 3 * box + 3; ++k)
-      if (!std::isfinite(low.numbers[k]) || !std::isfinite(high.numbers[k]))
-        return PyErr_Format(PyExc_ValueError, "box %zd has bounds that are not finite", box);
-    boxes.push_back(box);
-  }
-  bool all = BoundingBoxes{nullptr, nullptr, low.numbers, high.numbers}.sweep(
-      boxes, moves.numbers, most, [&](int64_t a, int64_t b) {
-        found.push_back(std::min(a, b));
-        found.push_back(std::max(a, b));
-      });
-  if (!all) Py_RETURN_NONE;
-  Array<int64_t> pairs;
-  if (!make({npy_intp(found.size() / 2), 2}, pairs)) return nullptr;
-  std::copy(found.begin(), found.end(), pairs.numbers);
-  return pairs.object.release();
-}
-
 PyObject* instruction_sets(PyObject*, PyObject*) {
   const auto& kernels = detail::kernels();
   Owned names(PyTuple_New(Py_ssize_t(kernels.count)));
@@ -630,16 +549,12 @@ PyMethodDef module_methods[] = {
     {"use_contact_types", method<use_contact_types>(), METH_FASTCALL,
      "use_contact_types(single, many)\n--\n\nSet the named tuples that calls and batches return."},
     {"stages", method<stages>(), METH_FASTCALL, "See core.stages."},
-    {"near_pairs", method<near_pairs>(), METH_FASTCALL,
-     "near_pairs(poses, sizes, moved, low, high, known, first, second, near, unknown)\n--\n\n"
-     "Write numbers of pairs that may touch, and of those without poses; return how many.\n\n"
-     "Boxes `moved` are bounded anew in low, high (boxes, 3). Returns -1 and the box for no pose."},
-    {"near_boxes", method<near_boxes>(), METH_FASTCALL,
-     "near_boxes(low, high, known, moves, most)\n--\n\n"
-     "Return the pairs (n, 2) of known boxes that may touch and of which one moves, in no "
-     "order.\n\n"
-     "Returns None where more than `most` intervals on the swept axis had to be compared.\n"
-     "low, high (boxes, 3): bounding boxes as near_pairs leaves them."},
+    {"message_numbers", method<message_numbers>(), METH_FASTCALL,
+     "message_numbers(point, normal, separation, volume, covariance)\n--\n\n"
+     "Return rows (n, 15) of contacts: point, normal, depth, volume, area, upper covariance."},
+    {"patch_areas", method<patch_areas>(), METH_FASTCALL,
+     "patch_areas(normal, covariance)\n--\n\n"
+     "Return areas (n,) of normals (n, 3), covariances (n, 3, 3)."},
     {nullptr, nullptr, 0, nullptr}};
 
 struct Whole {
@@ -693,6 +608,7 @@ PyMODINIT_FUNC PyInit__native() {
       add(module.get(), "lanes", PyLong_FromLong(kernel ? kernel->lanes : 0)) &&
       add(module.get(), "compiler", PyUnicode_FromString(__VERSION__)) &&
       add(module.get(), "PairSolver", PyType_FromSpec(&solver_spec)) &&
+      add(module.get(), "BroadPhase", PyType_FromSpec(&broad_phase_spec)) &&
       add(module.get(), "Law", PyType_FromSpec(&law_spec));
   for (const Whole& whole : wholes)
     added = added && add(module.get(), whole.name, PyLong_FromLong(whole.value));

@@ -1,0 +1,62 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// The areas of contacts' patches, and all numbers of contacts as messages have them.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "arrays.hpp"
+
+namespace box_contact::binding {
+
+// 12·√(n·adj(C)·n): e₁·e₂ of the covariance C across the normal n is n·adj(C)·n.
+inline double patch_area(const double* n, const double* c) {
+  double xx = c[0], xy = c[1], xz = c[2], yy = c[4], yz = c[5], zz = c[8];
+  double product = n[0] * n[0] * (yy * zz - yz * yz) + n[1] * n[1] * (xx * zz - xz * xz) +
+                   n[2] * n[2] * (xx * yy - xy * xy) +
+                   2.0 * (n[0] * n[1] * (xz * yz - xy * zz) + n[0] * n[2] * (xy * yz - xz * yy) +
+                          n[1] * n[2] * (xy * xz - xx * yz));
+  // Rounding may leave a line's product below zero. NaN stays NaN.
+  return 12.0 * std::sqrt(product < 0.0 ? 0.0 : product);
+}
+
+inline PyObject* patch_areas(PyObject*, PyObject* const* args, Py_ssize_t count) {
+  if (count != 2) return fail(PyExc_TypeError, "patch_areas(normal, covariance)");
+  Array<double> normal, covariance, area;
+  if (!read(args[0], "normal", {any_length, 3}, normal)) return nullptr;
+  npy_intp rows = normal.length(0);
+  if (!read(args[1], "covariance", {rows, 3, 3}, covariance) || !make({rows}, area)) return nullptr;
+  for (npy_intp row = 0; row < rows; ++row)
+    area.numbers[row] = patch_area(normal.numbers + 3 * row, covariance.numbers + 9 * row);
+  return area.object.release();
+}
+
+// Numbers of a contact in a message: point, normal, depth, volume, area, upper covariance.
+constexpr npy_intp message_numbers_count = 15;
+
+inline PyObject* message_numbers(PyObject*, PyObject* const* args, Py_ssize_t count) {
+  if (count != 5)
+    return fail(PyExc_TypeError, "message_numbers(point, normal, separation, volume, covariance)");
+  Array<double> point, normal, separation, volume, covariance, numbers;
+  if (!read(args[0], "point", {any_length, 3}, point)) return nullptr;
+  npy_intp rows = point.length(0);
+  if (!read(args[1], "normal", {rows, 3}, normal) ||
+      !read(args[2], "separation", {rows}, separation) ||
+      !read(args[3], "volume", {rows}, volume) ||
+      !read(args[4], "covariance", {rows, 3, 3}, covariance) ||
+      !make({rows, message_numbers_count}, numbers))
+    return nullptr;
+  double* to = numbers.numbers;
+  for (npy_intp row = 0; row < rows; ++row) {
+    const double *n = normal.numbers + 3 * row, *c = covariance.numbers + 9 * row;
+    to = std::copy_n(n, 3, std::copy_n(point.numbers + 3 * row, 3, to));
+    for (double number : {-separation.numbers[row], volume.numbers[row], patch_area(n, c), c[0],
+                          c[1], c[2], c[4], c[5], c[8]})
+      *to++ = number;
+  }
+  return numbers.object.release();
+}
+
+}  // namespace box_contact::binding

@@ -1,0 +1,111 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// The C interface of the broad phase.
+#include "../broad_phase.hpp"
+
+#include "../../include/box_contact/broad_phase.h"
+#include "refusals.hpp"
+
+namespace box_contact::detail {
+namespace {
+
+bool is_box(int64_t box, int64_t count) { return box >= 0 && box < count; }
+
+// Which pairs `boxes` ask for, or the words of a refusal.
+bc_status read_asked(const bc_boxes& boxes, Asked& asked) {
+  for (int64_t k = 0; boxes.listed && k < boxes.listed_count; ++k) {
+    int64_t a = boxes.listed[2 * k], b = boxes.listed[2 * k + 1];
+    if (!is_box(a, boxes.count) || !is_box(b, boxes.count) || a == b)
+      return fail(BC_BAD_ROWS, "listed[%lld] is (%lld, %lld), but there are %lld boxes",
+                  (long long)k, (long long)a, (long long)b, (long long)boxes.count);
+    asked.listed.insert(asked.listed.end(), {a, b});
+  }
+  if (!boxes.groups) {
+    asked.groups = boxes.listed ? 0 : 1;
+    asked.group.assign(size_t(boxes.count), 0);
+    asked.allowed.assign(size_t(asked.groups), 1);
+    return BC_OK;
+  }
+  if (boxes.group_count < 1 || !boxes.allowed)
+    return fail(BC_BAD_ARGUMENT, "groups need a group_count, and which of them meet");
+  asked.groups = boxes.group_count;
+  for (int64_t box = 0; box < boxes.count; ++box)
+    if (!is_box(boxes.groups[box], boxes.group_count))
+      return fail(BC_BAD_ROWS, "groups[%lld] is %d, but there are %d", (long long)box,
+                  int(boxes.groups[box]), int(boxes.group_count));
+  asked.group.assign(boxes.groups, boxes.groups + boxes.count);
+  size_t all = size_t(asked.groups) * size_t(asked.groups);
+  asked.allowed.assign(boxes.allowed, boxes.allowed + all);
+  return BC_OK;
+}
+
+bc_status make(const bc_boxes& boxes, bc_broad_phase** made) {
+  if (boxes.count < 0 || boxes.count > INT32_MAX)
+    return fail(BC_BAD_ARGUMENT, "count %lld is that of no boxes", (long long)boxes.count);
+  if (boxes.count && !boxes.sizes) return refuse_null("sizes");
+  if (!(boxes.margin >= 0.0 && boxes.margin <= length_max))
+    return fail(BC_BAD_ARGUMENT, "margin must lie within 0 and 1e50 m, not %g", boxes.margin);
+  std::vector<Vec<double>> half;
+  for (int64_t box = 0; box < boxes.count; ++box) {
+    const double* size = boxes.sizes[box].extent;
+    Vec<double> extents{0.5 * size[0], 0.5 * size[1], 0.5 * size[2]};
+    if (!size_valid(extents))
+      return fail(BC_BAD_SIZE, "sizes[%lld] (%g, %g, %g) is not within 1e-50 to 1e50 m",
+                  (long long)box, size[0], size[1], size[2]);
+    // Boxes that are larger by the margin overlap, if the boxes are apart by the margin at most.
+    for (int k = 0; k < 3; ++k) extents[k] += 0.5 * boxes.margin;
+    half.push_back(extents);
+  }
+  std::vector<uint8_t> fixed(size_t(boxes.count), 0);
+  if (boxes.fixed) fixed.assign(boxes.fixed, boxes.fixed + boxes.count);
+  Asked asked;
+  bc_status status = read_asked(boxes, asked);
+  if (status == BC_OK)
+    *made = reinterpret_cast<bc_broad_phase*>(
+        new BroadPhase(std::move(half), std::move(fixed), std::move(asked)));
+  return status;
+}
+
+}  // namespace
+}  // namespace box_contact::detail
+
+using namespace box_contact::detail;
+
+extern "C" {
+
+bc_status bc_broad_phase_create(const bc_boxes* boxes, bc_broad_phase** broad_phase) {
+  return guarded([&] {
+    if (!boxes || !broad_phase) return refuse_null(boxes ? "broad_phase" : "boxes");
+    *broad_phase = nullptr;
+    bc_boxes all{};
+    if (!read(boxes, all)) return fail(BC_BAD_ABI, "boxes.size is unknown");
+    return make(all, broad_phase);
+  });
+}
+
+void bc_broad_phase_destroy(bc_broad_phase* broad_phase) {
+  delete reinterpret_cast<BroadPhase*>(broad_phase);
+}
+
+bc_status bc_broad_phase_find(bc_broad_phase* broad_phase, const bc_pose* poses, int64_t most,
+                              bc_near* near) {
+  return guarded([&] {
+    if (!broad_phase || !near) return refuse_null(near ? "broad_phase" : "near");
+    if (near->size != sizeof(bc_near)) return fail(BC_BAD_ABI, "near.size is unknown");
+    auto& self = *reinterpret_cast<BroadPhase*>(broad_phase);
+    if (self.count() && !poses) return refuse_null("poses");
+    if (most < 0) return fail(BC_BAD_ARGUMENT, "most must be 0 or more, not %lld", (long long)most);
+    const auto* numbers = reinterpret_cast<const double*>(poses);
+    int64_t refused = self.find(numbers, most);
+    *near = {sizeof(bc_near),       self.pairs().data(),
+             int64_t(self.pairs().size() / 2), self.stale().data(),
+             int64_t(self.stale().size() / 2), refused};
+    if (refused < 0) return BC_OK;
+    char field[32];
+    std::snprintf(field, sizeof field, "pose of box %lld", (long long)refused);
+    return refuse_pose(field, numbers + 7 * refused);
+  });
+}
+
+}  // extern "C"
