@@ -19,7 +19,7 @@
 #include "../src/mlp/shipped_network.hpp"
 #include "arrays.hpp"  // first, as Python.h wants
 #include "bounding_boxes.hpp"
-#include "law.hpp"
+#include "forces.hpp"
 
 namespace {
 
@@ -693,7 +693,7 @@ PyMODINIT_FUNC PyInit__native() {
       add(module.get(), "lanes", PyLong_FromLong(kernel ? kernel->lanes : 0)) &&
       add(module.get(), "compiler", PyUnicode_FromString(__VERSION__)) &&
       add(module.get(), "PairSolver", PyType_FromSpec(&solver_spec)) &&
-      add(module.get(), "Law", PyType_FromSpec(&law_spec));
+      add(module.get(), "PatchForces", PyType_FromSpec(&forces_spec));
   for (const Whole& whole : wholes)
     added = added && add(module.get(), whole.name, PyLong_FromLong(whole.value));
   for (const Constant& constant : constants)

@@ -1,0 +1,442 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""What stands by one contact per pair, beside MuJoCo: towers, walls, piles, pallets, a gripper."""
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+
+import mujoco
+import numpy as np
+
+from box_contact_ros import Body, ContactSolver, PatchForces
+from box_contact_ros.scene.pose import rotation_matrix
+from box_contact_ros.solver.contact import Contacts
+
+GRAVITY = 9.81  # [m/s²]
+CORNERS = 0.5 * np.array(list(product((-1, 1), repeat=3)))
+REST_SPEED = 1e-3  # of the fastest corner of a scene at rest [m/s]
+CONTAINER = (12.192, 2.438, 2.591)
+SEARCHED = 10  # steps from one search of neighbours to the next
+JUDGED = 10  # steps from one judgement to the next
+
+Wrenches = Callable[[float, 'Boxes', np.ndarray, np.ndarray], np.ndarray]
+
+
+@dataclass
+class Boxes:
+    """Boxes of a scene, a row each: full extents, mass (0: fixed, or moved by its velocity)."""
+
+    size: np.ndarray  # (n, 3) [m]
+    mass: np.ndarray  # (n,) [kg]
+    pose: np.ndarray  # (n, 7) of the boxes' centres
+    centre: np.ndarray  # (n, 3) of mass, in the box's own frame [m]
+    velocity: np.ndarray  # (n, 6) of the centre of mass
+
+    @classmethod
+    def of(cls, rows: Sequence[tuple]) -> Boxes:
+        """Return boxes of rows (size, mass, position[, quaternion[, centre]])."""
+        n = len(rows)
+        pose = np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
+        centre = np.zeros((n, 3))
+        for k, (_, _, position, *more) in enumerate(rows):
+            pose[k, :3] = position
+            if more:
+                pose[k, 3:] = more[0]
+            if len(more) > 1:
+                centre[k] = more[1]
+        return cls(np.array([row[0] for row in rows], dtype=float),
+                   np.array([row[1] for row in rows], dtype=float), pose, centre, np.zeros((n, 6)))
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """Return principal moments (n, 3) of boxes of one density."""
+        squares = self.size**2
+        return self.mass[:, None] / 12.0 * (squares.sum(axis=1, keepdims=True) - squares)
+
+
+@dataclass
+class Scene:
+    name: str
+    boxes: Boxes
+    seconds: float = 5.0
+    friction: float = 0.5
+    act: Wrenches | None = None
+    falls: bool = False
+    pallet: bool = False
+
+
+# --- our loop -------------------------------------------------------------------------------------
+
+
+def multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Return products (n, 4) of quaternions x y z w."""
+    pv, qv, pw, qw = p[:, :3], q[:, :3], p[:, 3:], q[:, 3:]
+    return np.hstack([pw * qv + qw * pv + np.cross(pv, qv),
+                      pw * qw - (pv * qv).sum(axis=1, keepdims=True)])
+
+
+def move(boxes: Boxes, h: float) -> None:
+    """Advance the poses by their velocities."""
+    arm = np.einsum('nij,nj->ni', rotation_matrix(boxes.pose[:, 3:]), boxes.centre)
+    place = boxes.pose[:, :3] + arm + h * boxes.velocity[:, :3]
+    spin = boxes.velocity[:, 3:]
+    angle = np.linalg.norm(spin, axis=1, keepdims=True) * h
+    turn = np.hstack([0.5 * h * np.sinc(angle / (2 * np.pi)) * spin, np.cos(angle / 2)])
+    q = multiply(turn, boxes.pose[:, 3:])
+    boxes.pose[:, 3:] = q / np.linalg.norm(q, axis=1, keepdims=True)
+    boxes.pose[:, :3] = place - np.einsum('nij,nj->ni', rotation_matrix(boxes.pose[:, 3:]),
+                                          boxes.centre)
+
+
+def near_pairs(boxes: Boxes, margin: float) -> np.ndarray:
+    """Return the pairs (k, 2) whose bounding boxes come within a margin; one of them moves."""
+    half = 0.5 * np.einsum('nij,nj->ni', np.abs(rotation_matrix(boxes.pose[:, 3:])), boxes.size)
+    low, high = boxes.pose[:, :3] - half - margin, boxes.pose[:, :3] + half
+    near = np.triu((low[:, None] <= high).all(axis=2) & (low <= high[:, None]).all(axis=2), 1)
+    moves = boxes.mass > 0
+    return np.argwhere(near & (moves[:, None] | moves))
+
+
+class Ours:
+    """Contacts by the solver, forces by `PatchForces`."""
+
+    def __init__(self, scene: Scene, step: float, *, rate_hz: float | None = None,
+                 latency: float = 0.0, model: str = 'exact', **options: int) -> None:
+        boxes = self.boxes = scene.boxes
+        self.scene, self.step_size = scene, step
+        self.every = max(1, round(1.0 / (rate_hz * step))) if rate_hz else 1
+        self.late = round(latency / step)
+        self.solver = ContactSolver((1, 1, 1), (1, 1, 1), model=model)
+        self.forces = PatchForces(
+            [Body(mass=m, inertia=i, centre=c)
+             for m, i, c in zip(boxes.mass, boxes.inertia, boxes.centre)],
+            friction=scene.friction, **options)
+        self.tick, self.spent = 0, 0.0
+        self.answers: deque = deque()
+        self.pairs = np.empty((0, 2), dtype=np.int64)
+        self.weight = np.zeros((len(boxes.mass), 6))
+        self.weight[:, 2] = -GRAVITY * boxes.mass
+
+    def step(self) -> None:
+        boxes, h = self.boxes, self.step_size
+        outside = self.weight
+        if self.scene.act:
+            outside = outside + self.scene.act(self.tick * h, boxes, boxes.pose, boxes.velocity)
+        start = time.perf_counter()
+        if self.tick % SEARCHED == 0:
+            fast = np.abs(boxes.velocity[:, :3]).max() + 0.5 * np.linalg.norm(
+                boxes.size, axis=1)[boxes.mass > 0].max() * np.abs(boxes.velocity[:, 3:]).max()
+            self.pairs = near_pairs(boxes, 2 * SEARCHED * h * (2 * fast + 0.1))
+        if self.tick % self.every == 0:
+            contacts = self.solver.batch(boxes.pose, sizes=boxes.size, pairs=self.pairs)
+            self.answers.append((self.tick + self.late, self.pairs, contacts, boxes.pose.copy()))
+        while self.answers and self.answers[0][0] <= self.tick:
+            self.forces.hold(*self.answers.popleft()[1:])
+        boxes.velocity = self.forces.step(h, boxes.pose, boxes.velocity, outside)
+        self.spent += time.perf_counter() - start
+        move(boxes, h)
+        self.tick += 1
+
+
+class Theirs:
+    """The same scene by MuJoCo with contacts of its own."""
+
+    def __init__(self, scene: Scene, step: float) -> None:
+        boxes = self.boxes = scene.boxes
+        self.scene, self.step_size = scene, step
+        spec = mujoco.MjSpec()
+        spec.option.gravity = 0.0, 0.0, -GRAVITY
+        spec.option.timestep = step
+        spec.memory = 2**28
+        self.free = boxes.mass > 0
+        self.moves = self.free | boxes.velocity.any(axis=1)
+        for k in range(len(boxes.mass)):
+            x, y, z, qx, qy, qz, qw = boxes.pose[k]
+            body = spec.worldbody.add_body(pos=(x, y, z), quat=(qw, qx, qy, qz))
+            if self.moves[k]:
+                body.add_freejoint()
+                body.explicitinertial = True
+                body.mass = boxes.mass[k] or 1e3 * boxes.mass.max()
+                body.inertia = boxes.inertia[k] if self.free[k] else np.full(3, body.mass)
+                body.ipos = boxes.centre[k]
+                body.gravcomp = float(not self.free[k])
+            body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=0.5 * boxes.size[k],
+                          friction=(scene.friction, 0.005, 0.0001))
+        self.model = spec.compile()
+        self.data = mujoco.MjData(self.model)
+        self.tick, self.spent = 0, 0.0
+        self.bodies = 1 + np.flatnonzero(self.moves)
+        self._put_velocity(self.moves)
+
+    def _put_velocity(self, rows: np.ndarray) -> None:
+        boxes = self.boxes
+        arm = np.einsum('nij,nj->ni', rotation_matrix(boxes.pose[:, 3:]), boxes.centre)
+        linear = boxes.velocity[:, :3] - np.cross(boxes.velocity[:, 3:], arm)
+        local = np.einsum('nji,nj->ni', rotation_matrix(boxes.pose[:, 3:]), boxes.velocity[:, 3:])
+        both = np.hstack([linear, local])
+        which = rows[self.moves]
+        self.data.qvel.reshape(-1, 6)[which] = both[self.moves][which]
+
+    def step(self) -> None:
+        boxes, h = self.boxes, self.step_size
+        if self.scene.act:
+            push = self.scene.act(self.tick * h, boxes, boxes.pose, boxes.velocity)
+            self.data.xfrc_applied[self.bodies] = np.where(
+                self.free[self.moves, None], push[self.moves], 0.0)
+        driven = self.moves & ~self.free
+        if driven.any():
+            self._put_velocity(driven)
+        start = time.perf_counter()
+        mujoco.mj_step(self.model, self.data)
+        self.spent += time.perf_counter() - start
+        q = self.data.qpos.reshape(-1, 7)
+        boxes.pose[self.moves] = q[:, [0, 1, 2, 4, 5, 6, 3]]
+        v = self.data.qvel.reshape(-1, 6)
+        rotation = rotation_matrix(boxes.pose[self.moves, 3:])
+        spin = np.einsum('nij,nj->ni', rotation, v[:, 3:])
+        arm = np.einsum('nij,nj->ni', rotation, boxes.centre[self.moves])
+        new = np.hstack([v[:, :3] + np.cross(spin, arm), spin])
+        boxes.velocity[self.free] = new[self.free[self.moves]]
+        self.tick += 1
+
+
+# --- judgement ------------------------------------------------------------------------------------
+
+
+class Judge:
+    """What becomes of a run."""
+
+    def __init__(self, boxes: Boxes) -> None:
+        self.solver = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
+        self.start = boxes.pose.copy()
+        self.rest = math.nan  # since when all corners are slow [s]
+        self.fastest, self.deepest, self.end_depth, self.end_speed = 0.0, 0.0, 0.0, 0.0
+
+    def see(self, boxes: Boxes, at: float) -> None:
+        free = boxes.mass > 0
+        arm = np.einsum('nij,nkj->nki', rotation_matrix(boxes.pose[:, 3:]),
+                        CORNERS * boxes.size[:, None] - boxes.centre[:, None])
+        speed = np.linalg.norm(boxes.velocity[:, None, :3]
+                               + np.cross(boxes.velocity[:, None, 3:], arm), axis=2)[free].max()
+        self.end_speed = speed
+        self.fastest = max(self.fastest, speed)
+        if not speed <= REST_SPEED:
+            self.rest = math.nan
+        elif math.isnan(self.rest):
+            self.rest = at
+        pairs = near_pairs(boxes, 0.0)
+        self.end_depth = float(-self.solver.batch(
+            boxes.pose, sizes=boxes.size, pairs=pairs, patch=False).separation.min(
+                initial=0.0)) if len(pairs) else 0.0
+        self.deepest = max(self.deepest, self.end_depth)
+
+    def moved(self, boxes: Boxes) -> tuple[float, float]:
+        """Return how far [m] and by what angle [°] the farthest boxes have gone."""
+        free = boxes.mass > 0
+        way = np.linalg.norm(boxes.pose[free, :3] - self.start[free, :3], axis=1).max()
+        dots = np.abs((boxes.pose[free, 3:] * self.start[free, 3:]).sum(axis=1))
+        return float(way), float(np.degrees(2 * np.arccos(np.clip(dots, 0, 1))).max())
+
+
+def run(make: Callable[[], Scene], way: str, step: float = 0.001, **options) -> dict:
+    scene = make()
+    loop = Theirs(scene, step) if way == 'MuJoCo' else Ours(scene, step, **options)
+    judge = Judge(scene.boxes)
+    steps = round(scene.seconds / step)
+    for tick in range(steps + 1):
+        if tick % JUDGED == 0:
+            judge.see(scene.boxes, tick * step)
+            if not judge.end_speed < 100:
+                break
+        loop.step()
+    way_moved, turned = judge.moved(scene.boxes)
+    return {'rest': judge.rest, 'end': 1e3 * judge.end_speed, 'deepest': 1e3 * judge.deepest,
+            'depth': 1e3 * judge.end_depth, 'fastest': judge.fastest, 'moved': 1e3 * way_moved,
+            'turned': turned, 'us': 1e6 * loop.spent / loop.tick}
+
+
+# --- scenes ---------------------------------------------------------------------------------------
+
+FLOOR = ((60.0, 60.0, 1.0), 0.0, (0.0, 0.0, -0.5))
+
+
+def about(axis: Sequence[float], degrees: float) -> np.ndarray:
+    """Return x y z w (4,) of a turn about an axis (3,)."""
+    half = 0.5 * math.radians(degrees)
+    return np.append(math.sin(half) * np.array(axis) / np.linalg.norm(axis), math.cos(half))
+
+
+def tower(count: int, edge: float = 0.5, jitter: float = 0.0, mass: float = 50.0) -> Scene:
+    rng = np.random.default_rng(3)
+    rows = [FLOOR]
+    for k in range(count):
+        x, y = jitter * edge * rng.uniform(-1, 1, 2)
+        rows.append(((edge,) * 3, mass, (x, y, edge * (k + 0.5) + (1e-4 * (k + 1) if jitter else 0.0)),
+                     about((0, 0, 1), 100 * jitter * rng.uniform(-1, 1))))
+    return Scene(f'tower of {count}' + (', jittered' if jitter else ''), Boxes.of(rows), 8.0)
+
+
+def wall(columns: int = 10, layers: int = 10) -> Scene:
+    size, rows = (0.4, 0.2, 0.2), [FLOOR]
+    for layer in range(layers):
+        for k in range(columns):
+            rows.append((size, 16.0, (size[0] * (k + 0.5 * (layer % 2)), 0.0, size[2] * (layer + 0.5))))
+    return Scene('wall 10 × 10', Boxes.of(rows), 4.0)
+
+
+def pyramid(base: int = 10) -> Scene:
+    edge, rows = 0.5, [FLOOR]
+    for layer in range(base):
+        for k in range(base - layer):
+            rows.append(((edge,) * 3, 50.0, ((k - 0.5 * (base - layer)) * 1.1 * edge, 0.0,
+                                            edge * (layer + 0.5))))
+    return Scene('pyramid of 55', Boxes.of(rows), 5.0)
+
+
+def pile(count: int = 200) -> Scene:
+    rng, rows = np.random.default_rng(5), [FLOOR]
+    for k in range(count):
+        layer, place = divmod(k, 20)
+        size = rng.uniform(0.15, 0.4, 3)
+        q = rng.normal(size=4)
+        rows.append((size, 500 * float(np.prod(size)),
+                     (0.5 * (place % 5) - 1, 0.5 * (place // 5) - 1, 0.6 * layer + 0.5),
+                     q / np.linalg.norm(q)))
+    return Scene('pile of 200', Boxes.of(rows), 8.0)
+
+
+def bars(layers: int = 15) -> Scene:
+    rng, rows = np.random.default_rng(6), [FLOOR]
+    for layer in range(layers):
+        for side in (-1, 1):
+            place = 0.35 * side
+            at = (0.0, place) if layer % 2 else (place, 0.0)
+            size = (1.0, 0.1, 0.1) if layer % 2 else (0.1, 1.0, 0.1)
+            rows.append((size, 6.0, (*(at + 0.01 * rng.uniform(-1, 1, 2)), 0.1 * (layer + 0.5)),
+                         about((0, 0, 1), rng.uniform(-1, 1))))
+    return Scene('30 crossed bars', Boxes.of(rows), 5.0)
+
+
+def mixed() -> Scene:
+    rng, rows, height = np.random.default_rng(7), [FLOOR], 0.0
+    for _ in range(8):
+        size = rng.uniform(0.2, 1.0, 3)
+        rows.append((size, 400 * float(np.prod(size)),
+                     (*(0.02 * rng.uniform(-1, 1, 2)), height + 0.5 * size[2]),
+                     about((0, 0, 1), rng.uniform(-20, 20))))
+        height += size[2]
+    return Scene('mixed sizes, 8', Boxes.of(rows), 5.0)
+
+
+def pallet(layers: int = 10) -> Scene:
+    rows = [FLOOR, ((1.2, 0.8, 0.144), 25.0, (0.6, 0.4, 0.072))]
+    for layer in range(layers):
+        long = layer % 2 == 0
+        size = (0.4, 0.4, 0.2) if long else (0.6, 0.4, 0.2)
+        for i in range(3 if long else 2):
+            for j in range(2):
+                rows.append((size, 8.0, (size[0] * (i + 0.5), size[1] * (j + 0.5),
+                                         0.144 + 0.2 * (layer + 0.5))))
+    return Scene('pallet of ten layers', Boxes.of(rows), 5.0)
+
+
+def containers(gusts: bool) -> Scene:
+    rows = [FLOOR]
+    for k in range(5):
+        rows.append((CONTAINER, 3800.0, (0.0, 0.0, CONTAINER[2] * (k + 0.5))))
+
+    def wind(t: float, boxes: Boxes, *_: np.ndarray) -> np.ndarray:
+        push = np.zeros((6, 6))
+        # 0.2 of the weight, that is half of what tips the stack.
+        push[1:, 1] = 3800 * 9.81 * 0.08 * (math.sin(2 * math.pi * 0.8 * t) if gusts else
+                                           min(1.0, t))
+        return push
+
+    return Scene('five containers in ' + ('gusts' if gusts else 'wind'), Boxes.of(rows), 6.0,
+                 act=wind)
+
+
+def off_centre(share: float) -> Scene:
+    return Scene(f'centre of mass at {share:g}', Boxes.of([
+        FLOOR, ((1.0, 1.0, 1.0), 100.0, (0, 0, 0.5), (0, 0, 0, 1), (share, 0, 0))]), 4.0)
+
+
+def ratio(heavy: float) -> Scene:
+    return Scene(f'heavy on light 1:{heavy:g}', Boxes.of([
+        FLOOR, ((1.0,) * 3, 10.0, (0, 0, 0.5)), ((1.0,) * 3, 10.0 * heavy, (0, 0, 1.5))]), 4.0)
+
+
+def slope(kind: str) -> Scene:
+    degrees = {'plate': 25.0, 'tall': 15.0, 'five': 8.0}[kind]
+    q = about((0, 1, 0), degrees)
+    up = rotation_matrix(q)[:, 2]
+    sizes = {'plate': [(1.0, 1.0, 0.1)], 'tall': [(0.5, 0.5, 1.5)], 'five': [(0.5,) * 3] * 5}[kind]
+    rows, height = [((20.0, 20.0, 1.0), 0.0, -0.5 * up, q)], 0.0
+    for size in sizes:
+        rows.append((size, 50.0, (height + 0.5 * size[2]) * up, q))
+        height += size[2]
+    return Scene(f'slope: {kind} on {degrees:g}°', Boxes.of(rows), 5.0)
+
+
+def gripper(force: float) -> Scene:
+    """Two fingers of 0.5 kg, guided by springs, press a cube of 0.1 kg and carry its weight."""
+    finger = (0.02, 0.04, 0.05)
+    rows = [(finger, 0.5, (-0.035, 0, 0.1)), (finger, 0.5, (0.035, 0, 0.1)),
+            ((0.05,) * 3, 0.1, (0, 0, 0.1))]
+    home = np.array([row[2] for row in rows[:2]])
+
+    def act(t: float, boxes: Boxes, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        push = np.zeros((3, 6))
+        push[:2, 2] = 0.5 * GRAVITY + 0.05 * GRAVITY
+        push[:2, 1:3] += 5e3 * (home - pose[:2, :3])[:, 1:] - 30.0 * velocity[:2, 1:3]
+        push[:2, 3:] -= 8.0 * pose[:2, 3:6] + 0.01 * velocity[:2, 3:]
+        push[0, 0], push[1, 0] = force, -force
+        return push
+
+    return Scene(f'gripper, {force:g} N', Boxes.of(rows), 3.0, act=act)
+
+
+SCENES: list[Callable[[], Scene]] = [
+    lambda: tower(20), lambda: tower(20, jitter=0.03), wall, pyramid, pile, bars, mixed, pallet,
+    lambda: containers(False), lambda: containers(True), lambda: off_centre(0.4),
+    lambda: off_centre(0.45), lambda: ratio(10), lambda: ratio(100), lambda: slope('plate'),
+    lambda: slope('tall'), lambda: slope('five'), lambda: gripper(2), lambda: gripper(5),
+    lambda: gripper(20), lambda: gripper(50)]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument('names', nargs='*')
+    parser.add_argument('--ways', nargs='+', default=['ours', 'MuJoCo'])
+    parser.add_argument('--iterations', type=int, default=50)
+    parser.add_argument('--relaxations', type=int, default=5)
+    parser.add_argument('--rate', type=float, default=None)
+    parser.add_argument('--latency', type=float, default=0.0)
+    parser.add_argument('--step', type=float, default=0.001)
+    options = parser.parse_args()
+    print(f'{"scene":28} {"way":7} {"rest":>6} {"end":>8} {"deepest":>8} {"depth":>8} {"fast":>7} '
+          f'{"moved":>8} {"turned":>7} {"us":>7}')
+    for make in SCENES:
+        name = make().name
+        if options.names and not any(word in name for word in options.names):
+            continue
+        for way in options.ways:
+            more = {} if way == 'MuJoCo' else dict(
+                iterations=options.iterations, relaxations=options.relaxations,
+                rate_hz=options.rate, latency=options.latency)
+            r = run(make, way, options.step, **more)
+            print(f'{name:28} {way:7} {r["rest"]:6.2f} {r["end"]:8.3g} {r["deepest"]:8.3g} '
+                  f'{r["depth"]:8.3g} {r["fastest"]:7.3g} {r["moved"]:8.3g} {r["turned"]:7.2g} '
+                  f'{r["us"]:7.0f}', flush=True)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
