@@ -12,6 +12,9 @@
 #ifndef BOX_CONTACT_FORCE_HPP
 #define BOX_CONTACT_FORCE_HPP
 
+#include <cstdint>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "box_contact.hpp"
@@ -61,7 +64,7 @@ class PatchForces {
   void set_bodies(Span<const Body> bodies) {
     detail::check(bc_patch_forces_set_bodies(forces_.get(), plain_of(bodies), std::int64_t(bodies.size())));
   }
-  void forget(std::int64_t body) { check(bc_patch_forces_forget(forces_.get(), body)); }
+  void forget(std::int64_t body) { detail::check(bc_patch_forces_forget(forces_.get(), body)); }
   void reset() { bc_patch_forces_reset(forces_.get()); }
 
   // Take an answer, asked for at `poses`; pairs that are left out are forgotten.
