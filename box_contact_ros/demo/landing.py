@@ -69,16 +69,16 @@ class LoadLaw(Protocol):
 class LoadForces:
     """`PatchForces` of one load on boxes that are fixed; made by `at_rate`."""
 
-    def __init__(self, load: Body, step: float) -> None:
-        """Begin without contacts; step: of physics [s]."""
-        self._load, self._step = load, step
+    def __init__(self, load: Body, step: float, period: float) -> None:
+        """Begin without contacts; step: of physics [s]; period: from question to question [s]."""
+        self._load, self._step, self._period = load, step, period
         self._places: dict[str, int] = {}  # of the fixed boxes, by the names of their pairs
         self._forces = PatchForces([load], friction=FRICTION)
 
     @classmethod
-    def at_rate(cls, load: Body, *, step: float, **_: float) -> LoadForces:
-        """Return the forces of a load, at any rate and latency."""
-        return cls(load, step)
+    def at_rate(cls, load: Body, *, rate_hz: float, step: float, **_: float) -> LoadForces:
+        """Return the forces of a load whose contacts are asked for `rate_hz` times a second."""
+        return cls(load, step, 1.0 / rate_hz)
 
     def _rows(self, row: np.ndarray, others: Sequence[float]) -> np.ndarray:
         """Return rows of all bodies: that of the load, and `others` for each fixed box."""
@@ -91,8 +91,8 @@ class LoadForces:
         fixed = Body(mass=0.0, inertia=np.zeros(3))
         self._forces.set_bodies([self._load, *[fixed] * len(self._places)])
         self._forces.hold(np.array([(0, self._places[name]) for name in contacts]).reshape(-1, 2),
-                          Contacts(*map(np.array, zip(*contacts.values()))),
-                          self._rows(pose, NO_TURN), age=age)
+                          Contacts.of(contacts.values()),
+                          self._rows(pose, NO_TURN), age=age, period=self._period)
 
     def wrench(self, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return force and torque (6,) at `pose` (7,) and `velocity` (6,), a physics step each."""

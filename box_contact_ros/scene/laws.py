@@ -76,18 +76,20 @@ class PatchForces:
 
     def hold(self, pairs: ArrayLike, contacts: Contacts, poses: ArrayLike, *,
              friction: ArrayLike | None = None, surface_velocity: ArrayLike | None = None,
-             stiffness: ArrayLike | None = None, age: float = 0.0) -> None:
+             stiffness: ArrayLike | None = None, age: float = 0.0,
+             period: float = 0.0) -> None:
         """Take the contacts of pairs of bodies (k, 2), asked for at `poses`; forget other pairs.
 
         A contact whose separation is NaN is stale: the patch of its pair stays.
         friction: μ (k,). surface_velocity: of B's surface relative to A's (k, 3) [m/s], beside that
         of the bodies, as of a belt. stiffness: (k,) [N/m]; 0 is as stiff as step and answers bear.
-        age: how long ago the answer was asked for [s].
+        age: how long ago the answer was asked for [s]. period: from one question to the next [s];
+        0 is the time since the answer before.
         ValueError: a contact without a patch, or a pair that comes twice; nothing changes then.
         """
         self._native.hold(pairs, contacts.separation, contacts.normal, contacts.point,
                           contacts.volume, contacts.covariance, poses, friction, surface_velocity,
-                          stiffness, age)
+                          stiffness, age, period)
 
     def step(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
              wrenches: ArrayLike | None = None) -> np.ndarray:

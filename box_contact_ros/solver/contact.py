@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -70,6 +71,14 @@ class Contacts(NamedTuple):
     """(n, 3, 3) [m²]."""
     axis: np.ndarray
     """(n,) int32."""
+
+    @classmethod
+    def of(cls, contacts: Iterable[Contact]) -> Contacts:
+        """Return the rows of single contacts."""
+        columns = list(zip(*contacts)) or [()] * len(cls._fields)
+        shapes = ((), (), (3,), (3,), (), (3, 3), ())
+        return cls(*(np.array(column).reshape(-1, *shape)
+                     for column, shape in zip(columns, shapes)))
 
     def row(self, number: int) -> Contact:
         """Return the contact of one pair."""

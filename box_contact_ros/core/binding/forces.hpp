@@ -87,11 +87,11 @@ inline bool read_given(PyObject* argument, const char* name, Shape shape, Array<
 }
 
 inline PyObject* forces_hold(PyObject* self, PyObject* const* args, Py_ssize_t count) {
-  if (count != 11)
+  if (count != 12)
     return fail(PyExc_TypeError,
                 "hold(pairs, separation, normal, point, volume, covariance, poses, friction, "
-                "surface, stiffness, age)");
-  double age = PyFloat_AsDouble(args[10]);
+                "surface, stiffness, age, period)");
+  double age = PyFloat_AsDouble(args[10]), period = PyFloat_AsDouble(args[11]);
   if (PyErr_Occurred()) return nullptr;
   Array<int64_t> pairs;
   if (!read(args[0], "pairs", {any_length, 2}, pairs)) return nullptr;
@@ -107,7 +107,8 @@ inline PyObject* forces_hold(PyObject* self, PyObject* const* args, Py_ssize_t c
     return nullptr;
   bc_patches answer{sizeof(bc_patches), int64_t(n),       pairs.numbers,  separation.numbers,
                     normal.numbers,     point.numbers,    volume.numbers, covariance.numbers,
-                    friction.numbers,   surface.numbers,  stiffness.numbers, age};
+                    friction.numbers,   surface.numbers,  stiffness.numbers, age,
+                    period};
   if (bc_status status =
           bc_patch_forces_hold(forces_of(self)->forces, &answer,
                                reinterpret_cast<const bc_pose*>(poses.numbers)))

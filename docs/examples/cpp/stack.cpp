@@ -55,7 +55,7 @@ int main() {
   const Patches answer{sizeof(Patches),  std::int64_t(rows), pairs.data(),
                        separation.data(), normal.data(),     point.data(),
                        volume.data(),     covariance.data(), nullptr,
-                       nullptr,           nullptr,           0.0};
+                       nullptr,           nullptr,           0.0,              0.0};
   PatchForces forces(bodies);
   const auto ask = [&] {
     collide({poses, poses, sizes, sizes, Span<const std::int64_t>(pairs)}, results);

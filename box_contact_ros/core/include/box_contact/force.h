@@ -10,7 +10,7 @@
  *   bc_patch_forces* forces;
  *   bc_patch_forces_create(bodies, 2, NULL, &forces);
  *   bc_patches answer = {sizeof(bc_patches), 1, pairs, separation, normal, point, volume,
- *                       covariance, NULL, NULL, NULL, 0.0};
+ *                       covariance, NULL, NULL, NULL, 0.0, 0.0};
  *   bc_patch_forces_hold(forces, &answer, poses);
  *   bc_patch_forces_step(forces, 0.001, poses, velocities, weights, velocities, NULL);
  *
@@ -61,6 +61,7 @@ typedef struct bc_patches {
                                bodies, as of a belt [m/s]; NULL: none */
   const double* stiffness;  /* [N/m]; 0, or NULL: as stiff as step and answers bear */
   double age;               /* since the answer was asked for [s] */
+  double period;            /* from one question to the next [s]; 0: from the answer before */
 } bc_patches;
 
 typedef struct bc_force_options {

@@ -137,7 +137,7 @@ class PatchForces {
     if (std::adjacent_find(next_.begin(), next_.end(), same) != next_.end()) return false;
     keep_impulses();
     patches_.swap(next_);
-    clock_.period = std::max(0.0, clock_.since);
+    clock_.period = answer.period > 0.0 ? answer.period : std::max(0.0, clock_.since);
     clock_.since = 0.0;
     return true;
   }
@@ -193,7 +193,7 @@ class PatchForces {
  private:
   struct Clock {
     double since = -1.0;  // the last answer [s]; below 0: there was none
-    double period = 0.0;  // between the last two answers [s]
+    double period = 0.0;  // between answers, as told or between the last two [s]
     double step = 0.0;    // the last one [s]
   };
 
@@ -300,12 +300,13 @@ class PatchForces {
     soften(patch, h, depth, turned, pressed, block);
   }
 
-  // Catto's soft step: a spring and a damper, implicit in time. Rocking is soft where answers are
-  // late: the wedge of the overlap, which levels a body, is late then.
+  // Catto's soft step: a spring and a damper, implicit in time. Where answers are late, and for a
+  // stiffness of its own, the spring is one that relaxation leaves alone. Rocking is soft where
+  // answers are late: the wedge of the overlap, which levels a body, is late then.
   void soften(const Patch& patch, double h, double depth, const Vec<double>& turned,
               const Mat<double>& pressed, Block& block) const {
     block.is_apart = depth < 0.0;
-    block.is_spring = patch.stiffness > 0.0;
+    block.is_spring = false;
     block.softness = {0.0, 0.0, 0.0};
     block.bias = {block.is_apart ? -depth / h : 0.0, 0.0, 0.0};
     block.soft_press_mass = block.press_mass;
@@ -314,8 +315,9 @@ class PatchForces {
     double bearable = late_frequency / (patch.late + 0.5 * clock_.period);
     bool is_late = bearable < frequency;
     if (is_late) frequency = bearable;
-    if (block.is_spring) frequency = std::sqrt(patch.stiffness * pressed[0][0]);
-    double damping = is_late || block.is_spring ? slow_damping_ratio : soft_damping_ratio;
+    if (patch.stiffness > 0.0) frequency = std::sqrt(patch.stiffness * pressed[0][0]);
+    block.is_spring = is_late || patch.stiffness > 0.0;
+    double damping = block.is_spring ? slow_damping_ratio : soft_damping_ratio;
     double rate = frequency / (2.0 * damping + h * frequency);
     double softness = rate / (h * frequency * frequency);
     block.bias[0] = -std::min(push_out_limit, rate * depth);

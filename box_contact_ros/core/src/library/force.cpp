@@ -174,8 +174,9 @@ bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches* answer
     bc_patches all{};
     if (!read(answer, all)) return fail(BC_BAD_ABI, "answer.size is unknown");
     if (all.count < 0) return fail(BC_BAD_ARGUMENT, "count is below zero");
-    if (!is_amount(&all.age, 0))
-      return fail(BC_BAD_ARGUMENT, "age must be 0 or more, not %g", all.age);
+    if (!is_amount(&all.age, 0) || !is_amount(&all.period, 0))
+      return fail(BC_BAD_ARGUMENT, "age and period must be 0 or more, not %g and %g", all.age,
+                  all.period);
     if (all.count > 0 && !(all.pairs && all.separation && all.normal && all.point && all.volume &&
                            all.covariance))
       return refuse_null("an array of the answer");
