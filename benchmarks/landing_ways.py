@@ -157,7 +157,7 @@ class Landed(Landing):
 
 
 class HeldLimits(NamedTuple):
-    """What a landing of the grid by held patches must not exceed, from its tenth second on."""
+    """What a landing of the grid by patches must not exceed, from its tenth second on."""
 
     corner_speed: float = 1e-7  # of the fastest corner [m/s]
     creep: float = 1e-8  # mean lateral speed of the centre [m/s]

@@ -77,17 +77,22 @@ struct Moving {
   int changed;                  // the last iteration that changed its velocities
 };
 
+// How pressing and rocking are solved: the impulses change by −mass·(v + bias + softness·impulses).
+struct PressRows {
+  Vec<double> softness, bias;
+  Mat<double> mass;
+};
+
 // A patch in a step. Impulses are components: N, τ1, τ2 and f1, f2, m / r.
 struct Block {
   int32_t a, b;
   Vec<double> arm_a, arm_b, normal, surface;
   Rectangle shape;
   double friction;
-  bool is_apart, is_spring;
-  Vec<double> softness, bias;     // of N, τ1, τ2
-  Mat<double> press_mass, soft_press_mass, rub_mass;  // from velocities to impulses
   double closing;         // how much an impulse N alone changes the closing speed [1/kg]
   double least_rub_mass;  // of any row of friction and torsion
+  PressRows pushing, relaxed;
+  Mat<double> rub_mass;
   Vec<double> press, rub;
 };
 
@@ -154,13 +159,13 @@ class PatchForces {
       warm_start(patches_[k], ratio, blocks_[k]);
       patches_[k].age += h;
     }
-    solve(options_.iterations, true);
+    solve(options_.iterations, &Block::pushing);
     for (size_t k = 0; k < bodies_.size(); ++k) {
       if (wrenches) write_wrench(k, h, velocities[k], outside ? outside + k : nullptr, wrenches[k]);
       if (after) write(moving_[k].linear, moving_[k].angular, after[k].linear, after[k].angular);
       relaxed_[k] = {-moving_[k].linear, -moving_[k].angular};
     }
-    solve(options_.relaxations, false);
+    solve(options_.relaxations, &Block::relaxed);
     for (size_t k = 0; k < bodies_.size(); ++k)
       relaxed_[k] = {relaxed_[k].linear + moving_[k].linear,
                      relaxed_[k].angular + moving_[k].angular};
@@ -293,44 +298,45 @@ class PatchForces {
     block.least_rub_mass = 1.0 / std::max(std::max(rubbed[0][0], rubbed[1][1]), rubbed[2][2]);
     Mat<double> pressed = compliance(body_a, body_b, block, {patch.normal, zero, zero},
                                      {zero, shape.axis_1, shape.axis_2});
-    block.press_mass = inverse(pressed);
     block.closing = pressed[0][0];
     double depth = patch.depth + dot(way_a - way_b, patch.normal);
     Vec<double> turned = turn(patch.asked_b, b) - turn(patch.asked_a, a);
     soften(patch, h, depth, turned, pressed, block);
   }
 
-  // Catto's soft step: a spring and a damper, implicit in time. Where answers are late, and for a
-  // stiffness of its own, the spring is one that relaxation leaves alone. Rocking is soft where
-  // answers are late: the wedge of the overlap, which levels a body, is late then.
+  // Catto's soft step: a spring and a damper, implicit in time. Relaxation is without them, but for a
+  // stiffness of the patch's own. Rocking is soft where answers are late: the wedge of the overlap,
+  // which levels a body, is late then.
   void soften(const Patch& patch, double h, double depth, const Vec<double>& turned,
               const Mat<double>& pressed, Block& block) const {
-    block.is_apart = depth < 0.0;
-    block.is_spring = false;
-    block.softness = {0.0, 0.0, 0.0};
-    block.bias = {block.is_apart ? -depth / h : 0.0, 0.0, 0.0};
-    block.soft_press_mass = block.press_mass;
-    if (block.is_apart || patch.age > overdue_periods * std::max(clock_.period, h)) return;
+    bool is_apart = depth < 0.0;
+    block.relaxed = {{0.0, 0.0, 0.0}, {is_apart ? -depth / h : 0.0, 0.0, 0.0}, inverse(pressed)};
+    block.pushing = block.relaxed;
+    if (is_apart || patch.age > overdue_periods * std::max(clock_.period, h)) return;
     double frequency = soft_frequency / h;
     double bearable = late_frequency / (patch.late + 0.5 * clock_.period);
-    bool is_late = bearable < frequency;
+    bool is_late = bearable < frequency, is_spring = patch.stiffness > 0.0;
     if (is_late) frequency = bearable;
-    if (patch.stiffness > 0.0) frequency = std::sqrt(patch.stiffness * pressed[0][0]);
-    block.is_spring = is_late || patch.stiffness > 0.0;
-    double damping = block.is_spring ? slow_damping_ratio : soft_damping_ratio;
+    if (is_spring) frequency = std::sqrt(patch.stiffness * pressed[0][0]);
+    double damping = is_late || is_spring ? slow_damping_ratio : soft_damping_ratio;
     double rate = frequency / (2.0 * damping + h * frequency);
     double softness = rate / (h * frequency * frequency);
-    block.bias[0] = -std::min(push_out_limit, rate * depth);
-    block.softness[0] = softness * pressed[0][0];
+    PressRows& rows = block.pushing;
     if (is_late) {
-      block.bias[1] = rate * dot(turned, block.shape.axis_1);
-      block.bias[2] = rate * dot(turned, block.shape.axis_2);
-      block.softness[1] = softness * pressed[1][1];
-      block.softness[2] = softness * pressed[2][2];
+      rows.softness = softness * Vec<double>{0.0, pressed[1][1], pressed[2][2]};
+      rows.bias = rate * Vec<double>{0.0, dot(turned, block.shape.axis_1),
+                                     dot(turned, block.shape.axis_2)};
+      rows.mass = softened(pressed, rows.softness);
+      block.relaxed = rows;
     }
-    Mat<double> softened = pressed;
-    for (int i = 0; i < 3; ++i) softened[i][i] += block.softness[i];
-    block.soft_press_mass = inverse(softened);
+    rows.softness[0] = softness * pressed[0][0];
+    rows.bias[0] = -std::min(push_out_limit, rate * depth);
+    rows.mass = softened(pressed, rows.softness);
+    if (is_spring) block.relaxed = rows;
+  }
+  static Mat<double> softened(Mat<double> pressed, const Vec<double>& softness) {
+    for (int i = 0; i < 3; ++i) pressed[i][i] += softness[i];
+    return inverse(pressed);
   }
 
   // Give the impulses of the last step again, as they are about the point of this one.
@@ -360,7 +366,7 @@ class PatchForces {
 
   // Solve the blocks in turn, so many times. A block whose bodies have not changed since its last turn
   // is left out.
-  void solve(int iterations, bool is_soft) {
+  void solve(int iterations, PressRows Block::*rows) {
     for (Moving& moving : moving_) moving.changed = 0;
     bool is_solved = false;
     for (int iteration = 1; iteration <= iterations && !is_solved; ++iteration) {
@@ -368,7 +374,7 @@ class PatchForces {
       for (Block& block : blocks_) {
         Moving &a = moving_[size_t(block.a)], &b = moving_[size_t(block.b)];
         if (std::max(a.changed, b.changed) < iteration - 1) continue;
-        if (std::max(rub(block), press(block, is_soft)) <= least_change) continue;
+        if (std::max(rub(block), press(block, block.*rows)) <= least_change) continue;
         is_solved = false;
         if (a.inverse_mass > 0.0) a.changed = iteration;
         if (b.inverse_mass > 0.0) b.changed = iteration;
@@ -396,23 +402,20 @@ class PatchForces {
   }
 
   // Solve pressing and rocking. Returns by how much the closing speed changed.
-  double press(Block& block, bool is_pushing) {
-    bool is_soft = is_pushing || block.is_spring;
-    Vec<double> zero{0.0, 0.0, 0.0}, before = block.press;
-    Vec<double> bias = is_soft || block.is_apart ? block.bias : zero;
-    Vec<double> softness = is_soft ? block.softness : zero;
-    const Mat<double>& mass = is_soft ? block.soft_press_mass : block.press_mass;
+  double press(Block& block, const PressRows& rows) {
+    Vec<double> before = block.press;
+    const Mat<double>& mass = rows.mass;
     auto error = [&] {
       Vec<double> turns = turning(block);
       return Vec<double>{dot(speed(block), block.normal), dot(turns, block.shape.axis_1),
                          dot(turns, block.shape.axis_2)} +
-             bias + softness * block.press;
+             rows.bias + rows.softness * block.press;
     };
     Vec<double> v = error(), next = block.press - mass * v;
     double limit_1 = next[0] * block.shape.half_2, limit_2 = next[0] * block.shape.half_1;
     if (!(std::fabs(next[1]) <= limit_1 && std::fabs(next[2]) <= limit_2)) {
       // The pressure would be negative at the rim: row by row, within the limits.
-      double alone = 1.0 / (block.closing + softness[0]);
+      double alone = 1.0 / (block.closing + rows.softness[0]);
       next = {std::max(0.0, block.press[0] - alone * v[0]), block.press[1], block.press[2]};
       give_press(block, next - block.press);
       block.press = next;
