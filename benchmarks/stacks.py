@@ -1,29 +1,50 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What stands by one contact per pair, beside MuJoCo: towers, walls, piles, pallets, a gripper."""
+"""What stands by one contact per pair, beside MuJoCo: towers, walls, piles, pallets, a gripper.
+
+`python -m benchmarks.stacks` runs every scene by `PatchForces`, at several steps, rates and
+latencies, and by MuJoCo with contacts of its own. Both begin with the same boxes, and get the same
+outside forces. The program prints and writes stacks.md and stacks.csv. The exit status is 1 if a
+scene of ours does not come to rest with answers at each step of 1 ms.
+
+Lengths in m, masses in kg, times in s.
+"""
 from __future__ import annotations
 
-import argparse
+import csv
+import logging
 import math
 import sys
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass
+from functools import partial
 from itertools import product
+from pathlib import Path
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from box_contact_ros import Body, ContactSolver, PatchForces
+from box_contact_ros.core import native
+from box_contact_ros.scene.laws import GRAVITY
 from box_contact_ros.scene.pose import rotation_matrix
-from box_contact_ros.solver.contact import Contacts
 
-GRAVITY = 9.81  # [m/s²]
+from . import output
+from .arguments import report_parser
+from .pose_sets import CONTAINER
+
+# MuJoCo would write warnings to a file MUJOCO_LOG.TXT in the working directory.
+mujoco.set_mju_user_warning(logging.getLogger(__name__).warning)
+
+STEP = 0.001  # of MuJoCo's physics
+PALLETS = Path(__file__).with_name('pallets.csv')
+LOST_SPEED = 100.0  # a run with a faster corner is over [m/s]
 CORNERS = 0.5 * np.array(list(product((-1, 1), repeat=3)))
 REST_SPEED = 1e-3  # of the fastest corner of a scene at rest [m/s]
-CONTAINER = (12.192, 2.438, 2.591)
 SEARCHED = 10  # steps from one search of neighbours to the next
 JUDGED = 10  # steps from one judgement to the next
 
@@ -64,13 +85,13 @@ class Boxes:
 
 @dataclass
 class Scene:
+    """Boxes, and the wrenches (n, 6) that act on them beside weight and contacts."""
+
     name: str
     boxes: Boxes
     seconds: float = 5.0
     friction: float = 0.5
     act: Wrenches | None = None
-    falls: bool = False
-    pallet: bool = False
 
 
 # --- our loop -------------------------------------------------------------------------------------
@@ -108,17 +129,17 @@ def near_pairs(boxes: Boxes, margin: float) -> np.ndarray:
 class Ours:
     """Contacts by the solver, forces by `PatchForces`."""
 
-    def __init__(self, scene: Scene, step: float, *, rate_hz: float | None = None,
-                 latency: float = 0.0, model: str = 'exact', **options: int) -> None:
+    def __init__(self, scene: Scene, timing: Timing) -> None:
+        """Make solver and forces."""
         boxes = self.boxes = scene.boxes
-        self.scene, self.step_size = scene, step
-        self.every = max(1, round(1.0 / (rate_hz * step))) if rate_hz else 1
-        self.late = round(latency / step)
-        self.solver = ContactSolver((1, 1, 1), (1, 1, 1), model=model)
+        self.scene, self.step_size, self.latency = scene, timing.step, timing.latency
+        self.every = max(1, round(1.0 / (timing.rate_hz * timing.step)))
+        self.late = round(timing.latency / timing.step)
+        self.solver = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
         self.forces = PatchForces(
             [Body(mass=m, inertia=i, centre=c)
              for m, i, c in zip(boxes.mass, boxes.inertia, boxes.centre)],
-            friction=scene.friction, **options)
+            friction=scene.friction)
         self.tick, self.spent = 0, 0.0
         self.answers: deque = deque()
         self.pairs = np.empty((0, 2), dtype=np.int64)
@@ -139,7 +160,7 @@ class Ours:
             contacts = self.solver.batch(boxes.pose, sizes=boxes.size, pairs=self.pairs)
             self.answers.append((self.tick + self.late, self.pairs, contacts, boxes.pose.copy()))
         while self.answers and self.answers[0][0] <= self.tick:
-            self.forces.hold(*self.answers.popleft()[1:])
+            self.forces.hold(*self.answers.popleft()[1:], age=self.latency)
         boxes.velocity = self.forces.step(h, boxes.pose, boxes.velocity, outside)
         self.spent += time.perf_counter() - start
         move(boxes, h)
@@ -246,21 +267,33 @@ class Judge:
         return float(way), float(np.degrees(2 * np.arccos(np.clip(dots, 0, 1))).max())
 
 
-def run(make: Callable[[], Scene], way: str, step: float = 0.001, **options) -> dict:
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a scene; lengths in mm, angles in degrees."""
+
+    rest: float  # since when all corners are slower than `REST_SPEED` [s]; NaN: never
+    end_speed: float  # of the fastest corner at the end [m/s]
+    deepest: float  # ever
+    depth: float  # at the end
+    moved: float  # the farthest box
+    turned: float
+    cost: float  # of contacts and forces, a step [µs]
+
+
+def run(make: Callable[[], Scene], timing: Timing | None) -> Outcome:
+    """Run a scene by ours at a timing, or by MuJoCo with a step of 1 ms."""
     scene = make()
-    loop = Theirs(scene, step) if way == 'MuJoCo' else Ours(scene, step, **options)
-    judge = Judge(scene.boxes)
-    steps = round(scene.seconds / step)
+    loop = Ours(scene, timing) if timing else Theirs(scene, STEP)
+    judge, steps = Judge(scene.boxes), round(scene.seconds / loop.step_size)
     for tick in range(steps + 1):
         if tick % JUDGED == 0:
-            judge.see(scene.boxes, tick * step)
-            if not judge.end_speed < 100:
+            judge.see(scene.boxes, tick * loop.step_size)
+            if not judge.end_speed < LOST_SPEED:
                 break
         loop.step()
-    way_moved, turned = judge.moved(scene.boxes)
-    return {'rest': judge.rest, 'end': 1e3 * judge.end_speed, 'deepest': 1e3 * judge.deepest,
-            'depth': 1e3 * judge.end_depth, 'fastest': judge.fastest, 'moved': 1e3 * way_moved,
-            'turned': turned, 'us': 1e6 * loop.spent / loop.tick}
+    moved, turned = judge.moved(scene.boxes)
+    return Outcome(judge.rest, judge.end_speed, 1e3 * judge.deepest, 1e3 * judge.end_depth,
+                   1e3 * moved, turned, 1e6 * loop.spent / max(1, loop.tick))
 
 
 # --- scenes ---------------------------------------------------------------------------------------
@@ -355,8 +388,8 @@ def containers(gusts: bool) -> Scene:
 
     def wind(t: float, boxes: Boxes, *_: np.ndarray) -> np.ndarray:
         push = np.zeros((6, 6))
-        # 0.2 of the weight, that is half of what tips the stack.
-        push[1:, 1] = 3800 * 9.81 * 0.08 * (math.sin(2 * math.pi * 0.8 * t) if gusts else
+        # 0.08 of the weight: 0.85 of what tips the stack, whose width is 0.19 of its height.
+        push[1:, 1] = 3800 * GRAVITY * 0.08 * (math.sin(2 * math.pi * 0.8 * t) if gusts else
                                            min(1.0, t))
         return push
 
@@ -404,38 +437,117 @@ def gripper(force: float) -> Scene:
     return Scene(f'gripper, {force:g} N', Boxes.of(rows), 3.0, act=act)
 
 
-SCENES: list[Callable[[], Scene]] = [
-    lambda: tower(20), lambda: tower(20, jitter=0.03), wall, pyramid, pile, bars, mixed, pallet,
-    lambda: containers(False), lambda: containers(True), lambda: off_centre(0.4),
-    lambda: off_centre(0.45), lambda: ratio(10), lambda: ratio(100), lambda: slope('plate'),
-    lambda: slope('tall'), lambda: slope('five'), lambda: gripper(2), lambda: gripper(5),
-    lambda: gripper(20), lambda: gripper(50)]
+def supported(boxes: Boxes, margin: float = 0.1) -> list[int]:
+    """Return the boxes of a packing plan that stand on boxes that stand; box 0 is the floor.
 
-
-def main() -> None:
-    parser = argparse.ArgumentParser()
-    parser.add_argument('names', nargs='*')
-    parser.add_argument('--ways', nargs='+', default=['ours', 'MuJoCo'])
-    parser.add_argument('--iterations', type=int, default=50)
-    parser.add_argument('--relaxations', type=int, default=5)
-    parser.add_argument('--rate', type=float, default=None)
-    parser.add_argument('--latency', type=float, default=0.0)
-    parser.add_argument('--step', type=float, default=0.001)
-    options = parser.parse_args()
-    print(f'{"scene":28} {"way":7} {"rest":>6} {"end":>8} {"deepest":>8} {"depth":>8} {"fast":>7} '
-          f'{"moved":>8} {"turned":>7} {"us":>7}')
-    for make in SCENES:
-        name = make().name
-        if options.names and not any(word in name for word in options.names):
+    A box stands if its middle is inside the hull of its supports, by a margin relative to its
+    shorter edge.
+    """
+    low, high = boxes.pose[:, :3] - 0.5 * boxes.size, boxes.pose[:, :3] + 0.5 * boxes.size
+    standing = [0]
+    for k in np.argsort(low[:, 2], kind='stable'):
+        if k == 0:
             continue
-        for way in options.ways:
-            more = {} if way == 'MuJoCo' else dict(
-                iterations=options.iterations, relaxations=options.relaxations,
-                rate_hz=options.rate, latency=options.latency)
-            r = run(make, way, options.step, **more)
-            print(f'{name:28} {way:7} {r["rest"]:6.2f} {r["end"]:8.3g} {r["deepest"]:8.3g} '
-                  f'{r["depth"]:8.3g} {r["fastest"]:7.3g} {r["moved"]:8.3g} {r["turned"]:7.2g} '
-                  f'{r["us"]:7.0f}', flush=True)
+        corners = []
+        for j in standing:
+            start, end = np.maximum(low[j, :2], low[k, :2]), np.minimum(high[j, :2], high[k, :2])
+            if abs(high[j, 2] - low[k, 2]) < 1e-6 and (end > start).all():
+                corners += list(product(*zip(start, end)))
+        angles = np.radians(np.arange(0.0, 360.0, 1.0))
+        ways = np.stack([np.cos(angles), np.sin(angles)])
+        if corners and ((np.array(corners) - boxes.pose[k, :2]) @ ways).max(axis=0).min() > (
+                margin * boxes.size[k, :2].min()):
+            standing.append(int(k))
+    return standing
+
+
+def real_pallet(order: str) -> Scene:
+    """Return the boxes of a real order that stand, as its packing plan places them."""
+    with PALLETS.open(encoding='utf-8') as file:
+        plan = [row for row in csv.reader(line for line in file if line[0] != '#')
+                if row[0] == order]
+    place, size, mass = np.split(np.array([row[1:] for row in plan], dtype=float), [3, 6], axis=1)
+    rows = [FLOOR] + [(e, m, c) for e, m, c in zip(1e-3 * size, mass[:, 0],
+                                                    1e-3 * (place + 0.5 * size))]
+    boxes = Boxes.of(rows)
+    kept = supported(boxes)
+    return Scene(f'order {order}, {len(kept) - 1} of {len(rows) - 1} boxes',
+                 Boxes.of([rows[k] for k in kept]), 5.0)
+
+
+ORDERS = ('00100408', '00100001', '00100002', '00100003', '00100004')
+SCENES: tuple[Callable[[], Scene], ...] = (
+    partial(tower, 20), partial(tower, 20, jitter=0.03), wall, pyramid, pile, bars, mixed, pallet,
+    partial(containers, False), partial(containers, True), partial(off_centre, 0.4),
+    partial(off_centre, 0.45), partial(ratio, 10.0), partial(ratio, 100.0),
+    partial(slope, 'plate'), partial(slope, 'tall'), partial(slope, 'five'),
+    *(partial(gripper, force) for force in (2.0, 5.0, 20.0, 50.0)),
+    *(partial(real_pallet, order) for order in ORDERS))
+QUICK = 5  # `--quick` runs every so-many-th scene
+
+
+class Timing(NamedTuple):
+    """The loop of a client: step of physics [s], rate of questions, and latency [s]."""
+
+    step: float
+    rate_hz: float
+    latency: float
+
+    def __str__(self) -> str:
+        return (f'{1e3 * self.step:g} ms, ' + ('each step' if self.rate_hz * self.step == 1.0 else
+                                               f'{self.rate_hz:g} Hz')
+                + (f', {1e3 * self.latency:g} ms late' if self.latency else ''))
+
+
+TIMINGS = (Timing(0.001, 1000.0, 0.0), Timing(0.004, 250.0, 0.0), Timing(0.001, 200.0, 0.0),
+           Timing(0.001, 200.0, 0.002), Timing(0.001, 50.0, 0.005))
+MUJOCO = 'MuJoCo, 1 ms'
+
+# --- the report -----------------------------------------------------------------------------------
+
+
+def verdict(outcome: Outcome) -> str:
+    """Return when a scene came to rest [s], or how fast its fastest corner is at the end."""
+    return (f'{outcome.rest:.2f}' if not math.isnan(outcome.rest) else
+            f'**{1e3 * outcome.end_speed:.2g} mm/s**')
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run all scenes, print and write; 1 if one of ours does not stand with answers at each step."""
+    parser = report_parser('stacks', __doc__, out='stacks.md and stacks.csv',
+                           quick=f'every {QUICK}th scene')
+    parser.add_argument('--scenes', nargs='+', metavar='WORD', default=[''],
+                        help='run the scenes whose names contain one of these words')
+    options = parser.parse_args(args)
+    folder = output.results_folder(parser, options)
+    scenes = {scene().name: scene for scene in SCENES[::QUICK if options.quick else 1]}
+    scenes = {name: scene for name, scene in scenes.items()
+              if any(word in name for word in options.scenes)}
+    found: dict[str, dict[str, Outcome]] = {}
+    for name, make in scenes.items():
+        found[name] = {str(timing): run(make, timing) for timing in TIMINGS}
+        found[name][MUJOCO] = run(make, None)
+        print(name, {way: verdict(each) for way, each in found[name].items()}, flush=True)
+    ours = str(TIMINGS[0])
+    rest = output.markdown_table(
+        ['scene', *map(str, TIMINGS), MUJOCO],
+        [[name, *map(verdict, ways.values())] for name, ways in found.items()])
+    both = output.markdown_table(
+        ['scene', 'deepest [mm]', 'MuJoCo', 'moved [mm]', 'MuJoCo', 'µs per step', 'MuJoCo'],
+        [[name, *(f'{value:.3g}' for field in ('deepest', 'moved', 'cost')
+                  for way in (ours, MUJOCO) for value in [getattr(ways[way], field)])]
+         for name, ways in found.items()])
+    about = output.machine(native, ('numpy', 'mujoco'))
+    output.write_csv(folder / 'stacks.csv', (
+        {'scene': name, 'way': way, **asdict(each)}
+        for name, ways in found.items() for way, each in ways.items()), digits=3, about=about)
+    (folder / 'stacks.md').write_text(output.page(
+        'benchmarks/pages/stacks', command=output.command_line('benchmarks.stacks', args),
+        machine=about, rest=rest, both=both), encoding='utf-8')
+    missed = [name for name, ways in found.items() if math.isnan(ways[ours].rest)]
+    for name in missed:
+        print(f'stacks: {name} does not come to rest', file=sys.stderr)
+    return int(bool(missed))
 
 
 if __name__ == '__main__':
