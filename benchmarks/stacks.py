@@ -147,6 +147,7 @@ class Ours:
         self.weight[:, 2] = -GRAVITY * boxes.mass
 
     def step(self) -> None:
+        """Advance all boxes by a step."""
         boxes, h = self.boxes, self.step_size
         outside = self.weight
         if self.scene.act:
@@ -207,6 +208,7 @@ class Theirs:
         self.data.qvel.reshape(-1, 6)[which] = both[self.moves][which]
 
     def step(self) -> None:
+        """Advance all boxes by a step."""
         boxes, h = self.boxes, self.step_size
         if self.scene.act:
             push = self.scene.act(self.tick * h, boxes, boxes.pose, boxes.velocity)
@@ -242,6 +244,7 @@ class Judge:
         self.fastest, self.deepest, self.end_depth, self.end_speed = 0.0, 0.0, 0.0, 0.0
 
     def see(self, boxes: Boxes, at: float) -> None:
+        """Judge the boxes at a time [s]."""
         free = boxes.mass > 0
         arm = np.einsum('nij,nkj->nki', rotation_matrix(boxes.pose[:, 3:]),
                         CORNERS * boxes.size[:, None] - boxes.centre[:, None])
@@ -308,24 +311,29 @@ def about(axis: Sequence[float], degrees: float) -> np.ndarray:
 
 
 def tower(count: int, edge: float = 0.5, jitter: float = 0.0, mass: float = 50.0) -> Scene:
+    """Return cubes on each other, shifted by a share of the edge and turned about the vertical."""
     rng = np.random.default_rng(3)
     rows = [FLOOR]
     for k in range(count):
         x, y = jitter * edge * rng.uniform(-1, 1, 2)
-        rows.append(((edge,) * 3, mass, (x, y, edge * (k + 0.5) + (1e-4 * (k + 1) if jitter else 0.0)),
+        gap = 1e-4 * (k + 1) if jitter else 0.0
+        rows.append(((edge,) * 3, mass, (x, y, edge * (k + 0.5) + gap),
                      about((0, 0, 1), 100 * jitter * rng.uniform(-1, 1))))
     return Scene(f'tower of {count}' + (', jittered' if jitter else ''), Boxes.of(rows), 8.0)
 
 
 def wall(columns: int = 10, layers: int = 10) -> Scene:
+    """Return a wall of bricks in running bond."""
     size, rows = (0.4, 0.2, 0.2), [FLOOR]
     for layer in range(layers):
         for k in range(columns):
-            rows.append((size, 16.0, (size[0] * (k + 0.5 * (layer % 2)), 0.0, size[2] * (layer + 0.5))))
+            rows.append((size, 16.0, (size[0] * (k + 0.5 * (layer % 2)), 0.0,
+                                      size[2] * (layer + 0.5))))
     return Scene('wall 10 × 10', Boxes.of(rows), 4.0)
 
 
 def pyramid(base: int = 10) -> Scene:
+    """Return cubes in rows, each on two of the row below."""
     edge, rows = 0.5, [FLOOR]
     for layer in range(base):
         for k in range(base - layer):
@@ -335,6 +343,7 @@ def pyramid(base: int = 10) -> Scene:
 
 
 def pile(count: int = 200) -> Scene:
+    """Return boxes of random sizes and turns, dropped in layers."""
     rng, rows = np.random.default_rng(5), [FLOOR]
     for k in range(count):
         layer, place = divmod(k, 20)
@@ -347,6 +356,7 @@ def pile(count: int = 200) -> Scene:
 
 
 def bars(layers: int = 15) -> Scene:
+    """Return pairs of bars, each layer across the one below."""
     rng, rows = np.random.default_rng(6), [FLOOR]
     for layer in range(layers):
         for side in (-1, 1):
@@ -359,6 +369,7 @@ def bars(layers: int = 15) -> Scene:
 
 
 def mixed() -> Scene:
+    """Return boxes of random sizes on each other."""
     rng, rows, height = np.random.default_rng(7), [FLOOR], 0.0
     for _ in range(8):
         size = rng.uniform(0.2, 1.0, 3)
@@ -370,6 +381,7 @@ def mixed() -> Scene:
 
 
 def pallet(layers: int = 10) -> Scene:
+    """Return cartons on a pallet, each layer turned."""
     rows = [FLOOR, ((1.2, 0.8, 0.144), 25.0, (0.6, 0.4, 0.072))]
     for layer in range(layers):
         long = layer % 2 == 0
@@ -382,6 +394,7 @@ def pallet(layers: int = 10) -> Scene:
 
 
 def containers(gusts: bool) -> Scene:
+    """Return five empty containers in a wind from the side, steady or in gusts of 0.8 Hz."""
     rows = [FLOOR]
     for k in range(5):
         rows.append((CONTAINER, 3800.0, (0.0, 0.0, CONTAINER[2] * (k + 0.5))))
@@ -398,16 +411,19 @@ def containers(gusts: bool) -> Scene:
 
 
 def off_centre(share: float) -> Scene:
+    """Return a cube whose centre of mass is off the middle by a share of the edge."""
     return Scene(f'centre of mass at {share:g}', Boxes.of([
         FLOOR, ((1.0, 1.0, 1.0), 100.0, (0, 0, 0.5), (0, 0, 0, 1), (share, 0, 0))]), 4.0)
 
 
 def ratio(heavy: float) -> Scene:
+    """Return a heavy cube on a light one."""
     return Scene(f'heavy on light 1:{heavy:g}', Boxes.of([
         FLOOR, ((1.0,) * 3, 10.0, (0, 0, 0.5)), ((1.0,) * 3, 10.0 * heavy, (0, 0, 1.5))]), 4.0)
 
 
 def slope(kind: str) -> Scene:
+    """Return boxes on a slope below the angle of friction and of tipping."""
     degrees = {'plate': 25.0, 'tall': 15.0, 'five': 8.0}[kind]
     q = about((0, 1, 0), degrees)
     up = rotation_matrix(q)[:, 2]
@@ -513,7 +529,7 @@ def verdict(outcome: Outcome) -> str:
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run all scenes, print and write; 1 if one of ours does not stand with answers at each step."""
+    """Run all scenes, print and write; 1 if one of ours moves with answers at each step."""
     parser = report_parser('stacks', __doc__, out='stacks.md and stacks.csv',
                            quick=f'every {QUICK}th scene')
     parser.add_argument('--scenes', nargs='+', metavar='WORD', default=[''],
