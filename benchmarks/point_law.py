@@ -104,7 +104,7 @@ class PointLaw:
                    damping=min(damping, DAMPING_LIMIT * corner * rate_hz),
                    torsion_radius=((length**2 + width**2) / 12.0)**0.5, rocking=(roll, pitch))
 
-    def hold(self, contacts: Mapping[str, Contact], pose: np.ndarray, *, age: float) -> None:
+    def hold(self, contacts: Mapping[str, Contact], pose: np.ndarray, *, age: float = 0.0) -> None:
         """Take the contacts of an answer."""
         self._answer = contacts
 
