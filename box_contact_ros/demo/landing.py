@@ -80,7 +80,7 @@ class LoadForces:
         """Return the forces of a load whose contacts are asked for `rate_hz` times a second."""
         return cls(load, step, 1.0 / rate_hz)
 
-    def _rows(self, row: np.ndarray, others: Sequence[float]) -> np.ndarray:
+    def _rows(self, row: np.ndarray, others: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return rows of all bodies: that of the load, and `others` for each fixed box."""
         return np.array([row, *[others] * len(self._places)])
 
