@@ -84,6 +84,7 @@ reports:
 	run benchmarks.fuzz $(ARGS)
 	run benchmarks.landing $(ARGS)
 	run benchmarks.rest $(ARGS)
+	run benchmarks.stacks $(ARGS)
 	run benchmarks.frontier $(ARGS)
 	run benchmarks.native $(ARGS)
 	run benchmarks.scenes $(ARGS)

@@ -6,7 +6,7 @@
 It runs a grid of 36 landings by every way (some by a sample), rate and latency. It also lands other
 loads and stacks, with an outcome that is stated beforehand (`landing_ways`). It writes landing.csv
 (a row per landing), landing.md (tables) and landing.png (one landing, four ways). The exit status
-is 1 if held patches of `exact` or `mlp` do not do all that is expected.
+is 1 if patches of `exact` or `mlp` do not do all that is expected.
 """
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Outcome(NamedTuple):
 
     @property
     def as_expected(self) -> bool:
-        """Return whether the load did what it was expected to do; held patches have own limits."""
+        """Return whether the load did what it was expected to do; patches have own limits."""
         held = self.way in GATED and self.planned.of_grid
         return self.planned.as_expected(self.result) and (
             not held or HeldLimits.at(self.timing.rate_hz).are_met(self.result))
@@ -129,7 +129,7 @@ def worst(results: Sequence[Landed], name: str, factor: float) -> str:
 def grid_table(outcomes: Sequence[Outcome]) -> str:
     """Return a row per way, rate and latency: how many rest, and the worst of each figure.
 
-    Of held patches, figures that are worse than those of MuJoCo's manifold are bold.
+    Of patches, figures that are worse than those of MuJoCo's manifold are bold.
     """
     of_grid = [outcome for outcome in outcomes if outcome.planned.of_grid]
     manifold = [outcome.result for outcome in of_grid if outcome.way == 'manifold']
@@ -189,7 +189,7 @@ def page(outcomes: Sequence[Outcome], command: str) -> str:
 
 # --- picture --------------------------------------------------------------------------------------
 
-SHOWN_WAYS = {'exact': 'held patch', 'point': 'point law', 'mujoco-deepest': 'deepest point',
+SHOWN_WAYS = {'exact': 'patch', 'point': 'point law', 'mujoco-deepest': 'deepest point',
               'manifold': "MuJoCo's manifold"}
 SHOWN_TIMING = LoopTiming(200.0, 0.002)
 EXAGGERATION = 15.0  # of the tilt: a third of a degree would not be seen

@@ -3,7 +3,7 @@
 
 """Which landings are run, what is measured of each, and by which ways of contact and force.
 
-A `Way` is a law and what gives its contacts. Held patches ask this package's models. Engines give a
+A `Way` is a law and what gives its contacts. Patches ask this package's models. Engines give a
 point, so theirs go to the point law, which knows the load's footprint. MuJoCo's own manifold is the
 reference to reach: forces of several points, implicit, within the simulator, at every physics step.
 
@@ -29,9 +29,9 @@ from box_contact_ros.demo.landing import (
     ClosedLoop,
     Landing,
     LandingRecord,
+    LoadForces,
     MakeLaw,
 )
-from box_contact_ros.scene.laws import HeldPatch
 from box_contact_ros.scene.scene_solver import CONTAINER
 from box_contact_ros.solver.contact import Contact
 from box_contact_ros.solver.contact_solver import ContactSolver
@@ -51,7 +51,7 @@ def solvers(scenario: CraneScenario, model: str) -> list[ContactSolver]:
 
 
 def land(scenario: CraneScenario, sources: Sequence[ContactSource], *, rate_hz: float = 200.0,
-         latency: float = 0.0, law: MakeLaw = HeldPatch.at_rate) -> LandingRecord:
+         latency: float = 0.0, law: MakeLaw = LoadForces.at_rate) -> LandingRecord:
     """Run one landing with contacts that act `latency` [s] after they were asked for.
 
     sources: for each box of the stack, such as `solvers`. ValueError: a contact lacks what the law
@@ -157,7 +157,7 @@ class Landed(Landing):
 
 
 class HeldLimits(NamedTuple):
-    """What a landing of the grid by held patches must not exceed, from its tenth second on."""
+    """What a landing of the grid by patches must not exceed, from its tenth second on."""
 
     corner_speed: float = 1e-7  # of the fastest corner [m/s]
     creep: float = 1e-8  # mean lateral speed of the centre [m/s]
@@ -268,7 +268,7 @@ weight rests on a strip of three fifths. The other end is bare, so it cannot lie
 
 # --- ways -----------------------------------------------------------------------------------------
 
-HELD_PATCH, POINT, MUJOCO = 'held patch', 'point', 'MuJoCo'
+PATCH, POINT, MUJOCO = 'patch', 'point', 'MuJoCo'
 SAMPLE = 5
 """Ways that are not compared at length run one of so many landings. Prime to three: every third
 landing of the grid has the same overhang."""
@@ -299,13 +299,13 @@ class Way(NamedTuple):
         """Return those at which it is run: all, the least latency of a baseline, one of MuJoCo."""
         least = min(timing.latency for timing in timings)
         return (list(timings[-1:]) if self.law == MUJOCO else
-                [timing for timing in timings if self.law == HELD_PATCH or timing.latency == least])
+                [timing for timing in timings if self.law == PATCH or timing.latency == least])
 
     def run(self, scenario: CraneScenario, timing: LoopTiming) -> LandingRecord:
         """Run one landing."""
         if self.law == MUJOCO:
             return own_contact(scenario, timing.rate_hz)
-        law = (HeldPatch.at_rate if self.law == HELD_PATCH
+        law = (LoadForces.at_rate if self.law == PATCH
                else partial(PointLaw.at_rate, size=scenario.size))
         return land(scenario, self.sources(scenario), law=law, **timing._asdict())
 
@@ -380,8 +380,8 @@ def _of_model(model: str) -> Callable[[CraneScenario], Sequence[ContactSource]]:
 
 
 WAYS = {
-    'exact': Way(HELD_PATCH, 'exact', _of_model('exact'), every=1),
-    'mlp': Way(HELD_PATCH, 'mlp', _of_model('mlp')),
+    'exact': Way(PATCH, 'exact', _of_model('exact'), every=1),
+    'mlp': Way(PATCH, 'mlp', _of_model('mlp')),
     'manifold': Way(MUJOCO, 'its manifold, in the simulator', every=1),
     'point': Way(POINT, 'exact', _of_model('exact')),
     'mujoco-mean': Way(POINT, 'MuJoCo, mean point', partial(mujoco_sources, choice='mean')),

@@ -4,7 +4,7 @@
 """From a contact's point and depth to a wrench: a spring and a damper at the point, a baseline.
 
 It is what a simulator does with an engine that gives one point. The load's footprint has to be
-known, for the dampers that stand for the patch. The laws of `scene.force.laws` need none of that.
+known, for the dampers that stand for the patch. `PatchForces` needs none of that.
 
 Box A is the load. Box B is the stack, which does not move. The normal n points from A to B, so the
 stack pushes the load along −n. With the velocity v of the load's material point at the contact
@@ -72,7 +72,7 @@ def effective_mass(mass: float, size: Sequence[float]) -> float:
 class PointLaw:
     """The law of one load, whose mass is in its middle; made by `at_rate`.
 
-    It is called as `HeldPatch` is, but the wrench of an answer acts until the next answer.
+    It is called as `LoadForces` is, but the wrench of an answer acts until the next answer.
     """
 
     def __init__(self, *, stiffness: float, damping: float, torsion_radius: float,
@@ -104,7 +104,7 @@ class PointLaw:
                    damping=min(damping, DAMPING_LIMIT * corner * rate_hz),
                    torsion_radius=((length**2 + width**2) / 12.0)**0.5, rocking=(roll, pitch))
 
-    def hold(self, contacts: Mapping[str, Contact], pose: np.ndarray) -> None:
+    def hold(self, contacts: Mapping[str, Contact], pose: np.ndarray, *, age: float = 0.0) -> None:
         """Take the contacts of an answer."""
         self._answer = contacts
 

@@ -26,10 +26,10 @@ import mujoco
 import numpy as np
 
 from box_contact_ros.core import native
-from box_contact_ros.scene.laws import FRICTION, GRAVITY, Body, SceneLaw
+from box_contact_ros.scene.laws import FRICTION, GRAVITY, Body, PatchForces
 from box_contact_ros.scene.pose import rotation_matrix
-from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver
 from box_contact_ros.solver.arguments import add_model
+from box_contact_ros.solver.contact_solver import ContactSolver
 
 from . import output
 from .arguments import report_parser
@@ -142,38 +142,50 @@ def simulate(case: Case, timing: Timing | None, model: str = 'exact') -> Log:
         log.velocities[tick] = np.roll(data.cvel[rows], 3, axis=1)
         if not np.abs(log.velocities[tick]).max() < 1e3:
             break  # diverged
-        data.xfrc_applied[rows] = client.wrenches(
-            time, log.poses[tick], log.velocities[tick]) if client else 0.0
-        if time >= 1.0:
-            data.xfrc_applied[1 + log.free[0], 0] += case.push
+        push = np.zeros((count, 6))
+        push[log.free[0], 0] = case.push if time >= 1.0 else 0.0
+        data.xfrc_applied[rows] = push
+        if client:
+            data.xfrc_applied[rows] += client.wrenches(time, log.poses[tick],
+                                                       log.velocities[tick], push)
         mujoco.mj_step2(physics, data)
     return log
 
 
 class Client:
-    """Asks for contacts at a rate, and the law at every step."""
+    """Asks for contacts at a rate, and for the forces at every step."""
 
     def __init__(self, parts: Sequence[Part], timing: Timing, model: str) -> None:
-        """Make solver and law for all pairs with a free box."""
-        boxes = {part.name: Box(part.name, part.size, None if part.mass or part.speed else (
-            *map(float, part.position), *map(float, part.quaternion))) for part in parts}
-        scene = Scene(boxes, tuple(Pair.between(first.name, second.name) for first, second in
-                                   combinations(parts, 2) if first.mass or second.mass))
-        self._solver = SceneSolver(scene, model=model)
-        self._law = SceneLaw.at_rate(
-            scene, {part.name: Body.of_box(part.size, part.mass) for part in parts if part.mass},
-            rate_hz=timing.rate_hz, latency=timing.latency, step=STEP)
+        """Make solver and forces for all pairs with a free box; what moves comes first."""
+        parts = sorted(parts, key=lambda part: not (part.mass or part.speed))
+        bodies = [Body.of_box(part.size, part.mass) for part in parts]
+        self._moving = sum(1 for part in parts if part.mass or part.speed)
+        self._sizes = np.array([part.size for part in parts])
+        self._pairs = np.array([(a, b) for a, b in combinations(range(len(parts)), 2)
+                                if parts[a].mass or parts[b].mass])
+        self._poses = np.array([(*part.position, *part.quaternion) for part in parts], dtype=float)
+        self._velocities = np.zeros((len(parts), 6))
+        self._weights = np.zeros((len(parts), 6))
+        self._weights[:, 2] = [-GRAVITY * body.mass for body in bodies]
+        self._solver = ContactSolver(parts[0].size, parts[0].size, model=model)
+        self._forces = PatchForces(bodies, friction=FRICTION)
         self._period, self._latency, self._next = 1.0 / timing.rate_hz, timing.latency, 0.0
-        self._answers: deque = deque()  # when each arrives, answer, and poses of the question
+        self._answers: deque = deque()  # when each arrives, contacts, and poses of the question
 
-    def wrenches(self, time: float, poses: np.ndarray, velocities: np.ndarray) -> np.ndarray:
-        """Return the wrenches (n, 6) on what moves, for poses (n, 7) and velocities (n, 6)."""
+    def wrenches(self, time: float, poses: np.ndarray, velocities: np.ndarray,
+                 push: np.ndarray) -> np.ndarray:
+        """Return the wrenches (n, 6) of contacts on what moves; `push` is beside the weight."""
+        self._poses[:self._moving], self._velocities[:self._moving] = poses, velocities
+        outside = self._weights.copy()
+        outside[:self._moving] += push
         if time >= self._next - TIME_ROUNDING:
             self._next += self._period
-            self._answers.append((time + self._latency, self._solver(poses), poses.copy()))
+            contacts = self._solver.batch(self._poses, sizes=self._sizes, pairs=self._pairs)
+            self._answers.append((time + self._latency, contacts, self._poses.copy()))
         while self._answers and self._answers[0][0] <= time + TIME_ROUNDING:
-            self._law.hold(*self._answers.popleft()[1:])
-        return self._law.wrenches(poses, velocities)
+            self._forces.hold(self._pairs, *self._answers.popleft()[1:], age=self._latency)
+        return self._forces.wrenches(STEP, self._poses, self._velocities,
+                                     outside)[:self._moving]
 
 
 def _physics(parts: Sequence[Part], *, own_contact: bool) -> mujoco.MjModel:

@@ -13,15 +13,15 @@ from .solver.contact import Contact, Contacts
 from .solver.contact_solver import ContactSolver
 
 if TYPE_CHECKING:
-    from .scene.laws import Body, HeldPatch, SceneLaw
+    from .scene.laws import Body, PatchForces
     from .scene.scene_file import read_scene
     from .scene.scene_solver import Box, Pair, Scene, SceneSolver
 
-__all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'HeldPatch', 'Pair', 'Scene',
-           'SceneLaw', 'SceneSolver', 'read_scene']
+__all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Pair', 'PatchForces', 'Scene',
+           'SceneSolver', 'read_scene']
 
 _LOADED_WHEN_USED = {
-    'scene.laws': ('Body', 'HeldPatch', 'SceneLaw'),
+    'scene.laws': ('Body', 'PatchForces'),
     'scene.scene_file': ('read_scene',),
     'scene.scene_solver': ('Box', 'Pair', 'Scene', 'SceneSolver'),
 }

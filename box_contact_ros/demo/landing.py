@@ -22,9 +22,9 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ..scene.laws import GRAVITY, HeldPatch
+from ..scene.laws import FRICTION, GRAVITY, Body, PatchForces
 from ..scene.pose import rotation_matrix
-from ..solver.contact import Contact
+from ..solver.contact import Contact, Contacts
 from ..solver.contact_solver import ContactSolver
 from .crane import Crane, CraneScenario
 
@@ -39,10 +39,13 @@ TILT_LIMIT = math.radians(0.06)  # mean angle between the load's and the world's
 DEPTH_LIMIT = 0.01  # depth as a share of the load's height, always
 GAP_LIMIT = 0.020  # gap after the first touch [m]: how high it may bounce
 
-Contacts = Mapping[str, Contact]
-"""The contacts of one question, by the names of their pairs."""
+NamedContacts = Mapping[str, Contact]
+"""The contacts of one question, by the names of their pairs; the load is box A."""
 MakeLaw = Callable[..., 'LoadLaw']
-"""What makes the law of a load, called as `HeldPatch.at_rate` is."""
+"""What makes the law of a load, called as `LoadForces.at_rate` is."""
+
+
+NO_TURN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)  # a pose
 
 
 class LoopState(NamedTuple):
@@ -56,11 +59,48 @@ class LoopState(NamedTuple):
 class LoadLaw(Protocol):
     """The wrench on a load, from the answer that it holds."""
 
-    def hold(self, contacts: Contacts, pose: np.ndarray) -> None:
-        """Hold the contacts that were asked for with the load at `pose` (7,)."""
+    def hold(self, contacts: NamedContacts, pose: np.ndarray, *, age: float) -> None:
+        """Take the contacts that were asked for `age` [s] ago with the load at `pose` (7,)."""
 
     def wrench(self, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return force and torque (6,) at `pose` (7,) and `velocity` (6,), a physics step each."""
+
+
+class LoadForces:
+    """`PatchForces` of one load on boxes that are fixed; made by `at_rate`."""
+
+    def __init__(self, load: Body, step: float, period: float) -> None:
+        """Begin without contacts; step: of physics [s]; period: from question to question [s]."""
+        self._load, self._step, self._period = load, step, period
+        self._places: dict[str, int] = {}  # of the fixed boxes, by the names of their pairs
+        self._forces = PatchForces([load], friction=FRICTION)
+
+    @classmethod
+    def at_rate(cls, load: Body, *, rate_hz: float, step: float, **_: float) -> LoadForces:
+        """Return the forces of a load whose contacts are asked for `rate_hz` times a second."""
+        return cls(load, step, 1.0 / rate_hz)
+
+    def _rows(self, row: np.ndarray, others: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Return rows of all bodies: that of the load, and `others` for each fixed box."""
+        return np.array([row, *[others] * len(self._places)])
+
+    def hold(self, contacts: NamedContacts, pose: np.ndarray, *, age: float) -> None:
+        """Take the contacts that were asked for `age` [s] ago with the load at `pose` (7,)."""
+        for name in contacts:
+            self._places.setdefault(name, len(self._places) + 1)
+        fixed = Body(mass=0.0, inertia=np.zeros(3))
+        self._forces.set_bodies([self._load, *[fixed] * len(self._places)])
+        self._forces.hold(np.array([(0, self._places[name]) for name in contacts]).reshape(-1, 2),
+                          Contacts.of(list(contacts.values())),
+                          self._rows(pose, NO_TURN), age=age, period=self._period)
+
+    def wrench(self, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """Return force and torque (6,) at `pose` (7,) and `velocity` (6,), a physics step each."""
+        still, weight = np.zeros(6), np.array([0, 0, -GRAVITY * self._load.mass, 0, 0, 0])
+        wrench: np.ndarray = self._forces.wrenches(
+            self._step, self._rows(pose, NO_TURN), self._rows(velocity, still),
+            self._rows(weight, still))[0]
+        return wrench
 
 
 def with_patch(touch: Contact, pose: np.ndarray, size: Sequence[float]) -> Contact:
@@ -220,13 +260,13 @@ class ClosedLoop:
     """A crane under the wrench of a law, recorded tick by tick, wherever contacts come from."""
 
     def __init__(self, scenario: CraneScenario, rate_hz: float, *, latency: float = 0.0,
-                 law: MakeLaw = HeldPatch.at_rate) -> None:
+                 law: MakeLaw = LoadForces.at_rate) -> None:
         """Make the crane, and the law for its load, this rate and latency [s]."""
         self.crane, self.record = Crane(scenario, rate_hz), LandingRecord(scenario, rate_hz)
         self._law = law(scenario.load, rate_hz=rate_hz, latency=latency,
                         step=self.crane.physics_step)
-        self._under_way: deque[tuple[float, Contacts, np.ndarray]] = deque()
-        """Answers that do not act yet: when they will [s], and the pose that they are for."""
+        self._under_way: deque[tuple[float, NamedContacts, LoopState]] = deque()
+        """Answers that do not act yet: when they will [s], and the state that they are for."""
         self._wrench = np.zeros(6)
 
     def ask(self) -> LoopState:
@@ -237,7 +277,7 @@ class ClosedLoop:
         self.record.velocities.append(crane.load_velocity)
         return state
 
-    def answer(self, state: LoopState, contacts: Contacts, *, latency: float) -> None:
+    def answer(self, state: LoopState, contacts: NamedContacts, *, latency: float) -> None:
         """Take the contacts of a state; they act `latency` [s] after they were asked for.
 
         An answer must neither come nor act before those to earlier questions.
@@ -245,7 +285,7 @@ class ClosedLoop:
         touches = [contact for contact in contacts.values() if contact.colliding]
         if touches:
             self.record.points[state.tick] = np.array(touches[0].point)
-        self._under_way.append((state.time + latency, contacts, state.pose))
+        self._under_way.append((state.time + latency, contacts, state))
 
     def step(self) -> None:
         """End the tick: advance the crane under what is due.
@@ -259,7 +299,7 @@ class ClosedLoop:
     def _at(self, time: float) -> np.ndarray:
         """Return the wrench (6,) of the physics step that starts at `time` [s]."""
         while self._under_way and self._under_way[0][0] <= time + TIME_ROUNDING:
-            _, contacts, pose = self._under_way.popleft()
-            self._law.hold(contacts, pose)
+            _, contacts, state = self._under_way.popleft()
+            self._law.hold(contacts, state.pose, age=max(0.0, time - state.time))
         self._wrench = self._law.wrench(self.crane.load_pose, self.crane.load_velocity)
         return self._wrench

@@ -59,7 +59,7 @@ def contacts_by_pair(message: Any) -> dict[str, Contact]:
 
 
 def read_answer(message: Any, scene: Scene) -> Answer:
-    """Return the answer that a `Contacts` message tells, as `SceneLaw` holds it.
+    """Return the answer that a `Contacts` message tells, as a `SceneSolver` gives it.
 
     scene: that of the node. Raises Refused for a pair that the scene lacks.
     """

@@ -3,8 +3,8 @@
 
 """Five containers fall onto each other and rest: `python docs/examples/container_stack.py`.
 
-All of them move. MuJoCo integrates, and its own contact is off. A SceneSolver answers for the pairs
-200 times a second, and each answer comes 2 ms late. A SceneLaw holds the patches, and gives the
+All of them move. MuJoCo integrates, and its own contact is off. A solver answers for the pairs 200
+times a second, and each answer comes 2 ms late. `PatchForces` takes the answers, and gives the
 wrench on every container at every physics step.
 
 It prints:
@@ -19,15 +19,16 @@ from itertools import combinations
 import mujoco
 import numpy as np
 
-from box_contact_ros import Box, Pair, Scene, SceneLaw, SceneSolver
+from box_contact_ros import Body, ContactSolver, PatchForces
 
 SIZE, MASS, COUNT = (12.192, 2.438, 2.591), 20_000.0, 5  # [m], [kg]
 RATE, LATENCY, STEP, DURATION = 200.0, 0.002, 0.001, 8.0  # [Hz], [s], [s], [s]
 GAP = 0.01  # between the containers at the start [m]
 
-BOXES = {'ground': Box('ground', (40.0, 40.0, 1.0), (0, 0, -0.5, 0, 0, 0, 1))} | {
-    f'container_{i}': Box(f'container_{i}', SIZE) for i in range(COUNT)}
-SCENE = Scene(BOXES, tuple(Pair.between(b, a) for a, b in combinations(BOXES, 2)))
+# Box 0 is the ground.
+SIZES = np.array([(40.0, 40.0, 1.0), *[SIZE] * COUNT])
+GROUND = np.array([0.0, 0.0, -0.5, 0.0, 0.0, 0.0, 1.0])
+PAIRS = np.array(list(combinations(range(COUNT + 1), 2)))
 MODEL = '\n'.join([
     f'<mujoco><option timestep="{STEP}"><flag contact="disable"/></option><worldbody>',
     *(f'<body pos="{0.1 * (-1)**i} 0 {(i + 0.5) * SIZE[2] + (i + 1) * GAP}" euler="0.05 0 {i}">'
@@ -37,7 +38,7 @@ MODEL = '\n'.join([
 
 def poses_of(data: mujoco.MjData) -> np.ndarray:
     """Return all poses (n, 7) `x y z qx qy qz qw`; MuJoCo puts w first."""
-    return data.qpos.reshape(COUNT, 7)[:, [0, 1, 2, 4, 5, 6, 3]]
+    return np.vstack([GROUND, data.qpos.reshape(COUNT, 7)[:, [0, 1, 2, 4, 5, 6, 3]]])
 
 
 def velocities_of(data: mujoco.MjData) -> np.ndarray:
@@ -45,7 +46,7 @@ def velocities_of(data: mujoco.MjData) -> np.ndarray:
     velocities = data.qvel.reshape(COUNT, 6).copy()
     velocities[:, 3:] = np.einsum('nij,nj->ni', data.xmat[1:].reshape(COUNT, 3, 3),
                                   velocities[:, 3:])
-    return velocities
+    return np.vstack([np.zeros(6), velocities])
 
 
 def main() -> None:
@@ -53,21 +54,23 @@ def main() -> None:
     model = mujoco.MjModel.from_xml_string(MODEL)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    solver = SceneSolver(SCENE)
-    law = SceneLaw.at_rate(SCENE, dict.fromkeys(SCENE.moving, MASS), rate_hz=RATE, latency=LATENCY,
-                            step=STEP)
+    solver = ContactSolver(SIZE, SIZE, model='exact')
+    bodies = [Body(mass=0.0, inertia=np.zeros(3)), *[Body.of_box(SIZE, MASS)] * COUNT]
+    forces = PatchForces(bodies)
+    weights = np.zeros((COUNT + 1, 6))
+    weights[1:, 2] = -9.81 * MASS
     ticks, late = round(1 / (RATE * STEP)), round(LATENCY / STEP)
     for step in range(round(DURATION / STEP)):
         poses = poses_of(data)
         if step % ticks == 0:
-            asked, answer = poses, solver(poses)
+            asked, contacts = poses, solver.batch(poses, sizes=SIZES, pairs=PAIRS)
         if step % ticks == late:
-            law.hold(answer, asked)
-        data.xfrc_applied[1:] = law.wrenches(poses, velocities_of(data))
+            forces.hold(PAIRS, contacts, asked, age=LATENCY)
+        data.xfrc_applied[1:] = forces.wrenches(STEP, poses, velocities_of(data), weights)[1:]
         mujoco.mj_step(model, data)
         if step % 2000 == 1999:
             fastest = np.abs(data.qvel.reshape(COUNT, 6)[:, :3]).max()
-            deepest = -answer.contacts.separation.min()
+            deepest = -contacts.separation.min()
             print(f'{data.time:.0f} s: slower than 1 mm/s: {fastest < 1e-3}, '
                   f'less than 1 mm deep: {deepest < 1e-3}')
 

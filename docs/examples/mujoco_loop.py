@@ -4,7 +4,7 @@
 """Land a container in MuJoCo on one contact per tick: `python docs/examples/mujoco_loop.py`.
 
 MuJoCo integrates the motion. Its own contact is off. Every 5 ms the solver answers for the pair,
-2 ms late. From then on the law holds that patch: at every physics step it makes the wrench of it.
+2 ms late. `PatchForces` takes the answer, and gives the wrench of each physics step.
 
 It prints:
 
@@ -18,7 +18,7 @@ It prints:
 import mujoco
 import numpy as np
 
-from box_contact_ros import Body, ContactSolver, HeldPatch
+from box_contact_ros import Body, ContactSolver, PatchForces
 
 SIZE, MASS = np.array([12.192, 2.438, 2.591]), 20_000.0  # a 40 ft container [m], [kg]
 STEP, STEPS, LATE = 0.001, 5, 2  # physics step [s]; steps from question to question, and to answer
@@ -56,18 +56,22 @@ def main() -> None:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     solver = ContactSolver(SIZE, SIZE, model='mlp')
-    law = HeldPatch.at_rate(Body.of_box(SIZE, MASS), rate_hz=1.0 / (STEPS * STEP),
-                             latency=LATE * STEP, step=STEP)
+    fixed = Body(mass=0.0, inertia=np.zeros(3))
+    forces = PatchForces([Body.of_box(SIZE, MASS), fixed])  # body 0, the load, and 1, the stack
+    velocities, weights = np.zeros((2, 6)), np.zeros((2, 6))
+    weights[0, 2] = -9.81 * MASS
     for tick in range(round(DURATION / (STEPS * STEP))):
-        asked = pose_of(data)
-        contact = solver(asked, STACK)  # A is the load, so the normal points down
+        asked = np.array([pose_of(data), STACK])
+        contacts = solver.batch(asked[:1], asked[1:])  # A is the load, so the normal points down
         for step in range(STEPS):
             if step == LATE:
-                law.hold(contact, asked)
-            data.xfrc_applied[1] = law.wrench(pose_of(data), velocity_of(data))
+                forces.hold([(0, 1)], contacts, asked, age=LATE * STEP)
+            velocities[0] = velocity_of(data)
+            data.xfrc_applied[1] = forces.wrenches(STEP, np.array([pose_of(data), STACK]),
+                                                   velocities, weights)[0]
             mujoco.mj_step(model, data)
         if tick in (10, 25, 50, 100, 200):
-            print(f'{data.time:.2f} s: {1e3 * max(0.0, -contact.separation):.1f} mm deep, '
+            print(f'{data.time:.2f} s: {1e3 * max(0.0, -contacts.separation[0]):.1f} mm deep, '
                   f'{1e3 * np.linalg.norm(data.qvel[:3]):.0f} mm/s')
     weight = MASS * 9.81
     tilt = np.degrees(np.arccos(np.clip(data.xmat[1][8], -1.0, 1.0)))

@@ -1,12 +1,13 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-/* A load that is dropped on a stack and pushed aside, by the C interface of the law. Prints where it
+/* A load that is dropped on a stack and pushed aside, by the C interface of forces. Prints where it
  * ends as hexadecimal floats: test_library.py has the same loop in Python. */
 #include "box_contact/force.h"
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static int failures = 0;
@@ -17,71 +18,101 @@ static void check(bool holds, const char* what) {
   printf("FAILED %s: %s\n", what, bc_error_text());
 }
 
-static const bc_body body = {20000.0, {21000.0, 260000.0, 255000.0}, {0.0, 0.0, 0.0}, false};
-static const bc_box stack = {{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}}, {{12.192, 2.438, 2.591}}};
+/* Its inertia keeps the load from turning. */
+static const bc_body bodies[2] = {{20000.0, {1e12, 1e12, 1e12}, {0.0, 0.0, 0.0}},
+                                  {.mass = 0.0}};
+static const bc_size size = {{12.192, 2.438, 2.591}};
+static const int64_t pair[2] = {0, 1};
+
+static bc_patches answer_of(const bc_contact* contact) {
+  return (bc_patches){.size = sizeof(bc_patches),
+                      .count = 1,
+                      .pairs = pair,
+                      .separation = &contact->separation,
+                      .normal = contact->normal,
+                      .point = contact->point,
+                      .volume = &contact->volume,
+                      .covariance = contact->covariance[0],
+                      .age = 0.002};
+}
 
 static void drop(void) {
-  bc_loop loop = BC_DEFAULT_LOOP;
-  loop.latency = 0.002;
-  bc_law* law;
-  check(bc_law_create(&body, 1, &loop, &law) == BC_OK, "create");
-  bc_pose load = {{0.3, 0.1, 2.601}, {0.001, 0.002, 0.003, 1.0}}, asked = load;
-  bc_velocity velocity = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-  bc_wrench wrench;
-  bc_touch touch = {.pair = 7, .a = 0, .b = -1}, late = touch;
+  bc_patch_forces *forces, *copy;
+  check(bc_patch_forces_create(bodies, 2, NULL, &forces) == BC_OK, "create");
+  bc_pose poses[2] = {{{0.3, 0.1, 2.601}, {0.001, 0.002, 0.003, 1.0}},
+                      {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}}};
+  bc_pose asked[2];
+  bc_velocity velocities[2];
+  bc_wrench outside[2], wrenches[2];
+  memset(velocities, 0, sizeof velocities);
+  memset(outside, 0, sizeof outside);
+  outside[0].force[2] = -9.81 * 20000.0;
+  bc_contact contact;
   for (int step = 0; step < 2000; ++step) {
     if (step % 5 == 0) {
-      bc_box box = {load, stack.size};
-      bc_collide(&box, &stack, NULL, &late.contact);
-      asked = load;
+      bc_box load = {poses[0], size}, stack = {poses[1], size};
+      check(bc_collide(&load, &stack, NULL, &contact) == BC_OK, "collide");
+      memcpy(asked, poses, sizeof asked);
     }
     if (step % 5 == 2) {
-      touch = late;
-      check(bc_law_hold(law, &touch, 1, &asked) == BC_OK, "hold");
+      bc_patches answer = answer_of(&contact);
+      check(bc_patch_forces_hold(forces, &answer, asked) == BC_OK, "hold");
     }
-    check(bc_law_wrenches(law, &load, &velocity, &wrench) == BC_OK, "wrench");
-    for (int k = 0; k < 3; ++k) {
-      double push = k == 0 && step > 1000 ? 40000.0 : 0.0, gravity = k == 2 ? 9.81 : 0.0;
-      velocity.linear[k] += ((wrench.force[k] + push) / 20000.0 - gravity) * 0.001;
-      load.position[k] += velocity.linear[k] * 0.001;
-    }
+    outside[0].force[0] = step > 1000 ? 40000.0 : 0.0;
+    check(bc_patch_forces_step(forces, 0.001, poses, velocities, outside, velocities, wrenches) ==
+              BC_OK,
+          "step");
+    for (int k = 0; k < 3; ++k) poses[0].position[k] += velocities[0].linear[k] * 0.001;
   }
-  for (int k = 0; k < 3; ++k) printf("%a ", load.position[k]);
-  for (int k = 0; k < 3; ++k) printf("%a ", wrench.force[k]);
-  for (int k = 0; k < 3; ++k) printf("%a ", wrench.torque[k]);
-  bc_law* copy;
-  check(bc_law_copy(law, &copy) == BC_OK, "copy");
-  bc_law_reset(law);
-  bc_law_wrenches(law, &load, &velocity, &wrench);
-  check(wrench.force[2] == 0.0, "reset");
-  bc_law_wrenches(copy, &load, &velocity, &wrench);
-  check(wrench.force[2] > 1e5, "the copy");
-  bc_law_destroy(copy);
-  bc_law_destroy(law);
+  for (int k = 0; k < 3; ++k) printf("%a ", poses[0].position[k]);
+  for (int k = 0; k < 3; ++k) printf("%a ", wrenches[0].force[k]);
+  for (int k = 0; k < 3; ++k) printf("%a ", wrenches[0].torque[k]);
+
+  check(bc_patch_forces_copy(forces, &copy) == BC_OK, "copy");
+  check(bc_patch_forces_bodies(copy) == 2, "its bodies");
+  bc_patch_forces_reset(forces);
+  bc_patch_forces_step(forces, 0.001, poses, velocities, outside, NULL, wrenches);
+  check(fabs(wrenches[0].force[2]) < 1.0, "reset");
+  int64_t count = bc_patch_forces_save(copy, NULL, 0);
+  char* state = malloc((size_t)count);
+  check(bc_patch_forces_save(copy, state, count) == count, "save");
+  bc_patch_forces_destroy(copy);
+  check(bc_patch_forces_load(state, count, &copy) == BC_OK, "load");
+  check(bc_patch_forces_load(state, count - 1, &forces) == BC_BAD_ARGUMENT && !forces, "damaged");
+  bc_patch_forces_step(copy, 0.001, poses, velocities, outside, NULL, wrenches);
+  check(wrenches[0].force[2] > 1e5, "the loaded copy");
+  check(bc_patch_forces_forget(copy, 1) == BC_OK, "forget");
+  bc_patch_forces_step(copy, 0.001, poses, velocities, outside, NULL, wrenches);
+  check(fabs(wrenches[0].force[2]) < 1e3, "forgotten");
+  free(state);
+  bc_patch_forces_destroy(copy);
 }
 
 static void check_refusals(void) {
-  bc_law* law = (bc_law*)&body;
-  bc_loop loop = BC_DEFAULT_LOOP;
-  bc_touch touches[2] = {{.pair = 1, .a = 0, .b = -1}, {.pair = 1, .a = 0, .b = -1}};
-  check(bc_law_create(NULL, 1, NULL, &law) == BC_BAD_ARGUMENT && !law, "no bodies");
-  loop.rate = NAN;
-  check(bc_law_create(&body, 1, &loop, &law) == BC_BAD_ARGUMENT, "no rate");
-  check(strstr(bc_error_text(), "rate must be positive, not nan") != NULL, "its words");
-  loop.size = 0;
-  check(bc_law_create(&body, 1, &loop, &law) == BC_BAD_ABI, "another struct");
-  check(bc_law_create(&body, 1, NULL, &law) == BC_OK, "the usual loop");
-  check(bc_law_frequency(law) == 450.0, "its frequency");
-  check(bc_law_hold(law, touches, 1, NULL) == BC_BAD_ARGUMENT, "no poses");
-  check(bc_law_hold(law, touches, 2, &stack.pose) == BC_BAD_ARGUMENT, "a pair that comes twice");
-  touches[1].a = 1;
-  check(bc_law_hold(law, touches + 1, 1, &stack.pose) == BC_BAD_ARGUMENT, "no such body");
-  touches[1].a = -1;
-  check(bc_law_hold(law, touches + 1, 1, &stack.pose) == BC_BAD_ARGUMENT, "two fixed boxes");
-  check(bc_law_wrenches(NULL, &stack.pose, NULL, NULL) == BC_BAD_ARGUMENT, "no law");
-  bc_law_destroy(law);
-  bc_law_destroy(NULL);
-  bc_law_reset(NULL);
+  bc_patch_forces* forces = (bc_patch_forces*)&bodies;
+  bc_force_options options = BC_DEFAULT_FORCE_OPTIONS;
+  bc_pose poses[2] = {{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}}, {{0.0, 0.0, 9.0}, {0, 0, 0, 1.0}}};
+  bc_contact contact;
+  memset(&contact, 0, sizeof contact);
+  bc_patches answer = answer_of(&contact);
+  check(bc_patch_forces_create(NULL, 1, NULL, &forces) == BC_BAD_ARGUMENT && !forces, "no bodies");
+  options.friction = NAN;
+  check(bc_patch_forces_create(bodies, 2, &options, &forces) == BC_BAD_ARGUMENT, "no friction");
+  check(strstr(bc_error_text(), "friction must be 0 or more, not nan") != NULL, "its words");
+  options.size = 0;
+  check(bc_patch_forces_create(bodies, 2, &options, &forces) == BC_BAD_ABI, "another struct");
+  check(bc_patch_forces_create(bodies, 2, NULL, &forces) == BC_OK, "the usual options");
+  check(bc_patch_forces_hold(forces, &answer, NULL) == BC_BAD_ARGUMENT, "no poses");
+  check(bc_patch_forces_hold(forces, &answer, poses) == BC_OK, "a contact apart");
+  answer.normal = NULL;
+  check(bc_patch_forces_hold(forces, &answer, poses) == BC_BAD_ARGUMENT, "no normals");
+  answer.size = sizeof answer + 1;
+  check(bc_patch_forces_hold(forces, &answer, poses) == BC_BAD_ABI, "another answer");
+  check(bc_patch_forces_step(NULL, 0.001, poses, NULL, NULL, NULL, NULL) == BC_BAD_ARGUMENT,
+        "no forces");
+  bc_patch_forces_destroy(forces);
+  bc_patch_forces_destroy(NULL);
+  bc_patch_forces_reset(NULL);
 }
 
 int main(void) {

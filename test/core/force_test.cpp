@@ -1,59 +1,83 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// The loop of force_test.c by the C++ interface.
+// The loop of force_test.c by the C++ interface, and a step allocates no memory.
 #include "box_contact/force.hpp"
 
 #include <cstdio>
+#include <cstdlib>
+#include <new>
+
+static long allocations = 0;
+
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 using namespace box_contact;
 
 int main() {
   const Size size{12.192, 2.438, 2.591};
-  const Body body{20000.0, {21000.0, 260000.0, 255000.0}};
-  Loop loop;
-  loop.latency = 0.002;
-  HeldPatch law(body, loop);
-  const Pose stack{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}};
-  Pose load{{0.3, 0.1, 2.601}, {0.001, 0.002, 0.003, 1.0}}, asked = load;
-  Velocity velocity{};
-  Wrench wrench{};
+  const Body bodies[] = {{20000.0, {1e12, 1e12, 1e12}}, {0.0, {0.0, 0.0, 0.0}}};
+  PatchForces forces(bodies);
+  Pose poses[] = {{{0.3, 0.1, 2.601}, {0.001, 0.002, 0.003, 1.0}},
+                  {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}}};
+  Pose asked[2];
+  Velocity velocities[2] = {};
+  Wrench outside[2] = {{{0.0, 0.0, -9.81 * 20000.0}, {}}, {}}, wrenches[2];
   Contact contact{};
-  for (int step = 0; step < 2000; ++step) {
-    if (step % 5 == 0) {
-      contact = collide({load, size}, {stack, size});
-      asked = load;
-    }
-    if (step % 5 == 2) law.hold(contact, asked, 7);
-    wrench = law.wrench(load, velocity);
-    for (int k = 0; k < 3; ++k) {
-      double push = k == 0 && step > 1000 ? 40000.0 : 0.0, gravity = k == 2 ? 9.81 : 0.0;
-      velocity.linear[k] += ((wrench.force[k] + push) / 20000.0 - gravity) * 0.001;
-      load.position[k] += velocity.linear[k] * 0.001;
-    }
-  }
-  for (double x : load.position) std::printf("%a ", x);
-  for (double x : wrench.force) std::printf("%a ", x);
-  for (double x : wrench.torque) std::printf("%a ", x);
-
+  const std::int64_t pair[2] = {0, 1};
   int failures = 0;
-  HeldPatch copy = law;
-  law.reset();
-  failures += law.wrench(load, velocity).force[2] != 0.0;
-  failures += !(copy.wrench(load, velocity).force[2] > 1e5);
+  for (int step = 0; step < 2000; ++step) {
+    long before = allocations;
+    if (step % 5 == 0) {
+      contact = collide({poses[0], size}, {poses[1], size});
+      asked[0] = poses[0], asked[1] = poses[1];
+    }
+    if (step % 5 == 2) {
+      Patches answer{};
+      answer.size = sizeof answer;
+      answer.count = 1;
+      answer.pairs = pair;
+      answer.separation = &contact.separation;
+      answer.normal = contact.normal;
+      answer.point = contact.point;
+      answer.volume = &contact.volume;
+      answer.covariance = contact.covariance[0];
+      answer.age = 0.002;
+      forces.hold(answer, asked);
+    }
+    outside[0].force[0] = step > 1000 ? 40000.0 : 0.0;
+    // The last step twice, by a copy: once for the wrenches.
+    if (step == 1999) PatchForces(forces).wrenches(0.001, poses, velocities, outside, wrenches);
+    forces.step(0.001, poses, velocities, outside, velocities);
+    for (int k = 0; k < 3; ++k) poses[0].position[k] += velocities[0].linear[k] * 0.001;
+    failures += step > 100 && step < 1999 && allocations != before;
+  }
+  for (double x : poses[0].position) std::printf("%a ", x);
+  for (double x : wrenches[0].force) std::printf("%a ", x);
+  for (double x : wrenches[0].torque) std::printf("%a ", x);
+  failures += allocations == 0;
+
+  PatchForces copy = forces, loaded = PatchForces::load(forces.save());
+  forces.reset();
+  Velocity after[3][2];
+  int k = 0;
+  for (PatchForces* each : {&forces, &copy, &loaded})
+    each->step(0.001, poses, velocities, outside, after[k++]);
+  failures += !(after[0][0].linear[2] < -0.009 && after[1][0].linear[2] > -1e-6);
+  failures += after[1][0].linear[2] != after[2][0].linear[2];
   try {
-    copy.hold(collide({stack, size}, {load, size}), load);
+    copy.step(0.001, {poses, 1}, velocities, outside, velocities);
     ++failures;
   } catch (const std::invalid_argument&) {
   }
-  copy.hold(collide({stack, size}, {load, size}), load, 7, HeldPatch::Load::b);
-  const Body bodies[2] = {body, body};
-  SceneLaw scene(bodies);
-  try {
-    scene.wrenches({&load, 1}, {&velocity, 1}, {&wrench, 1});
-    ++failures;
-  } catch (const std::invalid_argument&) {
-  }
+  copy.set_bodies({bodies, 1});
+  copy.step(0.001, {poses, 1}, {velocities, 1}, {}, {velocities, 1});
   std::printf("%d failures\n", failures);
-  return failures;
+  return failures != 0;
 }

@@ -62,14 +62,14 @@ def test_with_sanitizers(tmp_path: Path) -> None:
 
 
 class CLibrary(ctypes.CDLL):
-    """libbox_contact with a law."""
+    """libbox_contact with the forces of one body."""
 
     def __init__(self) -> None:
         super().__init__(str(LIBRARY))
         self.bc_error_text.restype = ctypes.c_char_p
-        self.law = c_void_p()
-        assert self.bc_law_create((c_double * 8)(1, 1, 1, 1), c_int64(1), None,
-                                  byref(self.law)) == 0
+        self.forces = c_void_p()
+        assert self.bc_patch_forces_create((c_double * 7)(1, 1, 1, 1), c_int64(1), None,
+                                           byref(self.forces)) == 0
 
 
 @pytest.fixture(scope='module')
@@ -81,22 +81,28 @@ def test_null_pointers(library: CLibrary) -> None:
     """In the place of each argument that must not be one."""
     pose, contact, rows = (c_double * 7)(0, 0, 0, 0, 0, 0, 1), (c_double * 64)(), Rows()
     rows.size, results = ctypes.sizeof(Rows), Results(ctypes.sizeof(Results))
+    answer = (c_int64 * 13)(13 * 8)  # a bc_patches without rows
+    step = c_double(0.001)
     made, wrench, box = c_void_p(), (c_double * 6)(), (c_double * 10)(*[0.0] * 6, *[1.0] * 4)
     calls: list[tuple[Callable[..., int], list[object], set[int]]] = [
         (library.bc_collide, [box, box, None, contact], {0, 1, 3}),
         (library.bc_collide_rows, [byref(rows), None, byref(results), 1, None], {0, 2}),
-        (library.bc_law_create, [(c_double * 8)(1, 1, 1, 1), c_int64(1), None, byref(made)],
-         {0, 3}),
-        (library.bc_law_copy, [library.law, byref(made)], {0, 1}),
-        (library.bc_law_hold, [library.law, None, c_int64(0), pose], {0, 3}),
-        (library.bc_law_wrenches, [library.law, pose, wrench, wrench], {0, 1, 2, 3})]
+        (library.bc_patch_forces_create,
+         [(c_double * 7)(1, 1, 1, 1), c_int64(1), None, byref(made)], {0, 3}),
+        (library.bc_patch_forces_copy, [library.forces, byref(made)], {0, 1}),
+        (library.bc_patch_forces_set_bodies,
+         [library.forces, (c_double * 7)(1, 1, 1, 1), c_int64(1)], {0, 1}),
+        (library.bc_patch_forces_hold, [library.forces, answer, pose], {0, 1, 2}),
+        (library.bc_patch_forces_step,
+         [library.forces, step, pose, wrench, None, wrench, wrench], {0, 2, 3}),
+        (library.bc_patch_forces_forget, [library.forces, c_int64(0)], {0})]
     for call, given, needed in calls:
         assert call(*given) == 0, call.__name__
         for place in needed:
             changed = [None if place == k else value for k, value in enumerate(given)]
             assert call(*changed) == BAD_ARGUMENT, (call.__name__, place)
             assert b'is a null pointer' in library.bc_error_text()
-    for name in ('bc_law_destroy', 'bc_law_reset', 'bc_law_frequency'):
+    for name in ('bc_patch_forces_destroy', 'bc_patch_forces_reset', 'bc_patch_forces_bodies'):
         getattr(library, name)(None)
 
 

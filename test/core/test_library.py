@@ -8,6 +8,7 @@ which finds the library by the same `find_package`.
 """
 from __future__ import annotations
 
+import copy
 import ctypes
 import json
 import os
@@ -26,7 +27,7 @@ import poses
 import pytest
 from poses import Pairs
 
-from box_contact_ros import Body, ContactSolver, HeldPatch
+from box_contact_ros import Body, ContactSolver, PatchForces
 from box_contact_ros.core import FORCE, instruction_sets, native
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.contact import Contacts
@@ -150,7 +151,7 @@ def test_other_languages_get_the_bits_of_python(library: ctypes.CDLL, model: str
 
 
 @pytest.mark.parametrize('source', ['force_test.c', 'force_test.cpp'])
-def test_the_law_has_the_bits_of_python(tmp_path: Path, source: str) -> None:
+def test_forces_have_the_bits_of_python(tmp_path: Path, source: str) -> None:
     """A load that is dropped and pushed: 2,000 steps in C, in C++ and here."""
     compiler, standard = ('gcc', 'c11') if source.endswith('.c') else ('g++', 'c++17')
     program = tmp_path / 'force_test'
@@ -159,26 +160,27 @@ def test_the_law_has_the_bits_of_python(tmp_path: Path, source: str) -> None:
         '-o', program)
     *found, failures, _ = run(program).split()
     assert failures == '0'
-    size = (12.192, 2.438, 2.591)
+    size, pair = (12.192, 2.438, 2.591), np.array([(0, 1)])
     solver = ContactSolver(size, size, model='exact')
-    law = HeldPatch.at_rate(Body(mass=20000.0, inertia=(21000.0, 260000.0, 255000.0)),
-                            rate_hz=200.0, latency=0.002)
-    stack, velocity = np.array([0, 0, 0, 0, 0, 0, 1.0]), np.zeros(6)
-    load = np.array([0.3, 0.1, 2.601, 0.001, 0.002, 0.003, 1.0])
+    forces = PatchForces([Body(mass=20000.0, inertia=(1e12, 1e12, 1e12)),
+                          Body(mass=0.0, inertia=np.zeros(3))])
+    poses = np.array([[0.3, 0.1, 2.601, 0.001, 0.002, 0.003, 1.0], [0, 0, 0, 0, 0, 0, 1.0]])
+    velocities, outside = np.zeros((2, 6)), np.zeros((2, 6))
+    outside[0, 2] = -9.81 * 20000.0
     for step in range(2000):
         if step % 5 == 0:
-            contact, asked = solver(load, stack), load.copy()
+            contacts, asked = solver.batch(poses[:1], poses[1:]), poses.copy()
         if step % 5 == 2:
-            law.hold(contact, asked)
-        wrench = law.wrench(load, velocity)
-        push = np.array([40000.0 if step > 1000 else 0.0, 0.0, 0.0])
-        velocity[:3] += ((wrench[:3] + push) / 20000.0 - [0.0, 0.0, 9.81]) * 0.001
-        load[:3] += velocity[:3] * 0.001
-    expected = [*load[:3], *wrench]
-    assert [float.fromhex(number) for number in found] == expected
-    assert wrench[2] == pytest.approx(20000.0 * 9.81, rel=1e-3)
-    assert wrench[0] == pytest.approx(-40000.0, rel=1e-3)
-    assert np.abs(velocity).max() < 1e-3
+            forces.hold(pair, contacts, asked, age=0.002)
+        outside[0, 0] = 40000.0 if step > 1000 else 0.0
+        wrenches = copy.copy(forces).wrenches(
+            0.001, poses, velocities, outside) if step == 1999 else None
+        velocities = forces.step(0.001, poses, velocities, outside)
+        poses[0, :3] += velocities[0, :3] * 0.001
+    assert [float.fromhex(number) for number in found] == [*poses[0, :3], *wrenches[0]]
+    assert wrenches[0, 2] == pytest.approx(20000.0 * 9.81, rel=1e-3)
+    assert wrenches[0, 0] == pytest.approx(-40000.0, rel=1e-3)
+    assert np.abs(velocities).max() < 1e-3
 
 
 def test_the_interface_alone_is_exported() -> None:
@@ -469,13 +471,8 @@ def test_the_winning_axis(model: str) -> None:
     assert one(pairs.pose_a[0], pairs.pose_b[0]).axis == found.axis[0]
 
 
-def test_refusals_name_value_and_remedy() -> None:
-    """A place that there is not; a period in the place of a rate, and milliseconds for seconds."""
+def test_a_place_without_a_pose_is_named() -> None:
+    """A pair's place that there is not."""
     solver, twice = ContactSolver(poses.CUBE, poses.CUBE), np.array([poses.IDENTITY] * 2)
     with pytest.raises(ValueError, match=r'pairs\[1\] is \(1, 9\), but there are 2 poses'):
         solver.batch(twice, sizes=np.full((2, 3), 2.0), pairs=[[0, 1], [1, 9]])
-    load = Body.of_box(poses.CUBE, 1000.0)
-    for wrong in ({'rate_hz': 0.005}, {'rate_hz': 200.0, 'latency': 2.0}):
-        with pytest.raises(ValueError, match='a load would rest .* m deep'):
-            HeldPatch.at_rate(load, **wrong)
-    assert HeldPatch.at_rate(load, rate_hz=5.0, latency=0.1).frequency > 0.0

@@ -11,13 +11,14 @@ import pytest
 
 pytest.importorskip('mujoco')
 
-from box_contact_ros import Body, ContactSolver, HeldPatch
+from box_contact_ros import Body, ContactSolver
 from box_contact_ros.demo.crane import CraneScenario
 from box_contact_ros.demo.landing import (
     CORNER_SPEED_LIMIT,
     ClosedLoop,
     Landing,
     LandingRecord,
+    LoadForces,
     with_patch,
 )
 from box_contact_ros.scene.laws import GRAVITY
@@ -68,14 +69,15 @@ def test_an_answer_acts_from_its_time_on():
     held = []
 
     class Law:
-        def hold(self, contacts, pose):
+        def hold(self, contacts, pose, *, age):
             held.append((len(times), contacts, pose))
+            ages.append(age)
 
         def wrench(self, pose, velocity):
             times.append(loop.crane.time)
             return np.zeros(6)
 
-    times = []
+    times, ages = [], []
     loop = ClosedLoop(HARD, 200.0, law=lambda load, **_: Law())
     asked = []
     for latency in (0.002, 0.006, 0.001, 0.0):
@@ -84,6 +86,7 @@ def test_an_answer_acts_from_its_time_on():
         loop.step()
     # Ten physics steps of 0.5 ms per tick: 2 ms are 4 steps, 6 ms reach into the next tick.
     assert [step for step, _, _ in held] == [4, 22, 22, 30]
+    assert ages == pytest.approx([0.002, 0.006, 0.001, 0.0], abs=1e-9)
     assert [pose.tolist() for _, _, pose in held] == [state.pose.tolist() for state in asked]
 
 
@@ -100,8 +103,8 @@ def test_the_patch_of_a_flat_load_is_that_of_the_whole_load():
     assert assumed.covariance[:2, :2] == pytest.approx(exact.covariance[:2, :2])
     wrenches = []
     for contact in (exact, assumed):
-        law = HeldPatch.at_rate(Body.of_box(load, 20_000.0), rate_hz=200.0)
-        law.hold(contact, pose)
+        law = LoadForces.at_rate(Body.of_box(load, 20_000.0), rate_hz=200.0, step=0.001)
+        law.hold({'load_stack': contact}, pose, age=0.0)
         wrenches.append(law.wrench(pose, np.array([0.1, 0.0, -0.2, 0.01, 0.02, 0.03])))
     assert wrenches[1] == pytest.approx(wrenches[0], rel=1e-9, abs=1e-3)
 

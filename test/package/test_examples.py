@@ -16,7 +16,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / 'docs' / 'examples'
-CLIENTS = ('check_client.py', 'lockstep_client.py', 'held_patch_client.py')  # of a contact node
+CLIENTS = ('check_client.py', 'lockstep_client.py', 'forces_client.py')  # of a contact node
 NEEDS = {'mujoco_loop.py': 'mujoco', 'container_stack.py': 'mujoco',
          'dask_pairs.py': 'distributed',
          'tf_to_pose.py': 'tf2_ros'} | dict.fromkeys(CLIENTS, 'box_contact_msgs.msg')

@@ -19,7 +19,7 @@
 #include "../src/mlp/shipped_network.hpp"
 #include "arrays.hpp"  // first, as Python.h wants
 #include "broad_phase.hpp"
-#include "law.hpp"
+#include "forces.hpp"
 #include "patch_area.hpp"
 
 namespace {
@@ -609,7 +609,7 @@ PyMODINIT_FUNC PyInit__native() {
       add(module.get(), "compiler", PyUnicode_FromString(__VERSION__)) &&
       add(module.get(), "PairSolver", PyType_FromSpec(&solver_spec)) &&
       add(module.get(), "BroadPhase", PyType_FromSpec(&broad_phase_spec)) &&
-      add(module.get(), "Law", PyType_FromSpec(&law_spec));
+      add(module.get(), "PatchForces", PyType_FromSpec(&forces_spec));
   for (const Whole& whole : wholes)
     added = added && add(module.get(), whole.name, PyLong_FromLong(whole.value));
   for (const Constant& constant : constants)

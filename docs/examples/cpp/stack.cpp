@@ -1,12 +1,12 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// Three boxes fall on each other and come to rest. The program finds near pairs and moves the boxes,
-// as your simulator does. They stay level, so it leaves out angles. It prints:
+// Three boxes fall on each other and come to rest. The program moves the boxes, as your simulator
+// does. They stay level, so it leaves out angles. It prints:
 //
-//   box 0: 0.18 mm deep, 0.000 mm/s, net force 88290 N
-//   box 1: 0.17 mm deep, 0.000 mm/s, net force 39240 N
-//   box 2: 0.10 mm deep, 0.000 mm/s, net force 9810 N
+//   box 1: 0.01 mm deep, 0.000 mm/s, net force 88290 N
+//   box 2: 0.01 mm deep, 0.000 mm/s, net force 39240 N
+//   box 3: 0.00 mm deep, 0.000 mm/s, net force 9810 N
 #include <cmath>
 #include <cstdio>
 #include <vector>
@@ -15,12 +15,10 @@
 
 using namespace box_contact;
 
-const double step = 0.001, gravity = 9.81;                               // [s], [m/s²]
-const std::vector<double> masses{9000, 4000, 1000};                      // [kg]
-const std::vector<Size> sizes{{6, 2.4, 2.6}, {4, 2.4, 2.6}, {2, 2, 2}};  // [m]
+const double step = 0.001, gravity = 9.81;              // [s], [m/s²]
+const std::vector<double> masses{0, 9000, 4000, 1000};  // [kg]
 const Size ground_size{20, 20, 1};
 const Pose ground{{0, 0, -0.5}, {0, 0, 0, 1}};
-const int fixed = -1;  // the ground's number; bodies count from 0
 
 Body solid_box(double mass, const Size& size) {
   const auto [x, y, z] = size.extent;
@@ -28,50 +26,53 @@ Body solid_box(double mass, const Size& size) {
           {mass * (y * y + z * z) / 12, mass * (z * z + x * x) / 12, mass * (x * x + y * y) / 12}};
 }
 
-double radius(const Size& size) {
-  return 0.5 * std::hypot(size.extent[0], size.extent[1], size.extent[2]);
-}
-
-double distance(const Pose& a, const Pose& b) {
-  return std::hypot(a.position[0] - b.position[0], a.position[1] - b.position[1],
-                    a.position[2] - b.position[2]);
-}
-
 int main() {
-  const int count = int(masses.size());
-  std::vector<Body> bodies;
-  for (int i = 0; i < count; ++i) bodies.push_back(solid_box(masses[i], sizes[i]));
-  SceneLaw law(bodies, {1 / step, 0, step});  // answers at every step, used at once
-
-  std::vector<Pose> poses{
-      {{0, 0, 1.4}, {0, 0, 0, 1}}, {{0, 0, 4.1}, {0, 0, 0, 1}}, {{0, 0, 6.5}, {0, 0, 0, 1}}};
-  std::vector<Velocity> velocities(count);
-  std::vector<Wrench> wrenches(count);
-  std::vector<Touch> touches;
-
-  for (int tick = 0; tick < 3000; ++tick) {
-    touches.clear();
-    for (int a = 0; a < count; ++a) {
-      for (int b = fixed; b < a; ++b) {  // the upper box is box A
-        const Pose& under = b == fixed ? ground : poses[b];
-        const Size& size_under = b == fixed ? ground_size : sizes[b];
-        if (distance(poses[a], under) > radius(sizes[a]) + radius(size_under)) continue;
-        const std::int64_t pair = (count + 1) * a + b + 1;  // the same number at every step
-        touches.push_back({pair, a, b, collide({poses[a], sizes[a]}, {under, size_under})});
-      }
-    }
-    law.hold(touches, poses);
-    law.wrenches(poses, velocities, wrenches);
-    for (int i = 0; i < count; ++i) {
-      velocities[i].linear[2] += (wrenches[i].force[2] / masses[i] - gravity) * step;
-      poses[i].position[2] += velocities[i].linear[2] * step;
-    }
+  // Body 0 is the ground, which no force moves.
+  std::vector<Body> bodies{{0, {0, 0, 0}}};
+  std::vector<Size> sizes{ground_size, {6, 2.4, 2.6}, {4, 2.4, 2.6}, {2, 2, 2}};  // [m]
+  std::vector<Pose> poses{ground, {{0, 0, 1.4}, {0, 0, 0, 1}}, {{0, 0, 4.1}, {0, 0, 0, 1}},
+                          {{0, 0, 6.5}, {0, 0, 0, 1}}};
+  const std::size_t count = poses.size();
+  std::vector<Wrench> weights(count), wrenches(count);
+  for (std::size_t i = 1; i < count; ++i) {
+    bodies.push_back(solid_box(masses[i], sizes[i]));
+    weights[i].force[2] = -gravity * masses[i];
   }
+  std::vector<Velocity> velocities(count);
+  std::vector<std::int64_t> pairs;  // here all of them; a simulator lists those that are near
+  for (std::size_t b = 1; b < count; ++b)
+    for (std::size_t a = 0; a < b; ++a) pairs.insert(pairs.end(), {std::int64_t(a), std::int64_t(b)});
+
+  const std::size_t rows = pairs.size() / 2;
+  std::vector<double> separation(rows), normal(3 * rows), point(3 * rows), volume(rows),
+      covariance(9 * rows);
+  Results results;
+  results.separation = separation.data();
+  results.normal = normal.data();
+  results.point = point.data();
+  results.volume = volume.data();
+  results.covariance = covariance.data();
+  const Patches answer{sizeof(Patches),  std::int64_t(rows), pairs.data(),
+                       separation.data(), normal.data(),     point.data(),
+                       volume.data(),     covariance.data(), nullptr,
+                       nullptr,           nullptr,           0.0,              0.0};
+  PatchForces forces(bodies);
+  const auto ask = [&] {
+    collide({poses, poses, sizes, sizes, Span<const std::int64_t>(pairs)}, results);
+    forces.hold(answer, poses);
+  };
+  for (int tick = 0; tick < 3000; ++tick) {
+    ask();
+    forces.step(step, poses, velocities, weights, velocities);
+    for (std::size_t i = 1; i < count; ++i) poses[i].position[2] += velocities[i].linear[2] * step;
+  }
+  ask();
+  forces.wrenches(step, poses, velocities, weights, wrenches);
 
   double top = 0;  // of what is below [m]
-  for (int i = 0; i < count; ++i) {
+  for (std::size_t i = 1; i < count; ++i) {
     const double bottom = poses[i].position[2] - sizes[i].extent[2] / 2;
-    std::printf("box %d: %.2f mm deep, %.3f mm/s, net force %.0f N\n", i, 1e3 * (top - bottom),
+    std::printf("box %zu: %.2f mm deep, %.3f mm/s, net force %.0f N\n", i, 1e3 * (top - bottom),
                 std::fabs(1e3 * velocities[i].linear[2]), wrenches[i].force[2]);
     top = poses[i].position[2] + sizes[i].extent[2] / 2;
   }

@@ -1,25 +1,24 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-/* From contacts to forces: a law that holds the patches between questions. For C and C++.
+/* From contacts to forces, by sequential impulses. For C and C++.
  *
- * A simulator asks for contacts at some rate, and its answers come late. It gives each answer to the
- * law, with the poses for which it was asked. At every physics step the law then says which wrench
- * acts on each body, from the patches that it holds and from where the bodies are by now.
+ * A simulator gives each answer to the forces, with the poses for which it was asked. At every
+ * physics step they return the velocities of the bodies, or the wrenches that lead to them.
  *
- *   bc_body load = {20000.0, {2.1e4, 2.6e5, 2.6e5}, {0, 0, 0}, false};
- *   bc_loop loop = BC_DEFAULT_LOOP;             200 Hz, 1 ms steps, friction 0.5, gravity 9.81 m/s²
- *   bc_law* law;
- *   bc_law_create(&load, 1, &loop, &law);
- *   bc_touch touch = {7, 0, -1};                pair 7: body 0 is box A, and box B is fixed
- *   bc_collide(&load_box, &stack_box, NULL, &touch.contact);
- *   bc_law_hold(law, &touch, 1, &pose);
- *   bc_law_wrenches(law, &pose, &velocity, &wrench);                       at every physics step
+ *   bc_body bodies[2] = {{20000.0, {2.1e4, 2.6e5, 2.6e5}, {0, 0, 0}}, {0}};   a load, a fixed box
+ *   bc_patch_forces* forces;
+ *   bc_patch_forces_create(bodies, 2, NULL, &forces);
+ *   bc_patches answer = {sizeof(bc_patches), 1, pairs, separation, normal, point, volume,
+ *                       covariance, NULL, NULL, NULL, 0.0, 0.0};
+ *   bc_patch_forces_hold(forces, &answer, poses);
+ *   bc_patch_forces_step(forces, 0.001, poses, velocities, weights, velocities, NULL);
  *
- * The pose of a body is that of its box, as the solver takes it. Velocities and wrenches are in the
- * common frame, at and about the centre of mass. docs/explanation/force.md has the equations. One
- * thread at a time may use a law. `bc_law_hold` and `bc_law_wrenches` allocate no memory once as
- * many pairs have been held.
+ * A body is known by its place, 0 to count − 1. Its pose is that of its box, as the solver takes it.
+ * Velocities and wrenches are in the common frame, at and about the centre of mass.
+ * docs/explanation/force.md has the equations. One thread at a time may use an object.
+ * `bc_patch_forces_hold` and `bc_patch_forces_step` allocate no memory once as many pairs have been
+ * held. The bits are the same on all instruction sets.
  */
 #ifndef BOX_CONTACT_FORCE_H
 #define BOX_CONTACT_FORCE_H
@@ -31,30 +30,10 @@ extern "C" {
 #endif
 
 typedef struct bc_body {
-  double mass;       /* [kg]; 0: no force moves it, but it may move by itself */
+  double mass;       /* [kg]; 0: no force moves it, but it may move by its velocity */
   double inertia[3]; /* about the box's own axes, through the centre of mass [kg m²] */
   double centre[3];  /* of mass, in the box's own frame [m] */
-  bool compound;     /* of several boxes: normals are not checked against its centre of mass */
 } bc_body;
-
-typedef struct bc_loop {
-  size_t size; /* sizeof(bc_loop) */
-  double rate;     /* of questions [1/s] */
-  double latency;  /* from a question to the use of its answer [s] */
-  double step;     /* physics step [s] */
-  double friction; /* Coulomb's μ [1] */
-  double gravity;  /* [m/s²] */
-} bc_loop;
-
-#define BC_DEFAULT_LOOP {sizeof(bc_loop), 200.0, 0.0, 0.001, 0.5, 9.81}
-
-/* The contact of a pair of bodies, which friction knows again by the number of the pair. */
-typedef struct bc_touch {
-  int64_t pair;
-  int32_t a, b; /* places of the boxes' bodies; −1: a box that is fixed in the common frame */
-  bc_contact contact;
-  bool stale; /* a box had no recent pose: the patch that is held stays, `contact` is not read */
-} bc_touch;
 
 typedef struct bc_velocity {
   double linear[3];  /* of the centre of mass [m/s] */
@@ -66,31 +45,68 @@ typedef struct bc_wrench {
   double torque[3]; /* about the centre of mass [N m] */
 } bc_wrench;
 
-typedef struct bc_law bc_law;
+/* An answer: rows of pairs, as bc_solve_rows gives them. Rows without volume are passed over. A row
+ * whose separation is NaN is stale: the patch that is held for its pair stays. */
+typedef struct bc_patches {
+  size_t size; /* sizeof(bc_patches) */
+  int64_t count;
+  const int64_t* pairs;     /* (count, 2): the bodies of boxes A and B */
+  const double* separation; /* [m] */
+  const double* normal;     /* (count, 3), from A to B */
+  const double* point;      /* (count, 3) [m] */
+  const double* volume;     /* [m³] */
+  const double* covariance; /* (count, 3, 3) [m²] */
+  const double* friction;   /* Coulomb's μ [1]; NULL: that of the options */
+  const double* surface;    /* (count, 3): velocity of B's surface relative to A's, beside that of the
+                               bodies, as of a belt [m/s]; NULL: none */
+  const double* stiffness;  /* [N/m]; 0, or NULL: as stiff as step and answers bear */
+  double age;               /* since the answer was asked for [s] */
+  double period;            /* from one question to the next [s]; 0: from the answer before */
+} bc_patches;
 
-/* Make a law for `count` bodies. `loop` NULL: BC_DEFAULT_LOOP. On failure *law is NULL. */
-BC_API bc_status bc_law_create(const bc_body* bodies, int64_t count, const bc_loop* loop,
-                               bc_law** law);
-/* The same bodies, with the patches that are held and what their friction remembers. */
-BC_API bc_status bc_law_copy(const bc_law* law, bc_law** copy);
-BC_API void bc_law_destroy(bc_law* law);
+typedef struct bc_force_options {
+  size_t size;     /* sizeof(bc_force_options) */
+  int iterations;  /* of sequential impulses in a step, at most */
+  int relaxations; /* iterations more, at most, which remove the speed of pushing out */
+  double friction; /* Coulomb's μ [1] */
+} bc_force_options;
 
-/* Forget all patches: bodies were put elsewhere. */
-BC_API void bc_law_reset(bc_law* law);
+#define BC_DEFAULT_FORCE_OPTIONS {sizeof(bc_force_options), 50, 5, 0.5}
 
-/* Ω [1/s]: no body oscillates faster on its patches. One alone rests at the depth gravity / Ω². */
-BC_API double bc_law_frequency(const bc_law* law);
+typedef struct bc_patch_forces bc_patch_forces;
 
-/* Hold these contacts, asked for at `poses` (one for each body), in any order. Pairs that are left
- * out, or apart, are forgotten. BC_BAD_ARGUMENT, and nothing changes, for a contact without volume
- * and covariance, for a pair that comes twice, and for a normal that cannot be meant. */
-BC_API bc_status bc_law_hold(bc_law* law, const bc_touch* touches, int64_t count,
-                             const bc_pose* poses);
+/* Make the forces of `count` bodies. `options` NULL: BC_DEFAULT_FORCE_OPTIONS. On failure *forces is
+ * NULL. */
+BC_API bc_status bc_patch_forces_create(const bc_body* bodies, int64_t count,
+                                        const bc_force_options* options, bc_patch_forces** forces);
+BC_API bc_status bc_patch_forces_copy(const bc_patch_forces* forces, bc_patch_forces** copy);
+BC_API void bc_patch_forces_destroy(bc_patch_forces* forces);
+BC_API int64_t bc_patch_forces_bodies(const bc_patch_forces* forces); /* how many there are */
 
-/* The wrench on each body at `poses` and `velocities`. Friction follows the way from one call to the
- * next, so call it once a physics step. */
-BC_API bc_status bc_law_wrenches(bc_law* law, const bc_pose* poses, const bc_velocity* velocities,
-                                 bc_wrench* wrenches);
+/* Change masses, add bodies at the end, or drop bodies there with their patches. */
+BC_API bc_status bc_patch_forces_set_bodies(bc_patch_forces* forces, const bc_body* bodies,
+                                            int64_t count);
+/* Forget the patches of one body, which was put elsewhere, or all patches. */
+BC_API bc_status bc_patch_forces_forget(bc_patch_forces* forces, int64_t body);
+BC_API void bc_patch_forces_reset(bc_patch_forces* forces);
+
+/* Take an answer, asked for at `poses` (one for each body). Pairs that are left out are forgotten.
+ * BC_BAD_ARGUMENT, and nothing changes, for a contact without a patch and a pair that comes twice. */
+BC_API bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches* answer,
+                                      const bc_pose* poses);
+
+/* Take a step of `dt` seconds. `outside` are the wrenches beside those of contacts, gravity among
+ * them; NULL: none. `after` are the velocities with which the bodies move during the step;
+ * `wrenches` are those of contacts, constant over the step, that lead to them. Either may be NULL,
+ * and `after` may be `velocities`. */
+BC_API bc_status bc_patch_forces_step(bc_patch_forces* forces, double dt, const bc_pose* poses,
+                                      const bc_velocity* velocities, const bc_wrench* outside,
+                                      bc_velocity* after, bc_wrench* wrenches);
+
+/* Write the state as bytes, for machines of the same byte order, and return how many there are;
+ * nothing is written if `capacity` is less. Make forces of such bytes. */
+BC_API int64_t bc_patch_forces_save(const bc_patch_forces* forces, void* bytes, int64_t capacity);
+BC_API bc_status bc_patch_forces_load(const void* bytes, int64_t count, bc_patch_forces** forces);
 
 #ifdef __cplusplus
 }

@@ -1,125 +1,126 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// From contacts to forces in C++17: one load, or a scene of bodies.
+// From contacts to forces in C++17, by sequential impulses.
 //
-//   box_contact::HeldPatch law({mass, {ix, iy, iz}}, {200.0, 0.002, 0.001});   // Hz, s, s
-//   law.hold(box_contact::collide(load, stack), load.pose);  // when an answer comes
-//   box_contact::Wrench wrench = law.wrench(now, velocity);  // at every physics step
+//   box_contact::PatchForces forces(bodies);
+//   forces.hold(answer, poses);                                     // when an answer comes
+//   forces.step(0.001, poses, velocities, weights, velocities);     // at every physics step
 //
-// force.h says what the law does, and docs/explanation/force.md how. Refused input throws
+// force.h describes the arguments, and docs/explanation/force.md the method. Refused input throws
 // std::invalid_argument that names field and value.
 #ifndef BOX_CONTACT_FORCE_HPP
 #define BOX_CONTACT_FORCE_HPP
 
+#include <cstdint>
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "box_contact.hpp"
 #include "force.h"
 
 namespace box_contact {
 
-using Touch = bc_touch;        // a pair's contact, and the places of its bodies
 using Velocity = bc_velocity;  // of the centre of mass [m/s], [rad/s], common frame
 using Wrench = bc_wrench;      // force [N], and torque [N m] about the centre of mass, common frame
+using Patches = bc_patches;    // an answer
 
 struct Body {
   double mass;        // [kg]; 0: no force moves it
   double inertia[3];  // about the box's own axes, through the centre of mass [kg m²]
   double centre[3] = {0.0, 0.0, 0.0};  // of mass, in the box's own frame [m]
-  bool compound = false;               // of several boxes
 };
 
-struct Loop {
-  double rate = 200.0;    // of questions [1/s]
-  double latency = 0.0;   // from a question to the use of its answer [s]
-  double step = 0.001;    // physics step [s]
-  double friction = 0.5;  // Coulomb's μ
-  double gravity = 9.81;  // [m/s²]
-};
-
-// Bodies that touch each other and boxes that are fixed. A copy has the same patches and friction.
-class SceneLaw {
+// The forces of patches on all bodies. A copy has the same patches and impulses.
+class PatchForces {
  public:
-  SceneLaw(Span<const Body> bodies, const Loop& loop = Loop()) : count_(bodies.size()) {
-    static_assert(sizeof(Body) == sizeof(bc_body), "Body is a bc_body with defaults");
-    bc_loop plain{sizeof(bc_loop), loop.rate,     loop.latency,
-                  loop.step,       loop.friction, loop.gravity};
-    bc_law* made;
-    check(bc_law_create(reinterpret_cast<const bc_body*>(bodies.data()),
-                        std::int64_t(bodies.size()), &plain, &made));
-    law_.reset(made);
+  struct Options {
+    int iterations = 50;    // of sequential impulses in a step, at most
+    int relaxations = 5;    // iterations more, at most, which remove the speed of pushing out
+    double friction = 0.5;  // Coulomb's μ
+  };
+
+  explicit PatchForces(Span<const Body> bodies) : PatchForces(bodies, Options()) {}
+  PatchForces(Span<const Body> bodies, const Options& options) {
+    bc_force_options plain{sizeof(bc_force_options), options.iterations, options.relaxations,
+                           options.friction};
+    bc_patch_forces* made;
+    detail::check(bc_patch_forces_create(plain_of(bodies), std::int64_t(bodies.size()), &plain, &made));
+    forces_.reset(made);
   }
-  SceneLaw(const SceneLaw& other) : count_(other.count_) {
-    bc_law* made;
-    check(bc_law_copy(other.law_.get(), &made));
-    law_.reset(made);
+  PatchForces(const PatchForces& other) {
+    bc_patch_forces* made;
+    detail::check(bc_patch_forces_copy(other.forces_.get(), &made));
+    forces_.reset(made);
   }
-  SceneLaw(SceneLaw&&) = default;
-  SceneLaw& operator=(SceneLaw other) {
-    std::swap(law_, other.law_);
-    count_ = other.count_;
+  PatchForces(PatchForces&&) = default;
+  PatchForces& operator=(PatchForces other) {
+    std::swap(forces_, other.forces_);
     return *this;
   }
 
-  // Hold these contacts, asked for at `poses`; others are forgotten.
-  void hold(Span<const Touch> touches, Span<const Pose> poses) {
+  // Change masses, add bodies at the end, or drop bodies there with their patches.
+  void set_bodies(Span<const Body> bodies) {
+    detail::check(bc_patch_forces_set_bodies(forces_.get(), plain_of(bodies), std::int64_t(bodies.size())));
+  }
+  void forget(std::int64_t body) { detail::check(bc_patch_forces_forget(forces_.get(), body)); }
+  void reset() { bc_patch_forces_reset(forces_.get()); }
+
+  // Take an answer, asked for at `poses`; pairs that are left out are forgotten.
+  void hold(const Patches& answer, Span<const Pose> poses) {
     check_count(poses.size());
-    check(bc_law_hold(law_.get(), touches.data(), std::int64_t(touches.size()), poses.data()));
+    detail::check(bc_patch_forces_hold(forces_.get(), &answer, poses.data()));
   }
 
-  // The wrench on each body; once a physics step.
-  void wrenches(Span<const Pose> poses, Span<const Velocity> velocities, Span<Wrench> found) {
-    check_count(poses.size());
-    check_count(velocities.size());
+  // The velocities during a step of `dt` [s]; `outside` are the wrenches beside those of contacts.
+  void step(double dt, Span<const Pose> poses, Span<const Velocity> velocities,
+            Span<const Wrench> outside, Span<Velocity> after) {
+    check_count(after.size());
+    step(dt, poses, velocities, outside, after.data(), nullptr);
+  }
+  // The wrenches of contacts that lead to them, for a simulator that integrates by itself.
+  void wrenches(double dt, Span<const Pose> poses, Span<const Velocity> velocities,
+                Span<const Wrench> outside, Span<Wrench> found) {
     check_count(found.size());
-    check(bc_law_wrenches(law_.get(), poses.data(), velocities.data(), found.data()));
+    step(dt, poses, velocities, outside, nullptr, found.data());
   }
 
-  void reset() { bc_law_reset(law_.get()); }
-  double frequency() const { return bc_law_frequency(law_.get()); }
+  // The state as bytes, and forces of such bytes.
+  std::vector<char> save() const {
+    std::vector<char> bytes(std::size_t(bc_patch_forces_save(forces_.get(), nullptr, 0)));
+    bc_patch_forces_save(forces_.get(), bytes.data(), std::int64_t(bytes.size()));
+    return bytes;
+  }
+  static PatchForces load(Span<const char> bytes) {
+    bc_patch_forces* made;
+    detail::check(bc_patch_forces_load(bytes.data(), std::int64_t(bytes.size()), &made));
+    return PatchForces(made);
+  }
 
  private:
   struct Destroy {
-    void operator()(bc_law* law) const { bc_law_destroy(law); }
+    void operator()(bc_patch_forces* forces) const { bc_patch_forces_destroy(forces); }
   };
+  explicit PatchForces(bc_patch_forces* forces) : forces_(forces) {}
+  static const bc_body* plain_of(Span<const Body> bodies) {
+    static_assert(sizeof(Body) == sizeof(bc_body), "Body is a bc_body with defaults");
+    return reinterpret_cast<const bc_body*>(bodies.data());
+  }
   void check_count(std::size_t count) const {
-    if (count != count_) detail::raise(BC_BAD_ARGUMENT, "a row is needed for each body");
+    if (std::int64_t(count) != bc_patch_forces_bodies(forces_.get()))
+      detail::raise(BC_BAD_ARGUMENT, "a row is needed for each body");
   }
-  static void check(bc_status status) {
-    if (status != BC_OK) detail::raise(status, bc_error_text());
-  }
-
-  std::unique_ptr<bc_law, Destroy> law_;
-  std::size_t count_;
-};
-
-// One load, and boxes that are fixed. The load is box A of its pairs, or box B where so said.
-class HeldPatch {
- public:
-  enum class Load { a, b };
-
-  HeldPatch(const Body& load, const Loop& loop = Loop()) : law_(Span<const Body>(&load, 1), loop) {}
-
-  void hold(const Contact& contact, const Pose& pose, std::int64_t pair = 0, Load load = Load::a) {
-    bool is_a = load == Load::a;
-    Touch touch{pair, is_a ? 0 : -1, is_a ? -1 : 0, contact, false};
-    law_.hold({&touch, 1}, {&pose, 1});
-  }
-  // Contacts of several pairs; bodies 0 and −1.
-  void hold(Span<const Touch> touches, const Pose& pose) { law_.hold(touches, {&pose, 1}); }
-
-  Wrench wrench(const Pose& pose, const Velocity& velocity) {
-    Wrench found;
-    law_.wrenches({&pose, 1}, {&velocity, 1}, {&found, 1});
-    return found;
+  void step(double dt, Span<const Pose> poses, Span<const Velocity> velocities,
+            Span<const Wrench> outside, Velocity* after, Wrench* found) {
+    check_count(poses.size());
+    check_count(velocities.size());
+    if (outside.size()) check_count(outside.size());
+    detail::check(bc_patch_forces_step(forces_.get(), dt, poses.data(), velocities.data(), outside.data(),
+                               after, found));
   }
 
-  void reset() { law_.reset(); }
-  double frequency() const { return law_.frequency(); }
-
- private:
-  SceneLaw law_;
+  std::unique_ptr<bc_patch_forces, Destroy> forces_;
 };
 
 }  // namespace box_contact

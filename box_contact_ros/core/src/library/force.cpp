@@ -1,134 +1,99 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// The C interface of the force law.
+// The C interface of forces.
 #include <algorithm>
-#include <tuple>
+#include <cstring>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
-#include "../force/patch_law.hpp"
+#include "../force/patch_forces.hpp"
 #include "refusals.hpp"
 
 namespace box_contact::detail {
 namespace {
 
 using force::Body;
-using force::PatchLaw;
+using force::PatchForces;
 
-// Of a load at rest [m]. Beyond it the rate or a time is in another unit, as a period for a rate.
-constexpr double deepest_rest = 1.0;
-
-struct Law {
-  PatchLaw law;
-  std::vector<int64_t> pairs;  // of the contacts that are being checked
-};
-
-Law& law_of(bc_law* law) { return *reinterpret_cast<Law*>(law); }
-const Law& law_of(const bc_law* law) { return *reinterpret_cast<const Law*>(law); }
-
-const double* numbers(const bc_pose& pose) { return reinterpret_cast<const double*>(&pose); }
+PatchForces& forces_of(bc_patch_forces* forces) { return *reinterpret_cast<PatchForces*>(forces); }
+const PatchForces& forces_of(const bc_patch_forces* forces) {
+  return *reinterpret_cast<const PatchForces*>(forces);
+}
+bc_patch_forces* handle(PatchForces* forces) { return reinterpret_cast<bc_patch_forces*>(forces); }
 
 bool is_positive(double number) { return number > 0.0 && number <= largest_number; }
-bool is_finite(const double* numbers, int count) {
-  for (int k = 0; k < count; ++k)
-    if (!(std::fabs(numbers[k]) <= largest_number)) return false;
-  return true;
+bool is_finite(const double* numbers, int64_t count) {
+  return std::all_of(numbers, numbers + count,
+                     [](double number) { return std::fabs(number) <= largest_number; });
+}
+// Rows of numbers of 0 or more, or no rows.
+bool is_amount(const double* numbers, int64_t k) {
+  return !numbers || numbers[k] == 0.0 || is_positive(numbers[k]);
 }
 
-bc_status read_body(const bc_body& given, int64_t place, std::vector<Body>& bodies) {
-  bool moves = given.mass != 0.0;
-  if (moves && !is_positive(given.mass))
-    return fail(BC_BAD_ARGUMENT, "mass of body %lld must be positive, or 0, not %g",
-                (long long)place, given.mass);
-  Body body{
-      moves ? 1.0 / given.mass : 0.0, {0.0, 0.0, 0.0}, force::vector(given.centre), given.compound};
-  for (int k = 0; k < 3; ++k) {
-    if (moves && !is_positive(given.inertia[k]))
-      return fail(BC_BAD_ARGUMENT, "inertia of body %lld must be positive, not %g",
-                  (long long)place, given.inertia[k]);
-    if (moves) body.inverse_inertia[k] = 1.0 / given.inertia[k];
-  }
-  if (!is_finite(given.centre, 3))
-    return fail(BC_BAD_ARGUMENT, "centre of body %lld is not finite", (long long)place);
-  bodies.push_back(body);
-  return BC_OK;
-}
-
-bc_status check_loop(const bc_loop& loop) {
-  struct Number {
-    const char* name;
-    double value;
-    bool may_be_zero;
-  } const numbers[] = {{"rate", loop.rate, false},
-                       {"latency", loop.latency, true},
-                       {"step", loop.step, false},
-                       {"friction", loop.friction, true},
-                       {"gravity", loop.gravity, true}};
-  for (const Number& number : numbers)
-    if (!is_positive(number.value) && !(number.may_be_zero && number.value == 0.0))
-      return fail(BC_BAD_ARGUMENT, "%s must be %s, not %g", number.name,
-                  number.may_be_zero ? "0 or more" : "positive", number.value);
-  return BC_OK;
-}
-
-// Whether the normal can be meant for a body. A plane across the normal bounds the body's box. The
-// contact is at most a depth behind that plane, and the centre of mass is not beyond it.
-bool is_outward(const bc_contact& contact, const Body& body, const bc_pose& pose, double sign) {
-  force::Placed placed = force::placed_at(pose, body.centre);
-  double outward =
-      dot(force::vector(contact.point) - placed.position, force::vector(contact.normal));
-  // Half a depth more, for models whose point is not exact.
-  return body.compound || sign * outward >= 1.5 * contact.separation;
-}
-
-bc_status check_touch(const bc_touch& touch, const std::vector<Body>& bodies,
-                      const bc_pose* poses) {
-  const bc_contact& contact = touch.contact;
-  auto pair = (long long)touch.pair;
-  int64_t count = int64_t(bodies.size());
-  for (int32_t body : {touch.a, touch.b})
-    if (body < -1 || body >= count)
-      return fail(BC_BAD_ARGUMENT, "pair %lld: there is no body %d", pair, int(body));
-  auto is_free = [&](int32_t body) { return body >= 0 && bodies[size_t(body)].is_free(); };
-  if (touch.a >= 0 && touch.a == touch.b)
-    return fail(BC_BAD_ARGUMENT, "pair %lld: both boxes are body %d", pair, int(touch.a));
-  if (!is_free(touch.a) && !is_free(touch.b))
-    return fail(BC_BAD_ARGUMENT, "pair %lld: no force moves either of its two bodies", pair);
-  if (touch.stale || contact.volume == 0.0) return BC_OK;
-  if (!is_positive(contact.volume) || !is_finite(contact.covariance[0], 9))
-    return fail(BC_BAD_ARGUMENT,
-                "pair %lld: the contact has no patch (volume %g), and the law needs volume and "
-                "covariance: ask for both, of model mlp or exact",
-                pair, contact.volume);
-  if (!is_finite(contact.normal, 3) || !is_finite(contact.point, 3) ||
-      !is_finite(&contact.separation, 1))
-    return fail(BC_BAD_ARGUMENT, "pair %lld: normal or point is not finite", pair);
-  for (auto [body, sign, side] : {std::tuple{touch.a, 1.0, 'A'}, {touch.b, -1.0, 'B'}})
-    if (body >= 0 && !is_outward(contact, bodies[size_t(body)], poses[body], sign))
-      return fail(
-          BC_BAD_ARGUMENT,
-          "pair %lld: the normal points %s body %d, which is box %c: say that it is box %c "
-          "(load='%c' for one load; else exchange a and b), or ask for the contact with the boxes "
-          "in the other order",
-          pair, side == 'A' ? "into" : "out of", int(body), side, side == 'A' ? 'B' : 'A',
-          side == 'A' ? 'b' : 'a');
-  return BC_OK;
-}
-
-bc_status check_touches(Law& self, const bc_touch* touches, int64_t count, const bc_pose* poses) {
-  const std::vector<Body>& bodies = self.law.bodies();
-  for (size_t k = 0; k < bodies.size(); ++k)
-    if (!pose_is_valid(numbers(poses[k]))) return refuse_pose("a body's", numbers(poses[k]));
-  self.pairs.clear();
+bc_status read_bodies(const bc_body* given, int64_t count, std::vector<Body>& bodies) {
+  if (!given && count > 0) return refuse_null("bodies");
+  if (count < 0 || count > INT32_MAX) return fail(BC_BAD_ARGUMENT, "count is no number of bodies");
+  bodies.reserve(size_t(count));
   for (int64_t k = 0; k < count; ++k) {
-    if (bc_status status = check_touch(touches[k], bodies, poses)) return status;
-    self.pairs.push_back(touches[k].pair);
+    bool moves = given[k].mass != 0.0;
+    if (moves && !is_positive(given[k].mass))
+      return fail(BC_BAD_ARGUMENT, "mass of body %lld must be positive, or 0, not %g", (long long)k,
+                  given[k].mass);
+    if (!is_finite(given[k].centre, 3))
+      return fail(BC_BAD_ARGUMENT, "centre of body %lld is not finite", (long long)k);
+    Body body{moves ? 1.0 / given[k].mass : 0.0, {0.0, 0.0, 0.0}, force::vector(given[k].centre)};
+    for (int i = 0; i < 3 && moves; ++i) {
+      if (!is_positive(given[k].inertia[i]))
+        return fail(BC_BAD_ARGUMENT, "inertia of body %lld must be positive, not %g", (long long)k,
+                    given[k].inertia[i]);
+      body.inverse_inertia[i] = 1.0 / given[k].inertia[i];
+    }
+    bodies.push_back(body);
   }
-  std::sort(self.pairs.begin(), self.pairs.end());
-  auto twice = std::adjacent_find(self.pairs.begin(), self.pairs.end());
-  if (twice != self.pairs.end())
-    return fail(BC_BAD_ARGUMENT, "pair %lld comes twice", (long long)*twice);
+  return BC_OK;
+}
+
+constexpr int64_t state_format = 0x3146504342;  // "BCPF1"
+
+int64_t state_size(const PatchForces& forces) {
+  size_t size = 0;
+  PatchForces::visit_state(
+      forces, [&size](const auto* values, size_t count) { size += count * sizeof *values; });
+  return int64_t(size);
+}
+
+bc_status check_poses(size_t count, const bc_pose* poses) {
+  for (size_t k = 0; k < count; ++k) {
+    auto* numbers = reinterpret_cast<const double*>(poses + k);
+    if (!pose_is_valid(numbers)) return refuse_pose("a body's", numbers);
+  }
+  return BC_OK;
+}
+
+bc_status check_row(const bc_patches& answer, int64_t k, int64_t count) {
+  auto pair = (long long)k;
+  const int64_t* bodies = answer.pairs + 2 * k;
+  for (int side = 0; side < 2; ++side)
+    if (bodies[side] < 0 || bodies[side] >= count)
+      return fail(BC_BAD_ARGUMENT, "pairs[%lld]: there is no body %lld", pair,
+                  (long long)bodies[side]);
+  if (bodies[0] == bodies[1])
+    return fail(BC_BAD_ARGUMENT, "pairs[%lld]: both boxes are body %lld", pair,
+                (long long)bodies[0]);
+  if (!is_amount(answer.friction, k) || !is_amount(answer.stiffness, k) ||
+      (answer.surface && !is_finite(answer.surface + 3 * k, 3)))
+    return fail(BC_BAD_ARGUMENT,
+                "pairs[%lld]: friction and stiffness must be 0 or more, and surface finite", pair);
+  if (answer.separation[k] != answer.separation[k] || answer.volume[k] == 0.0) return BC_OK;
+  if (!is_positive(answer.volume[k]) || !is_finite(answer.covariance + 9 * k, 9) ||
+      !is_finite(answer.normal + 3 * k, 3) || !is_finite(answer.point + 3 * k, 3))
+    return fail(BC_BAD_ARGUMENT,
+                "pairs[%lld]: the contact has no patch (volume %g): volume and covariance are "
+                "needed, as models mlp and exact give them",
+                pair, answer.volume[k]);
   return BC_OK;
 }
 
@@ -139,72 +104,151 @@ using namespace box_contact::detail;
 
 extern "C" {
 
-bc_status bc_law_create(const bc_body* bodies, int64_t count, const bc_loop* loop, bc_law** law) {
+bc_status bc_patch_forces_create(const bc_body* bodies, int64_t count,
+                                 const bc_force_options* options, bc_patch_forces** forces) {
   return guarded([&] {
-    if (!law) return refuse_null("law");
-    *law = nullptr;
-    if (!bodies) return refuse_null("bodies");
-    bc_loop all = BC_DEFAULT_LOOP;
-    if (loop && !read(loop, all)) return fail(BC_BAD_ABI, "loop.size is unknown");
-    if (count < 1) return fail(BC_BAD_ARGUMENT, "count must be 1 or more");
-    if (bc_status status = check_loop(all)) return status;
-    LawConstants constants = constants_for(all);
-    double rest = all.gravity / (constants.frequency * constants.frequency);
-    if (rest > deepest_rest)
-      return fail(BC_BAD_ARGUMENT,
-                  "with rate %g 1/s, latency %g s and step %g s a load would rest %g m deep",
-                  all.rate, all.latency, all.step, rest);
+    if (!forces) return refuse_null("forces");
+    *forces = nullptr;
+    bc_force_options all = BC_DEFAULT_FORCE_OPTIONS;
+    if (options && !read(options, all)) return fail(BC_BAD_ABI, "options.size is unknown");
+    if (all.iterations < 1 || all.relaxations < 0)
+      return fail(BC_BAD_ARGUMENT, "iterations must be 1 or more, and relaxations 0 or more");
+    if (!is_amount(&all.friction, 0))
+      return fail(BC_BAD_ARGUMENT, "friction must be 0 or more, not %g", all.friction);
     std::vector<Body> read;
-    for (int64_t place = 0; place < count; ++place)
-      if (bc_status status = read_body(bodies[place], place, read)) return status;
-    *law = reinterpret_cast<bc_law*>(new Law{{std::move(read), constants}, {}});
+    if (bc_status status = read_bodies(bodies, count, read)) return status;
+    *forces = handle(
+        new PatchForces(std::move(read), {all.iterations, all.relaxations, all.friction}));
     return BC_OK;
   });
 }
 
-bc_status bc_law_copy(const bc_law* law, bc_law** copy) {
+bc_status bc_patch_forces_copy(const bc_patch_forces* forces, bc_patch_forces** copy) {
   return guarded([&] {
     if (!copy) return refuse_null("copy");
     *copy = nullptr;
-    if (!law) return refuse_null("law");
-    *copy = reinterpret_cast<bc_law*>(new Law(law_of(law)));
+    if (!forces) return refuse_null("forces");
+    *copy = handle(new PatchForces(forces_of(forces)));
     return BC_OK;
   });
 }
 
-void bc_law_destroy(bc_law* law) { delete reinterpret_cast<Law*>(law); }
-
-void bc_law_reset(bc_law* law) {
-  if (law) law_of(law).law.reset();
+void bc_patch_forces_destroy(bc_patch_forces* forces) {
+  delete reinterpret_cast<PatchForces*>(forces);
 }
 
-double bc_law_frequency(const bc_law* law) {
-  return law ? law_of(law).law.constants().frequency : 0.0;
+int64_t bc_patch_forces_bodies(const bc_patch_forces* forces) {
+  return forces ? int64_t(forces_of(forces).bodies().size()) : 0;
 }
 
-bc_status bc_law_hold(bc_law* law, const bc_touch* touches, int64_t count, const bc_pose* poses) {
+bc_status bc_patch_forces_set_bodies(bc_patch_forces* forces, const bc_body* bodies,
+                                     int64_t count) {
   return guarded([&] {
-    if (!law || !poses || (!touches && count > 0))
-      return refuse_null(!law ? "law" : !poses ? "poses" : "touches");
-    if (count < 0) return fail(BC_BAD_ARGUMENT, "count is below zero");
-    if (bc_status status = check_touches(law_of(law), touches, count, poses)) return status;
-    law_of(law).law.hold(touches, count, poses);
+    if (!forces) return refuse_null("forces");
+    std::vector<Body> read;
+    if (bc_status status = read_bodies(bodies, count, read)) return status;
+    forces_of(forces).set_bodies(std::move(read));
     return BC_OK;
   });
 }
 
-bc_status bc_law_wrenches(bc_law* law, const bc_pose* poses, const bc_velocity* velocities,
-                          bc_wrench* wrenches) {
+bc_status bc_patch_forces_forget(bc_patch_forces* forces, int64_t body) {
   return guarded([&] {
-    if (!law || !poses || !velocities || !wrenches)
-      return refuse_null(!law ? "law" : !poses ? "poses" : !velocities ? "velocities" : "wrenches");
-    size_t bodies = law_of(law).law.bodies().size();
+    if (!forces) return refuse_null("forces");
+    if (body < 0 || size_t(body) >= forces_of(forces).bodies().size())
+      return fail(BC_BAD_ARGUMENT, "there is no body %lld", (long long)body);
+    forces_of(forces).forget(int32_t(body));
+    return BC_OK;
+  });
+}
+
+void bc_patch_forces_reset(bc_patch_forces* forces) {
+  if (forces) forces_of(forces).reset();
+}
+
+bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches* answer,
+                               const bc_pose* poses) {
+  return guarded([&] {
+    if (!forces || !answer || !poses)
+      return refuse_null(!forces ? "forces" : !answer ? "answer" : "poses");
+    bc_patches all{};
+    if (!read(answer, all)) return fail(BC_BAD_ABI, "answer.size is unknown");
+    if (all.count < 0) return fail(BC_BAD_ARGUMENT, "count is below zero");
+    if (!is_amount(&all.age, 0) || !is_amount(&all.period, 0))
+      return fail(BC_BAD_ARGUMENT, "age and period must be 0 or more, not %g and %g", all.age,
+                  all.period);
+    if (all.count > 0 && !(all.pairs && all.separation && all.normal && all.point && all.volume &&
+                           all.covariance))
+      return refuse_null("an array of the answer");
+    size_t bodies = forces_of(forces).bodies().size();
+    if (bc_status status = check_poses(bodies, poses)) return status;
+    for (int64_t k = 0; k < all.count; ++k)
+      if (bc_status status = check_row(all, k, int64_t(bodies))) return status;
+    if (!forces_of(forces).hold(all, poses))
+      return fail(BC_BAD_ARGUMENT, "a pair of bodies comes twice");
+    return BC_OK;
+  });
+}
+
+bc_status bc_patch_forces_step(bc_patch_forces* forces, double dt, const bc_pose* poses,
+                               const bc_velocity* velocities, const bc_wrench* outside,
+                               bc_velocity* after, bc_wrench* wrenches) {
+  return guarded([&] {
+    if (!forces || !poses || !velocities)
+      return refuse_null(!forces ? "forces" : !poses ? "poses" : "velocities");
+    if (!is_positive(dt)) return fail(BC_BAD_ARGUMENT, "dt must be positive, not %g", dt);
+    size_t bodies = forces_of(forces).bodies().size();
+    if (bc_status status = check_poses(bodies, poses)) return status;
     for (size_t k = 0; k < bodies; ++k) {
-      if (!pose_is_valid(numbers(poses[k]))) return refuse_pose("a body's", numbers(poses[k]));
       if (!is_finite(velocities[k].linear, 3) || !is_finite(velocities[k].angular, 3))
         return fail(BC_BAD_ARGUMENT, "velocity of body %zu is not finite", k);
+      if (outside && (!is_finite(outside[k].force, 3) || !is_finite(outside[k].torque, 3)))
+        return fail(BC_BAD_ARGUMENT, "wrench of body %zu is not finite", k);
     }
-    law_of(law).law.wrenches(poses, velocities, wrenches);
+    forces_of(forces).step(dt, poses, velocities, outside, after, wrenches);
+    return BC_OK;
+  });
+}
+
+int64_t bc_patch_forces_save(const bc_patch_forces* forces, void* bytes, int64_t capacity) {
+  if (!forces) return 0;
+  const PatchForces& self = forces_of(forces);
+  const int64_t head[] = {state_format, int64_t(self.bodies().size()), int64_t(self.patch_count())};
+  auto size = int64_t(sizeof head) + state_size(self);
+  if (!bytes || capacity < size) return size;
+  auto* at = static_cast<char*>(bytes);
+  std::memcpy(at, head, sizeof head);
+  at += sizeof head;
+  PatchForces::visit_state(self, [&at](const auto* values, size_t count) {
+    static_assert(std::is_trivially_copyable_v<std::remove_pointer_t<decltype(values)>>);
+    if (count > 0) std::memcpy(at, values, count * sizeof *values);
+    at += count * sizeof *values;
+  });
+  return size;
+}
+
+bc_status bc_patch_forces_load(const void* bytes, int64_t count, bc_patch_forces** forces) {
+  return guarded([&] {
+    if (!forces) return refuse_null("forces");
+    *forces = nullptr;
+    if (!bytes) return refuse_null("bytes");
+    int64_t head[3] = {};
+    auto* at = static_cast<const char*>(bytes);
+    if (count >= int64_t(sizeof head)) std::memcpy(head, at, sizeof head);
+    at += sizeof head;
+    // Each body and each patch takes bytes, so no more of them than bytes are made room for.
+    bool fits = head[0] == state_format && 0 <= head[1] && head[1] <= count && 0 <= head[2] &&
+                head[2] <= count;
+    PatchForces loaded({}, {1, 0, 0.0});
+    if (fits) loaded.make_room(size_t(head[1]), size_t(head[2]));
+    if (!fits || int64_t(sizeof head) + state_size(loaded) != count)
+      return fail(BC_BAD_ARGUMENT, "the bytes are no state of this version");
+    PatchForces::visit_state(loaded, [&at](auto* values, size_t rows) {
+      if (rows > 0) std::memcpy(static_cast<void*>(values), at, rows * sizeof *values);
+      at += rows * sizeof *values;
+    });
+    if (!loaded.is_sound()) return fail(BC_BAD_ARGUMENT, "the bytes are damaged");
+    *forces = handle(new PatchForces(std::move(loaded)));
     return BC_OK;
   });
 }

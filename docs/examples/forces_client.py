@@ -1,0 +1,62 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Make forces of what a contact node sends: `python docs/examples/forces_client.py`.
+
+Start `box_contact_contact_node` first. The client asks 200 times a second, and its answers come 2
+ms late. `PatchForces` takes each answer with the poses that it was asked for. At every physics step
+it then gives the velocities.
+
+It prints:
+
+    50 ms: -6.99 mm deep, 583.4 mm/s
+    100 ms: 0.06 mm deep, 178.7 mm/s
+    200 ms: 0.05 mm deep, 1.8 mm/s
+    500 ms: 0.05 mm deep, 0.0 mm/s
+    2000 ms: 0.05 mm deep, 0.0 mm/s
+    force / weight 1.0000, slid 30 mm
+"""
+import numpy as np
+import rclpy
+from lockstep_client import LockstepClient
+
+from box_contact_ros import Body, Contacts, PatchForces
+from box_contact_ros.node.messages import contacts_by_pair
+
+SIZE, MASS = (12.192, 2.438, 2.591), 20_000.0  # a 40 ft container [m], [kg]
+STEP_MS, PERIOD_MS, LATENCY_MS = 1, 5, 2
+GRAVITY = 9.81  # [m/s²]
+WIDE = 1e12  # inertia of a load that guides keep from turning [kg m²]
+
+
+def main() -> None:
+    """Set a container down from 20 mm at 0.3 m/s to the side. Guides keep it from turning."""
+    rclpy.init()
+    client = LockstepClient()
+    client.wait_for_node()
+    places = {'box_a': 0, 'box_b': 1}  # of the bodies, by the names of their boxes
+    forces = PatchForces([Body(mass=MASS, inertia=[WIDE] * 3),
+                          Body(mass=0.0, inertia=np.zeros(3))])
+    poses = np.array([[0.0, 0.0, 2.611, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
+    velocities, weights = np.zeros((2, 6)), np.zeros((2, 6))
+    velocities[0, 0], weights[0, 2] = 0.3, -GRAVITY * MASS
+    for time in range(0, 2001, STEP_MS):
+        if time % PERIOD_MS == 0:
+            asked, contacts = poses.copy(), contacts_by_pair(
+                client.ask(time * 1_000_000, *poses))
+        if time % PERIOD_MS == LATENCY_MS:
+            pairs = [[places['box_a'], places['box_b']] for _ in contacts]
+            forces.hold(np.reshape(pairs, (-1, 2)), Contacts.of(contacts.values()), asked,
+                        age=1e-3 * LATENCY_MS, period=1e-3 * PERIOD_MS)
+        velocities = forces.step(1e-3 * STEP_MS, poses, velocities, weights)
+        poses[:, :3] += 1e-3 * STEP_MS * velocities[:, :3]
+        if time in (50, 100, 200, 500, 2000):
+            print(f'{time} ms: {1e3 * (2.591 - poses[0, 2]):.2f} mm deep, '
+                  f'{1e3 * np.linalg.norm(velocities):.1f} mm/s')
+    wrench = forces.wrenches(1e-3 * STEP_MS, poses, velocities, weights)[0]
+    print(f'force / weight {wrench[2] / (GRAVITY * MASS):.4f}, slid {1e3 * poses[0, 0]:.0f} mm')
+    rclpy.shutdown()
+
+
+if __name__ == '__main__':
+    main()
