@@ -12,7 +12,7 @@ import poses
 import pytest
 from poses import Pairs
 
-from box_contact_ros.core import BRACKET_LIMIT, LENGTH_MAX, LENGTH_MIN, native
+from box_contact_ros.core import LENGTH_MAX, LENGTH_MIN, native
 from box_contact_ros.solver.contact import Contacts
 
 UNIT = (1.0, 1.0, 1.0)
@@ -30,10 +30,12 @@ def solver(model: str, rng: np.random.Generator) -> native.PairSolver:
     """Return a solver with random weights of up to 1 or 1e4, one in eight of them zero."""
     if model == 'exact':
         return native.PairSolver('exact', UNIT, UNIT)
-    most = rng.choice([1.0, 1e4])
-    network = rng.uniform(-most, most, 1 + (native.FEATURES + 2) * rng.integers(0, 9))
-    network[rng.random(len(network)) < 1 / 8] = 0.0
-    return native.PairSolver('mlp', UNIT, UNIT, network.astype(np.float32))
+    most, (first, second) = rng.choice([1.0, 1e4]), rng.integers(1, 4, 2)
+    numbers = rng.uniform(-most, most, 8 * (
+        first * (1 + native.FEATURES) + second * (1 + 8 * first) + 1 + 8 * second))
+    numbers[rng.random(len(numbers)) < 1 / 8] = 0.0
+    network = np.concatenate([[first, second], numbers]).astype(np.float32)
+    return native.PairSolver('mlp', UNIT, UNIT, network)
 
 
 def accepted(pairs: Pairs) -> np.ndarray:
@@ -104,19 +106,16 @@ def test_a_row_is_its_single_call(model: str) -> None:
 
 
 @pytest.mark.parametrize('seed', range(8))
-def test_volumes_are_within_their_brackets(seed: int) -> None:
-    """Of the contacts that `mlp` does not leave to `exact`; no eigenvalue is below zero."""
+def test_mlp_is_sound(seed: int) -> None:
+    """Volumes are above zero, and no eigenvalue is below."""
     rng = np.random.default_rng([23, seed])
     pairs = poses.extreme_pairs(rng, N)
     pairs = Pairs(*(part[accepted(pairs)] for part in pairs))
-    truth, found = (Contacts(*solver(model, rng).solve(*pairs, 1)[0]) for model in ('exact', 'mlp'))
-    rows = truth.colliding & (found.volume != truth.volume)
-    assert rows.mean() > 0.1
+    found = Contacts(*solver('mlp', rng).solve(*pairs, 1)[0])
+    rows = found.colliding
+    assert rows.mean() > 0.1 and np.isfinite(found.point[rows]).all()
     assert (found.volume[rows] > 0.0).all()
     covariance = found.covariance[rows]
     scaled = covariance / np.trace(covariance, axis1=1, axis2=2)[:, None, None]
     assert np.array_equal(scaled, scaled.transpose(0, 2, 1))
     assert np.linalg.eigvalsh(scaled)[:, 0].min() >= -1e-14
-    rows &= truth.separation <= -SLIVER * np.hstack(pairs[2:]).max(axis=1)
-    off = np.abs(found.volume - truth.volume)
-    assert np.all((off <= BRACKET_LIMIT * found.volume + FLOAT32 * truth.volume)[rows])

@@ -68,7 +68,7 @@ using Mask = decltype(T() < T());
 // The same number in every lane.
 template <class T>
 BC_INLINE T splat(Number<T> x) {
-  return T{} + x;
+  return x - T{};  // no instruction, while −0 + 0 is one
 }
 
 template <class T>
