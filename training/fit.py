@@ -55,8 +55,10 @@ class PatchNetwork(torch.nn.Module):
                               1.0 + size.clamp(0.0, MOST_EXPONENT))
         place = (0.5 + 0.5 * samples.mean).clamp(max=1.0 - LEAST_MARGIN)
         odds = place * factors[:, :3]
-        deviations = factors[:, 4:]
-        return (2.0 * odds / (odds + 1.0 - place) - 1.0, samples.volume * factors[:, 3],
+        most = torch.diagonal(samples.covariance, dim1=1, dim2=2).rsqrt()
+        deviations = torch.minimum(factors[:, 4:], most)
+        return (2.0 * odds / (odds + 1.0 - place) - 1.0,
+                (samples.volume * factors[:, 3]).clamp(max=1.0),
                 samples.covariance * deviations[:, :, None] * deviations[:, None, :])
 
     def layers(self) -> Layers:

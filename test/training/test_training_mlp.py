@@ -69,10 +69,8 @@ def test_errors_are_those_of_the_core(pairs: Pairs, tmp_path: Path, hidden: tupl
     with torch.no_grad():
         errors = errors_of(network, tensors(data))
     assert np.median(expected.volume) > 10.0
-    held = data.true_volume > 1e-3  # what the core caps at the bounds, the fit does not
     for of_fit, of_core in zip(errors, expected):
-        close = np.isclose(100.0 * of_fit.numpy(), of_core, rtol=1e-3, atol=1e-3)
-        assert close[held].mean() > 0.95
+        np.testing.assert_allclose(100.0 * of_fit.numpy(), of_core, rtol=5e-3, atol=0.02)
 
 
 def test_the_fit_lowers_the_loss_and_follows_the_seed(data: MlpSamples) -> None:
