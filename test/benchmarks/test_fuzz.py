@@ -69,9 +69,10 @@ needle a thousand-millionth as wide as it is long."""
 def test_found_poses_have_no_variance_below_zero():
     size_a, size_b, pose_a, pose_b = (np.array(column) for column in zip(*FOUND))
     pairs = Pairs(pose_a, pose_b, size_a, size_b)
-    found = pairs.contacts(ContactSolver((1, 1, 1), (1, 1, 1)))
-    assert found.colliding.all()
-    assert not patches.patch_faults(pairs, found).any()
+    for model in ('exact', 'mlp'):
+        found = pairs.contacts(ContactSolver((1, 1, 1), (1, 1, 1), model=model))
+        assert found.colliding.all()
+        assert not patches.patch_faults(pairs, found).any()
     assert not patches.mlp_faults(pairs, found).any()
 
 
