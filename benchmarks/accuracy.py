@@ -110,14 +110,13 @@ class AccuracyRow:
     set: str
     errors: Mapping[str, Mapping[str, Summary]]  # by field of `ContactErrors`, then by part
     pairs: int
-    fallback_share: float  # share of contacts answered by `exact`
     outside: float  # farthest point outside a box, of the size
 
 
 def measure(model: Contestant, name: str, pairs: Pairs, truth: Contacts) -> AccuracyRow | None:
     """Measure a model on a set; None where the model is not for its sizes."""
     try:
-        contacts, fallbacks = model.solve(pairs)
+        contacts, _ = model.solve(pairs)
     except ValueError:
         if model.any_boxes:
             raise
@@ -131,7 +130,6 @@ def measure(model: Contestant, name: str, pairs: Pairs, truth: Contacts) -> Accu
         model=model.name, set=name, pairs=len(both),
         errors={quantity: by_part(values, classes, winners) for quantity, values
                 in errors._asdict().items() if np.isfinite(values).all()},
-        fallback_share=fallbacks / max(1, int(contacts.colliding.sum())),
         outside=outside(pairs, contacts))
 
 
@@ -150,7 +148,7 @@ def measure_all(models: Sequence[Contestant], count: int, seed: int) -> list[Acc
 def error_table(rows: Sequence[AccuracyRow]) -> str:
     """Return mean/p99/worst of each quantity over whole sets.
 
-    Then come the share of contacts left to `exact`, and the farthest point outside a box.
+    Then comes the farthest point outside a box.
     """
     def cell(row: AccuracyRow, quantity: str) -> str:
         if quantity not in row.errors:
@@ -159,10 +157,10 @@ def error_table(rows: Sequence[AccuracyRow]) -> str:
         return f'{errors.mean:.2g} / {errors.p99:.2g} / {errors.worst:.2g}'
 
     lines = [[f'{r.model}, {r.set}', *(cell(r, name) for name in ContactErrors._fields),
-              f'{100.0 * r.fallback_share:.3g} %', f'{r.outside:.1g}']
+              f'{r.outside:.1g}']
              for r in rows]
     return markdown_table(['model, set', 'point', 'volume', 'covariance', 'in-plane eigenvalues',
-                           'left to exact', 'outside'], lines)
+                           'outside'], lines)
 
 
 def class_table(rows: Sequence[AccuracyRow]) -> str:
@@ -190,7 +188,7 @@ def csv_rows(rows: Sequence[AccuracyRow]) -> Iterator[dict[str, object]]:
                 line = {'model': row.model, 'set': row.set, 'part': part, 'quantity': quantity,
                         **errors._asdict()}
                 if part == 'all' and quantity == 'point':
-                    line |= {'fallback_share': row.fallback_share, 'outside': row.outside}
+                    line |= {'outside': row.outside}
                 yield line
 
 

@@ -39,11 +39,11 @@ FAR_BEHIND, MOSTLY_ROUNDING = 1e-9, 1e-6
 of the size. Its edges must cross at a larger sine than the second, or its direction is noise."""
 
 (MISSED, PHANTOM, TOO_DEEP, TOO_SHALLOW, WRONG_AXIS, NOT_UNIT, OUTSIDE, NOT_FINITE, NEGATIVE,
- OUT_OF_BRACKETS) = (1 << k for k in range(10))
+ OUT_OF_BOUNDS) = (1 << k for k in range(10))
 GATES = {MISSED: 'missed contact', PHANTOM: 'phantom contact', TOO_DEEP: 'too deep',
          TOO_SHALLOW: 'too shallow', WRONG_AXIS: 'wrong axis', NOT_UNIT: 'normal not unit',
          OUTSIDE: 'point outside', NOT_FINITE: 'NaN', NEGATIVE: 'negative eigenvalue',
-         OUT_OF_BRACKETS: 'volume outside its brackets'}
+         OUT_OF_BOUNDS: 'outside the bounds of the overlap'}
 """Faults by bit. `judge` returns sums of them; the last two are those of `patches`."""
 BY_GAP = MISSED | PHANTOM | TOO_DEEP | TOO_SHALLOW | WRONG_AXIS  # what the true gap decides
 PIECE = 2048  # pairs that are judged at a time: their corners fit a processor's caches

@@ -3,18 +3,17 @@
 
 """Faults of volumes and covariances, for the fuzz.
 
-Model `mlp` takes off the columns what upper faces cut off them, and knows that volume within
-brackets (core/src/mlp/mlp_model.hpp). Its volume and the exact one have to be between them, and the
-brackets close together. Pairs that it has left to `exact` have the volume of `exact`, to the bit.
+The point of model `mlp` is within the bounds of the overlap, and its volume is at most theirs.
+These bounds are the patch box (core/src/mlp/patch_box.hpp).
 """
 from __future__ import annotations
 
 import numpy as np
 
-from box_contact_ros.core import BRACKET_LIMIT, DEPTH_FLOOR, stages
+from box_contact_ros.core import DEPTH_FLOOR, stages
 from box_contact_ros.solver.contact import Contacts
 
-from .judge import NEGATIVE, NOT_FINITE, OUT_OF_BRACKETS
+from .judge import NEGATIVE, NOT_FINITE, OUT_OF_BOUNDS
 from .pose_sets import Pairs
 
 SMOOTH = 2.0**-46
@@ -22,10 +21,8 @@ SMOOTH = 2.0**-46
 EXACT = 1e-9
 """The same of `exact`, whose sums cancel; or SLIVER times size by depth, if that is more."""
 SLIVER = 1e-15
-SINGLE, DOUBLE = 5e-4, 2.0**-39
-"""How far beyond a bracket a volume may be [of itself]. The first is what float32 may cost: of 7.6
-million contacts one was off by 3.6e-4, and no other by more than 2e-4. The second, times size by
-depth, is what rounded poses cost slivers."""
+OUTSIDE = 2.0**-43
+"""How far a point may be outside the bounds, of the size and the coordinates: roundings."""
 
 
 def patch_faults(pairs: Pairs, found: Contacts) -> np.ndarray:
@@ -44,20 +41,15 @@ def patch_faults(pairs: Pairs, found: Contacts) -> np.ndarray:
 
 
 def mlp_faults(pairs: Pairs, found: Contacts) -> np.ndarray:
-    """Return sums (n,) of the faults of those patches that `mlp` has found itself."""
-    truth = pairs.contacts()
-    rows = np.flatnonzero(found.colliding & truth.colliding & (found.volume != truth.volume))
-    of = stages(*pairs.rows(rows), names=(
-        'true_volume', 'columns_volume', 'upper_volume', 'upper_least', 'upper_most'))
-    least, most = (of.columns_volume - (of.upper_volume.astype(np.float64) * share).sum(axis=1)
-                   for share in (of.upper_most, of.upper_least))
-    volume = of.true_volume * (found.volume[rows] / truth.volume[rows])
-    slack = (SINGLE + DOUBLE * _size_by_depth(pairs, found, rows)) * of.true_volume
-    within = (np.minimum(volume, of.true_volume) >= least - slack) & (
-        np.maximum(volume, of.true_volume) <= most + slack)
-    close = most - least <= BRACKET_LIMIT * volume + slack
+    """Return sums (n,) of the faults of the patches of `mlp`."""
+    rows = np.flatnonzero(found.colliding)
+    box = stages(*pairs.rows(rows), names=('patch_axes', 'patch_middle', 'patch_half'))
+    off = np.abs(np.einsum('nji,nj->ni', box.patch_axes, found.point[rows] - box.patch_middle))
+    reach = pairs.size[rows] + np.abs(found.point[rows]).max(axis=1)
+    within = np.all(off <= box.patch_half + OUTSIDE * reach[:, None], axis=1)
+    within &= found.volume[rows] <= (1.0 + OUTSIDE) * np.prod(2.0 * box.patch_half, axis=1)
     faults = np.zeros(len(found.colliding), dtype=np.int64)
-    faults[rows] = (np.where(within & close, 0, OUT_OF_BRACKETS)
+    faults[rows] = (np.where(within, 0, OUT_OF_BOUNDS)
                     | np.where(_least(found, rows) >= -SMOOTH, 0, NEGATIVE))
     return faults
 

@@ -3,16 +3,10 @@
 
 """Make the data, fit the networks, write the weights files with their model cards.
 
-Measured on a machine with two cores, of which a training uses one:
-  mlp               any two boxes                                  5 minutes
-  paper             two boxes of edge 2, with discontinuities      2 minutes
-  containers        two boxes of 12.192 x 2.438 x 2.591 m          2 minutes
-  paper-continuous  without discontinuities, a network per subset  8 minutes
-  paper-committee   a classifier, and a network for each class     7 minutes
-  table-1-...       each of the three columns of Table 1, 5 seeds  5 minutes
-  table-2-by-signs  without discontinuities, by signs of angles   10 minutes
-
-The first three are shipped with the package. The others are for the tables of benchmarks.paper.
+mlp                      any two boxes; the default
+paper                    two boxes of edge 2 that just touch, as the paper draws them
+paper --scene NAME       two equal boxes in the poses of a scene
+paper-…, table-1-…       what only the tables of benchmarks.paper need
 """
 from __future__ import annotations
 
@@ -28,13 +22,14 @@ import torch
 from benchmarks.arguments import report_parser
 from benchmarks.output import QUICK_RESULTS, make_folder
 from benchmarks.paper import jobs
+from box_contact_ros.core import UNITS_MAX
 from box_contact_ros.solver.arguments import within
-from box_contact_ros.solver.mlp import NETWORK, UNITS_MAX
+from box_contact_ros.solver.mlp import NETWORK
 from box_contact_ros.solver.weights_file import load_weights
 
-from . import recipe
+from . import paper, recipe
 
-MLP = 'mlp'
+MLP, PAPER = 'mlp', 'paper'
 NAMES = (MLP, *jobs.JOBS)
 SHIPPED_HEADER = Path(__file__).parents[1].joinpath(
     'box_contact_ros', 'core', 'src', 'mlp', 'shipped_network.hpp')
@@ -46,14 +41,21 @@ QUICK_COUNTS, QUICK_STARTS, QUICK_EPOCHS = (1000, 500, 2000), 3, 70
 def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser = report_parser('python -m training', __doc__, seed=1,
                            quick='small sets and few epochs, to try it out in seconds')
-    parser.add_argument('what', nargs='+', choices=(*NAMES, 'all'), metavar='WHAT',
-                        help=f'{", ".join(NAMES)}, or all')
-    parser.add_argument('--hidden', type=within(1, UNITS_MAX), metavar='UNITS', help='units of the '
-                        f'hidden layer of mlp (default: {recipe.HIDDEN}), named in the file')
+    parser.add_argument('what', nargs='*', choices=(*NAMES, []), metavar='WHAT',
+                        help=', '.join(NAMES))
+    parser.add_argument('--hidden', type=within(1, UNITS_MAX), nargs=2, metavar='UNITS',
+                        help=f'units of the hidden layers of mlp (default: {recipe.HIDDEN[0]} '
+                        f'{recipe.HIDDEN[1]}), named in the file')
+    parser.add_argument('--scene', choices=paper.SCENES, help='pose set that paper is trained for')
+    parser.add_argument('--output', choices=tuple(paper.SETTINGS), default=paper.ANGLES,
+                        help='of paper --scene: four angles, or x, y and z of the point')
     parser.add_argument('--out', type=Path, metavar='DIR',
                         help='folder to write to (default: weights/, benchmarks/paper/weights/ for '
                         'what the tables alone need, and quick-results/ with --quick)')
     options = parser.parse_args(args)
+    options.what = options.what or [MLP]
+    if options.scene and options.what != [PAPER]:
+        parser.error(f'--scene is of {PAPER} alone')
     if options.quick and options.out is None:
         options.out = QUICK_RESULTS
     if options.out is not None:
@@ -71,15 +73,23 @@ def _commit() -> str:
 
 
 def _train_mlp(options: argparse.Namespace) -> None:
-    name = f'{MLP}-{options.hidden}' if options.hidden else MLP
+    hidden = tuple(options.hidden or recipe.HIDDEN)
+    name = '-'.join((MLP, *map(str, options.hidden or ())))
     path = (options.out or jobs.SHIPPED) / f'{name}.safetensors'
     card = recipe.train(path, seed=options.seed, commit=_commit(), quick=options.quick,
-                        hidden=options.hidden or recipe.HIDDEN)
+                        hidden=hidden)
     print(f'{path}, {card["training"]["minutes"]} min\n{recipe.metrics_table(card)}')
     if name == MLP and options.out is None:
         network = load_weights(path).networks[NETWORK]
         SHIPPED_HEADER.write_text(recipe.header(network.layers), encoding='utf-8')
         print(f'{SHIPPED_HEADER}: build the library anew')
+
+
+def _train_scene(options: argparse.Namespace) -> None:
+    quick = {'counts': QUICK_COUNTS, 'networks': QUICK_STARTS, 'epochs': QUICK_EPOCHS}
+    card = paper.train(options.out or jobs.SHIPPED, options.scene, options.output,
+                       seed=options.seed, commit=_commit(), **(quick if options.quick else {}))
+    print(f'{card["name"]}.safetensors: point {card["metrics"]} [% of the longest edge]')
 
 
 def _train_paper(options: argparse.Namespace, job: jobs.PaperJob) -> None:
@@ -96,9 +106,11 @@ def main(args: Sequence[str] | None = None) -> int:
     """Train what the arguments name."""
     options = _options(args)
     torch.set_num_threads(1)  # matrices this small gain nothing from more
-    for name in NAMES if 'all' in options.what else dict.fromkeys(options.what):
+    for name in dict.fromkeys(options.what):
         if name == MLP:
             _train_mlp(options)
+        elif options.scene:
+            _train_scene(options)
         else:
             _train_paper(options, jobs.JOBS[name])
     return 0

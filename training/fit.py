@@ -1,11 +1,9 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Fit the network of model `mlp`: samples as tensors, the answers, the loss and the training loop.
+"""Fit the network of model `mlp`: the answers, the loss and the training loop.
 
-The network says where between its brackets the volume is that each upper face cuts off
-(core/src/columns/upper_faces.hpp). Volume, centroid and covariance of the overlap follow from it as
-in core/src/mlp/mlp_model.hpp.
+`PatchNetwork.forward` repeats core/src/mlp/mlp_model.hpp for tensors.
 """
 from __future__ import annotations
 
@@ -16,40 +14,52 @@ import torch
 from torch import Tensor
 
 from benchmarks.paper.fit import as_layers
-from box_contact_ros.core import FEATURES
+from box_contact_ros.core import FEATURES, OUTPUTS
 from box_contact_ros.solver.weights_file import Layers
 
 from .samples import MlpSamples
 
-SOFT = 1e-5
+MOST_EXPONENT, LEAST_MARGIN = 3.0, 1e-3  # as in core/src/mlp/mlp_model.hpp
+SOFT = 3e-3
 """Error below which the loss is quadratic, and above which it is linear."""
-TAIL = 300.0  # weight of the mean square beside it: the worst cases count
-OF_VOLUME = 100.0
-"""Weight of the volume's error. Point and covariance also depend on where an upper face's two
-points of mass are. The network cannot change that, and would give up the volume for it."""
+TAIL = 10.0  # weight of the mean square beside it: the worst cases count
+UNITS = (0.25, 1.0, 1.0)
+"""Errors of point, volume and covariance that weigh the same."""
 
 
 class MlpErrors(NamedTuple):
     """Errors of n contacts, (n,) each."""
 
-    point: Tensor  # [root of the covariance's trace]
+    point: Tensor  # [the smaller box's longest edge]
     volume: Tensor  # relative
-    covariance: Tensor  # of the covariance's eigenvalues, relative: Frobenius norm
+    covariance: Tensor  # Frobenius norm, relative to the exact trace
 
 
-class ShareNetwork(torch.nn.Module):
-    """One hidden layer of rectified units and one output between 0 and 1."""
+class PatchNetwork(torch.nn.Module):
+    """Two hidden layers of rectified units, and seven outputs: exponents of factors."""
 
-    def __init__(self, hidden: int) -> None:
+    def __init__(self, hidden: tuple[int, int]) -> None:
         super().__init__()
-        self.hidden = torch.nn.Linear(FEATURES, hidden)
-        self.output = torch.nn.Linear(hidden, 1)
+        self.first = torch.nn.Linear(FEATURES, hidden[0])
+        self.second = torch.nn.Linear(*hidden)
+        self.output = torch.nn.Linear(hidden[1], OUTPUTS)
+        with torch.no_grad():  # begin with the body of the chords
+            self.output.weight *= 0.1
+            self.output.bias *= 0.0
 
-    def forward(self, features: Tensor) -> Tensor:
-        """Return the answers (…,) for features (…, FEATURES)."""
-        x = self.output(torch.relu(self.hidden(features)))[..., 0]
-        x = x.clamp(-3.0, 3.0)
-        return 0.5 + 0.5 * x * (27.0 + x * x) / (27.0 + 9.0 * x * x)
+    def forward(self, samples: MlpSamples) -> tuple[Tensor, Tensor, Tensor]:
+        """Return centroids (n, 3), volumes (n,) and covariances (n, 3, 3) in the patch boxes."""
+        x = torch.relu(self.second(torch.relu(self.first(samples.features))))
+        size = self.output(x)
+        factors = torch.where(size < 0.0, 1.0 / (1.0 + size.abs().clamp(max=MOST_EXPONENT)),
+                              1.0 + size.clamp(0.0, MOST_EXPONENT))
+        place = (0.5 + 0.5 * samples.mean).clamp(max=1.0 - LEAST_MARGIN)
+        odds = place * factors[:, :3]
+        most = torch.diagonal(samples.covariance, dim1=1, dim2=2).rsqrt()
+        deviations = torch.minimum(factors[:, 4:], most)
+        return (2.0 * odds / (odds + 1.0 - place) - 1.0,
+                (samples.volume * factors[:, 3]).clamp(max=1.0),
+                samples.covariance * deviations[:, :, None] * deviations[:, None, :])
 
     def layers(self) -> Layers:
         """Return the layers."""
@@ -63,25 +73,20 @@ def tensors(samples: MlpSamples) -> MlpSamples:
 
 def errors_of(network: torch.nn.Module, batch: MlpSamples) -> MlpErrors:
     """Return the errors of contacts."""
-    share = batch.least + network(batch.features) * (batch.most - batch.least)
-    cut = (batch.cut * share)[..., None] * batch.carries
-    volume = 1.0 - cut.sum((1, 2))
-    first = (cut[..., None] * batch.points).sum((1, 2))
-    second = torch.einsum('nkp,nkpi,nkpj->nij', cut, batch.points, batch.points)
-    shift = first / volume[:, None]
-    covariance = ((batch.columns_covariance - second) / volume[:, None, None]
-                  - shift[:, :, None] * shift[:, None, :])
-    wrong = batch.whitening @ (covariance - batch.covariance) @ batch.whitening.mT
-    return MlpErrors((shift + batch.mean).norm(dim=-1), (volume / batch.volume - 1.0).abs(),
-                     wrong.square().sum((1, 2)).sqrt())
+    mean, volume, covariance = network(batch)
+    scale = batch.half[:, :, None] * batch.half[:, None, :]
+    trace = torch.diagonal(scale * batch.true_covariance, dim1=1, dim2=2).sum(1)
+    wrong = (covariance - batch.true_covariance) * scale
+    return MlpErrors(((mean - batch.true_mean) * batch.half).norm(dim=1),
+                     (volume / batch.true_volume - 1.0).abs(),
+                     wrong.square().sum((1, 2)).sqrt() / trace)
 
 
 def loss_of(errors: MlpErrors) -> Tensor:
     """Return the loss: mean errors, and mean squares for the tail."""
-    of_point, of_volume, of_covariance = (
-        (error.square() + SOFT**2).sqrt().mean() + TAIL * error.square().mean()
-        for error in errors)
-    return of_point + OF_VOLUME * of_volume + of_covariance
+    scaled = [(error / unit).clamp(max=2.0) for error, unit in zip(errors, UNITS)]
+    return sum((error.square() + SOFT**2).sqrt().mean() + TAIL * error.square().mean()
+               for error in scaled)
 
 
 def fit(network: torch.nn.Module, samples: MlpSamples, *, steps: int, batch: int, rate: float,
@@ -92,10 +97,9 @@ def fit(network: torch.nn.Module, samples: MlpSamples, *, steps: int, batch: int
     """
     optimiser = torch.optim.Adam(network.parameters(), lr=rate)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
-    data = tensors(samples)
     for _ in range(steps):
-        rows = torch.randint(len(samples), (min(batch, len(samples)),), generator=generator)
-        loss = loss_of(errors_of(network, data.part(rows)))
+        rows = torch.randint(len(samples), (batch,), generator=generator)
+        loss = loss_of(errors_of(network, samples.part(rows)))
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()

@@ -3,8 +3,8 @@
 
 """Train the network of model `mlp`: from draws, then from what a search finds hardest.
 
-Five networks from five seeds learn from the same data. The one of median error is written, and the
-spread of all five stands in its model card.
+Networks from several seeds learn from the same data. The one of median error is written, and the
+spread of all stands in its model card.
 """
 from __future__ import annotations
 
@@ -22,23 +22,24 @@ from benchmarks.output import percentiles
 from benchmarks.pose_sets import SETS, Pairs
 from benchmarks.weights import save_weights
 from benchmarks.worst_case import climb, worst_start
-from box_contact_ros.core import BRACKET_LIMIT, FEATURES, NETWORK_FORMAT, SPREAD_LIMIT, UPPER_LIMIT
+from box_contact_ros.core import FEATURES, NETWORK_FORMAT, OUTPUTS
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.mlp import ACTIVATION, NETWORK, core_numbers
+from box_contact_ros.solver.mlp import ACTIVATION, GROUP, NETWORK, core_numbers
 from box_contact_ros.solver.weights_file import Network
 
-from .fit import MlpErrors, ShareNetwork, errors_of, fit, tensors
+from .fit import UNITS, MlpErrors, PatchNetwork, errors_of, fit, tensors
 from .samples import MlpSamples, describe, draw_samples, mixture
 
 FEATURE_NAMES = (
-    "largest share of the body's extent beyond a side face", 'sum of these shares',
-    'deepest corner along these extents', 'centroid along these extents',
-    'sum of how far its own edges truncate the face', 'product of these')
-"""Features of what an upper face cuts off (core/src/columns/upper_faces.hpp)."""
-HIDDEN = 16
-"""Hidden units. Only pairs with open brackets ask them, so that they cost next to nothing."""
+    'length of the chords, by level', 'their first moment along x, by level',
+    'their first moment along y, by level', 'variances of x and y, covariance of both')
+"""Features of the chords of a contact (core/src/mlp/chords.hpp)."""
+HIDDEN = (24, 24)
+"""Units of both hidden layers."""
 HARD_START, HARD_COUNT = 200_000, 3_000
 """Pairs drawn for each search, which climbs from the HARD_COUNT worst."""
+HARD_SHARE = 30
+"""Contacts that are drawn for each one that a search has found."""
 
 # Streams of random numbers: data, what is measured on, hard data.
 _DATA, _METRICS, _HARD = range(3)
@@ -48,37 +49,38 @@ _DATA, _METRICS, _HARD = range(3)
 class MlpRecipe:
     """One training."""
 
-    pairs: int = 4_000_000
-    steps: int = 3_000
-    batch: int = 2048
-    rate: float = 1e-2
-    generations: int = 60  # of each search for hard contacts
+    pairs: int = 1_200_000
+    first_steps: int = 1_500  # of a network whose hardest contacts are searched
+    steps: int = 6_000
+    batch: int = 4096
+    rate: float = 5e-3
+    generations: int = 40  # of each search for hard contacts
     hard_rounds: int = 2
     metric_pairs: int = 100_000  # pairs of each set in the model card's metrics
     networks: int = 5
 
 
-QUICK = {'pairs': 100_000, 'steps': 200, 'generations': 3, 'hard_rounds': 1, 'metric_pairs': 2_000,
-         'networks': 2}
+QUICK = {'pairs': 50_000, 'first_steps': 50, 'steps': 200, 'generations': 3, 'hard_rounds': 1,
+         'metric_pairs': 2_000, 'networks': 2}
 """What `--quick` replaces: enough to see the error fall, in seconds."""
 
 
-def train(path: Path, *, seed: int, commit: str, quick: bool = False, hidden: int = HIDDEN,
-          ) -> dict[str, Any]:
+def train(path: Path, *, seed: int, commit: str, quick: bool = False,
+          hidden: tuple[int, int] = HIDDEN) -> dict[str, Any]:
     """Train the networks and write one to `path`; return its model card."""
     began = time.monotonic()
     recipe = MlpRecipe(**(QUICK if quick else {}))
     data = draw_samples(mixture, [seed, _DATA], recipe.pairs, progress=True)
     drawn = len(data)
-    first = _trained(data, seed, hidden, recipe, 'on draws')
     for number in range(recipe.hard_rounds):
+        first = _trained(tensors(data), seed, hidden, recipe, recipe.first_steps,
+                         f'round {number + 1}')
         hard = _hard(first, np.random.default_rng([seed, _HARD, number]), recipe)
-        data = MlpSamples.joined([data, *[hard] * max(1, drawn // (5 * len(hard)))])
-        if number + 1 < recipe.hard_rounds:
-            first = _trained(data, seed, hidden, recipe, f'with hard ones, round {number + 1}')
-    networks = [_trained(data, seed + number, hidden, recipe, f'network {number + 1}')
-                for number in range(recipe.networks)]
-    summaries = [_summary(network, data) for network in networks]
+        data = MlpSamples.joined([data, *[hard] * max(1, drawn // (HARD_SHARE * len(hard)))])
+    batches = tensors(data)
+    networks = [_trained(batches, seed + number, hidden, recipe, recipe.steps,
+                         f'network {number + 1}') for number in range(recipe.networks)]
+    summaries = [_summary(network, batches) for network in networks]
     order = np.argsort([sum(entry['p99'] for entry in summary.values()) for summary in summaries])
     chosen = int(order[len(order) // 2])
     card = model_card(path, recipe, hidden, {
@@ -96,11 +98,10 @@ def train(path: Path, *, seed: int, commit: str, quick: bool = False, hidden: in
 
 def header(layers: Any) -> str:
     """Return the text of core/src/mlp/shipped_network.hpp for a network's layers."""
-    numbers = core_numbers(Network(layers))
-    lines = [f'    {float(numbers[0])!r}F,']
-    for unit in numbers[1:].reshape(-1, FEATURES + 2):
-        lines.append('    ' + ', '.join(f'{float(number)!r}F' for number in unit) + ',')
-    return HEADER.replace('NUMBERS', '\n'.join(lines))
+    numbers = [f'{float(number)!r}F' for number in core_numbers(Network(layers))]
+    lines = [', '.join(numbers[:2])]
+    lines += [', '.join(numbers[at:at + GROUP]) for at in range(2, len(numbers), GROUP)]
+    return HEADER.replace('NUMBERS', '\n'.join(f'    {line},' for line in lines))
 
 
 HEADER = """// Copyright 2026 The box_contact_ros maintainers
@@ -111,7 +112,7 @@ HEADER = """// Copyright 2026 The box_contact_ros maintainers
 
 namespace box_contact::detail {
 
-// The bias of the output, then the numbers of each unit.
+// The groups of each hidden layer, then groups of eight units.
 // clang-format off
 constexpr float shipped_network[] = {
 NUMBERS
@@ -122,26 +123,27 @@ NUMBERS
 """
 
 
-def _trained(data: MlpSamples, seed: int, hidden: int, recipe: MlpRecipe, what: str,
-             ) -> ShareNetwork:
+def _trained(batches: MlpSamples, seed: int, hidden: tuple[int, int], recipe: MlpRecipe,
+             steps: int, what: str) -> PatchNetwork:
     torch.manual_seed(seed)
-    network = ShareNetwork(hidden)
-    losses = fit(network, data, steps=recipe.steps, batch=recipe.batch, rate=recipe.rate,
+    network = PatchNetwork(hidden)
+    losses = fit(network, batches, steps=steps, batch=recipe.batch, rate=recipe.rate,
                  generator=torch.Generator().manual_seed(seed))
-    with tqdm(losses, desc=what, total=recipe.steps, unit='step', mininterval=1.0) as bar:
+    with tqdm(losses, desc=what, total=steps, unit='step', mininterval=1.0) as bar:
         for step, loss in enumerate(bar):
             if step % 200 == 0:
                 bar.set_postfix(loss=f'{loss.item():.2e}', refresh=False)
     return network
 
 
-def _hard(network: ShareNetwork, rng: np.random.Generator, recipe: MlpRecipe) -> MlpSamples:
+def _hard(network: PatchNetwork, rng: np.random.Generator, recipe: MlpRecipe) -> MlpSamples:
     """Return what a search from the worst of fresh draws finds, over poses and sizes."""
     def score(pairs: Pairs) -> np.ndarray:
         samples, rows = describe(pairs)
         found = np.full(len(rows), -1.0)
         with torch.no_grad():
-            found[rows] = torch.stack(errors_of(network, tensors(samples))).amax(0).numpy()
+            errors = errors_of(network, tensors(samples))
+        found[rows] = torch.stack([error / unit for error, unit in zip(errors, UNITS)]).amax(0)
         return np.nan_to_num(found, nan=-1.0)
 
     start = worst_start(mixture(rng, HARD_START), score, HARD_COUNT)
@@ -149,26 +151,24 @@ def _hard(network: ShareNetwork, rng: np.random.Generator, recipe: MlpRecipe) ->
 
 
 @torch.no_grad()
-def _summary(network: ShareNetwork, data: MlpSamples) -> dict[str, dict[str, float]]:
-    errors = errors_of(network, tensors(data))
+def _summary(network: PatchNetwork, batches: MlpSamples) -> dict[str, dict[str, float]]:
+    errors = errors_of(network, batches)
     return {name: error_summary(100.0 * values.numpy())
             for name, values in zip(MlpErrors._fields, errors)}
 
 
-def model_card(path: Path, recipe: MlpRecipe, hidden: int, data: dict[str, Any]) -> dict[str, Any]:
+def model_card(path: Path, recipe: MlpRecipe, hidden: tuple[int, int], data: dict[str, Any],
+               ) -> dict[str, Any]:
     """Return the card of a network before anything is measured."""
     return {
         'name': path.stem, 'model': 'mlp', 'format': NETWORK_FORMAT,
-        'architecture': [FEATURES, hidden, 1], 'activation': ACTIVATION, 'sizes': [],
-        'inputs': {'description': 'what an upper face cuts off the columns, and where side faces '
-                   'cut it', 'names': FEATURE_NAMES,
-                   'range': {'brackets apart [of the volume]': BRACKET_LIMIT,
-                             'brackets apart [of the second moments]': SPREAD_LIMIT,
-                             'cut off [of the volume]': UPPER_LIMIT}},
-        'outputs': ['where between its brackets the volume is'],
+        'architecture': [FEATURES, *hidden, OUTPUTS], 'activation': ACTIVATION, 'sizes': [],
+        'inputs': {'description': 'chords of the overlap in its patch box', 'names': FEATURE_NAMES,
+                   'range': [-1.0, 1.0]},
+        'outputs': ['exponents of factors: odds of x, y, z; volume; deviations along x, y, z'],
         'data': data, 'metrics': {},
         'training': {'algorithm': 'Adam', 'steps': recipe.steps, 'batch': recipe.batch,
-                     'rate': recipe.rate, 'threads': torch.get_num_threads()}}
+                     'rate': recipe.rate, 'loss units': UNITS, 'threads': torch.get_num_threads()}}
 
 
 def error_summary(errors: np.ndarray) -> dict[str, float]:

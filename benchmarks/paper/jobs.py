@@ -14,7 +14,7 @@ import numpy as np
 
 from box_contact_ros.solver.weights_file import Network, load_weights
 
-from ..pose_sets import CONTAINER, CUBE
+from ..pose_sets import CUBE
 from ..weights import save_weights
 from . import dataset
 from .errors import errors_of, figures, figures_by_part
@@ -38,7 +38,6 @@ _COMMITTEE = (_FOLDED.replace('half of the patterns vertex-face, half edge-edge'
               'uniform, tilted by up to 0.02 rad; the point is the middle of the overlap. '
               'Classifier: a third of each kind.')
 SHIPPED = Path(__file__).parents[2] / 'weights'
-SHIPPED_NAMES = ('paper', 'paper-12.192x2.438x2.591')
 SEEDS = (1, 2, 3, 4, 5)
 
 
@@ -61,7 +60,7 @@ class PaperJob:
     @property
     def folder(self) -> Path:
         """Return where the file is: with the package, or with the tables that alone need it."""
-        return SHIPPED if self.name in SHIPPED_NAMES else Path(__file__).parent / 'weights'
+        return SHIPPED if self.name == 'paper' else Path(__file__).parent / 'weights'
 
 
 # Learning rate, initial range, batch and epochs were compared on seed 1, by the cross-validation
@@ -70,7 +69,6 @@ class PaperJob:
 _JUMPS = PaperSettings((6, 20, 18, 4), networks=96, epochs=300, rate=0.05, initial=0.7)
 _EXPERTS = replace(_JUMPS, networks=24)
 _TABLE_1 = replace(_JUMPS, networks=16, wrap=False)  # of each seed, or subset
-_CONTAINERS = PaperSettings((6, 20, 18, 4), networks=48, epochs=400, rate=0.1, initial=0.7)
 _SMOOTH = PaperSettings((6, 20, 17, 4), networks=24, epochs=1000, rate=0.2)
 
 JOBS = {
@@ -82,7 +80,6 @@ JOBS = {
         dataset.CONTINUOUS_COUNTS),
     'paper-committee': PaperJob('paper-committee', 'paper-committee', CUBE, _EXPERTS, _COMMITTEE,
                                 dataset.CONTINUOUS_COUNTS),
-    'containers': PaperJob('paper-12.192x2.438x2.591', 'paper', CONTAINER, _CONTAINERS),
     **{job.name: job for job in (
         PaperJob('table-1-as-written', 'paper', CUBE, _TABLE_1, _AS_WRITTEN, folded_in=False,
                  kept=1.0, seeds=SEEDS),

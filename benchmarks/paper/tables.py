@@ -149,7 +149,6 @@ def sections_1_and_2(tables: Collection[int], step: int) -> list[str]:
         sections.append(_page('table_2', table=beside_paper(2, pooled), least=min(above),
                               most=max(above)))
     if 1 in tables:
-        detail['containers'] = evaluate('paper-12.192x2.438x2.591', step)['contact']
         sections.append(committee.section(step))
     return [*sections, _page('tables_1_2', by_part=by_part(detail))]
 

@@ -42,11 +42,7 @@ QUATERNION_MIN, QUATERNION_MAX = native.QUATERNION_MIN, native.QUATERNION_MAX
 """Least and largest norm of a quaternion that are accepted."""
 DEPTH_FLOOR = native.DEPTH_FLOOR
 """Least depth to which boxes are pressed together before the overlap is taken [of the size]."""
-BRACKET_LIMIT, SPREAD_LIMIT, UPPER_LIMIT = (
-    native.BRACKET_LIMIT, native.SPREAD_LIMIT, native.UPPER_LIMIT)
-"""Limits of `mlp`, relative to the overlap. The first two say how far apart the brackets of volume
-and second moments may be, the third how much upper faces may cut off."""
 NETWORK_FORMAT = native.NETWORK_FORMAT
 """Format of the network's file that the core reads: what its numbers mean."""
-FEATURES = native.FEATURES
-"""Features of an upper face, which the network of `mlp` reads."""
+FEATURES, OUTPUTS, UNITS_MAX = native.FEATURES, native.OUTPUTS, native.UNITS_MAX
+"""What the network of `mlp` reads and gives, and the most units of a hidden layer."""

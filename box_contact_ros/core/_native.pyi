@@ -14,12 +14,11 @@ QUATERNION_MIN: float
 QUATERNION_MAX: float
 CONTACT_ULPS: float
 DEPTH_FLOOR: float
-BRACKET_LIMIT: float
-SPREAD_LIMIT: float
-UPPER_LIMIT: float
 
 NETWORK_FORMAT: int
 FEATURES: int
+OUTPUTS: int
+UNITS_MAX: int
 
 kernel: str
 instruction_set: str
@@ -39,8 +38,6 @@ class PairSolver:
                                np.ndarray, np.ndarray], int]: ...
     @property
     def clipped(self) -> int: ...
-    @property
-    def fallbacks(self) -> int: ...
 
 class BroadPhase:
     def __init__(self, sizes: np.ndarray, fixed: np.ndarray, margin: float, listed: np.ndarray,

@@ -19,9 +19,8 @@ class Stages(NamedTuple):
     Lengths are in metres. The frame is A's, from A's centre, unless said otherwise. "Pressed" pairs
     have the minimum depth (`DEPTH_FLOOR`).
 
-    Arrays from `unit` on are in the coordinates t_k of the columns (core/src/columns/): along the
-    edges of the incident box, from the contact frame's origin, in `unit`. Volumes are in unit²
-    times the origin's depth.
+    Arrays from `patch_axes` on are of pairs that touch. `body_…` are in the coordinates of the
+    patch box, −1 to 1, mirrored so that no mean is below 0 (core/src/mlp/).
     """
 
     colliding: np.ndarray  # (n,) bool
@@ -45,21 +44,15 @@ class Stages(NamedTuple):
     covariance: np.ndarray  # (n, 3, 3) its second central moments by its volume [m²], common frame
     clipped_covariance: np.ndarray  # (n, 3, 3) the same by clipping
     certain: np.ndarray  # (n,) bool: the exact moments are by planes; else by clipping
-    accurate: np.ndarray  # (n,) bool: float32 is enough for the columns
-    unit: np.ndarray  # (n,) unit of length [m]
-    true_volume: np.ndarray  # (n,) exact volume of the overlap
-    true_mean: np.ndarray  # (n, 3) its exact centroid
-    true_covariance: np.ndarray  # (n, 3, 3) its exact covariance
-    columns_volume: np.ndarray  # (n,) float32 volume of the columns
-    columns_mean: np.ndarray  # (n, 3) float32 their centroid
-    columns_covariance: np.ndarray  # (n, 3, 3) float32 their covariance
-    upper_volume: np.ndarray
-    """(n, 3) float32 what each upper face cuts off the columns, without P's side faces."""
-    upper_least: np.ndarray  # (n, 3) float32 least share of it that P's side faces leave
-    upper_most: np.ndarray  # (n, 3) float32 largest share of it
-    upper_features: np.ndarray  # (n, 3, 6) float32 what the network is told of it
-    upper_points: np.ndarray  # (n, 3, 2, 3) float32 two points that carry it
-    upper_carries: np.ndarray  # (n, 3, 2) float32 their shares
+    patch_axes: np.ndarray  # (n, 3, 3) axes of the patch box of `mlp` as columns, common frame
+    patch_middle: np.ndarray  # (n, 3) its middle, common frame
+    patch_half: np.ndarray  # (n, 3) its half extents
+    features: np.ndarray  # (n, FEATURES) float32 what the network of `mlp` reads
+    body_volume: np.ndarray  # (n,) float32 what the chords sum to, relative to the patch box
+    body_mean: np.ndarray  # (n, 3) float32
+    body_variance: np.ndarray  # (n, 3) float32 variances of x, y and z
+    body_beside: np.ndarray  # (n, 3) float32 covariances of yz, xz and xy
+    flip: np.ndarray  # (n, 3) float32 −1 for the coordinates that were mirrored
 
 
 def stages(poses_a: ArrayLike, poses_b: ArrayLike, size_a: ArrayLike, size_b: ArrayLike, *,

@@ -389,7 +389,7 @@ class SceneSolver:
 
     @property
     def fallbacks(self) -> int:
-        """Contacts so far that the model handed to `exact`: see `mlp`."""
+        """Contacts so far that the model handed to `exact`: see `soup-N`."""
         return self._solver.fallbacks - self._warm_up_answers
 
     def _warm_up(self) -> None:

@@ -90,8 +90,8 @@ class ContactSolver(native.PairSolver):
 
     @property
     def fallbacks(self) -> int:
-        """Contacts so far that the model handed to `exact`: see `mlp`."""
-        return super().fallbacks + int(getattr(self._model, 'fallbacks', 0))
+        """Contacts so far that the model handed to `exact`: see `soup-N`."""
+        return int(getattr(self._model, 'fallbacks', 0))
 
     def _call_general(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact:
         """Return the contact of one pair whose poses (7,) are of any kind of numbers.

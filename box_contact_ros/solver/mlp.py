@@ -9,25 +9,32 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core import FEATURES, NETWORK_FORMAT
+from ..core import FEATURES, NETWORK_FORMAT, OUTPUTS, UNITS_MAX
 from ..resources import resource_path
 from .checks import short_repr
 from .weights_file import Network, Weights, WeightsError, load_weights
 
-NETWORK = 'share'  # name of the network in a weights file
+NETWORK = 'patch'  # name of the network in a weights file
 ACTIVATION = 'relu'  # activation of the hidden units; weights made for another one are refused
-UNITS_MAX = 64  # most hidden units
+GROUP = 8
+"""Units that the core reads together."""
 
 
 def core_numbers(network: Network) -> np.ndarray:
-    """Return a network as the core reads it: float32 (1 + 8 · units,).
+    """Return a network as the core reads it (core/src/mlp/network.hpp): float32 (n,).
 
-    The bias of the output comes first. For each unit follow its bias, its weights for the features,
-    and its weight to the output.
+    The numbers of groups of both hidden layers come first. Each group of `GROUP` units has its
+    biases, and for each input the units' weights for it. Units that fill a group are zero.
     """
-    (first, bias), (last, last_bias) = network.layers
-    units = np.concatenate([bias[:, None], first, last.T], axis=1)
-    return np.concatenate([last_bias, units.ravel()]).astype(np.float32)
+    numbers, inputs = [], FEATURES
+    counts = [-(-len(bias) // GROUP) for _, bias in network.layers]
+    for groups, (weight, bias) in zip(counts, network.layers):
+        layer = np.zeros((GROUP * groups, 1 + inputs), np.float32)
+        layer[:len(bias), 0] = bias
+        layer[:len(bias), 1:1 + weight.shape[1]] = weight
+        numbers.append(layer.reshape(groups, GROUP, 1 + inputs).swapaxes(1, 2).ravel())
+        inputs = GROUP * groups
+    return np.concatenate([np.array(counts[:2], np.float32), *numbers])
 
 
 def load_mlp(path: str | None = None) -> Weights:
@@ -38,9 +45,9 @@ def load_mlp(path: str | None = None) -> Weights:
     if type(number) is not int or number != NETWORK_FORMAT:
         raise WeightsError(f'{file} has format {short_repr(number)}; this version reads '
                            f'{NETWORK_FORMAT}')
-    network = loaded.network(NETWORK, FEATURES, 1, model='mlp')
-    if len(network.widths) != 3 or network.widths[1] > UNITS_MAX:
-        raise WeightsError(f'{file}: network {NETWORK!r} must have one hidden layer, of at most '
+    network = loaded.network(NETWORK, FEATURES, OUTPUTS, model='mlp')
+    if len(network.widths) != 4 or max(network.widths[1:3]) > UNITS_MAX:
+        raise WeightsError(f'{file}: network {NETWORK!r} must have two hidden layers, of at most '
                            f'{UNITS_MAX} units')
     if loaded.card.get('activation') != ACTIVATION:
         raise WeightsError(f"{file}: this version's units are {ACTIVATION!r}, not "

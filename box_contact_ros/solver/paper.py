@@ -31,8 +31,10 @@ from .checks import as_size, short_repr
 from .contact import Contacts, without_patch
 from .weights_file import Network, Weights, WeightsError, load_weights
 
-INPUTS, OUTPUTS = 6, 4
-"""Of a network: t_x t_y t_z roll pitch yaw → azimuth, elevation of the point, of the normal."""
+INPUTS, OUTPUTS, PLACE = 6, 4, 3
+"""Of a network: t_x t_y t_z roll pitch yaw → azimuth, elevation of the point, of the normal. Or →
+x y z of the point, from the first box's centre [half of the longest edge]; the normal is then
+SAT's."""
 SAME_SIZE = 1e-6
 """Relative difference of extents up to which two sizes are one, and a size that of the weights."""
 STAGES = ('colliding', 'separation', 'axis', 'normal', 'axes_a', 'rotation', 'offset_a',
@@ -117,8 +119,11 @@ class Paper:
     """Outputs of each network in the weights file."""
 
     def __init__(self, weights: Weights) -> None:
-        self._networks = {name: weights.network(name, INPUTS, outputs, self.name)
-                          for name, outputs in self.networks.items()}
+        contact = weights.networks.get('contact')
+        self._places = contact is not None and contact.widths[-1] == PLACE
+        self._networks = {
+            name: weights.network(name, INPUTS, PLACE if self._places else outputs, self.name)
+            for name, outputs in self.networks.items()}
         self._file = weights.path.name
         try:
             self._size = as_size(weights.card['sizes'][0], 'size')[0]
@@ -130,11 +135,15 @@ class Paper:
     def answer(self, pairs: TouchingPairs) -> tuple[np.ndarray, np.ndarray]:
         """Return directions (n, 3) to the impact point and of the normal, first box's frame.
 
+        Where the network gives x y z, the first is the point itself, in half of the longest edge.
         Models with other networks replace this.
         """
         m, n = octant_signs(pairs.offset, pairs.rotation)
         inputs = network_inputs(m * pairs.offset, m[:, :, None] * pairs.rotation * n[:, None])
-        point, normal = directions(forward(self._networks['contact'], inputs))
+        outputs = forward(self._networks['contact'], inputs)
+        if self._places:
+            return m * outputs.astype(np.float64), pairs.normal
+        point, normal = directions(outputs)
         return m * point, m * normal
 
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
@@ -168,7 +177,10 @@ class Paper:
         way, answer = self.answer(pairs)
         # The ray leaves the first box at the impact point. Its surface lies half the depth beyond
         # the middle of the overlap.
-        point = way / np.max(np.abs(way) / half, axis=1, keepdims=True)
+        if self._places:
+            point = way * half.max(axis=1, keepdims=True)
+        else:
+            point = way / np.max(np.abs(way) / half, axis=1, keepdims=True)
         in_b = pairs.first_is_b[:, None]
         rotation = stages['rotation']
         point = np.where(in_b, stages['offset_a'] + 0.5 * depth * normal + turned(rotation, point),
@@ -217,6 +229,11 @@ def in_words(size: np.ndarray) -> str:
     return ' × '.join(f'{extent:g}' for extent in size) + ' m'
 
 
+def in_file_name(size: np.ndarray) -> str:
+    """Return full extents (3,) as the names of weights files have them: nothing for cubes."""
+    return '' if is_cube(size) else '-' + 'x'.join(f'{extent:g}' for extent in size)
+
+
 def paper(size: np.ndarray, path: str | None) -> Paper:
     """Return model `paper` with the weights of a file.
 
@@ -224,9 +241,8 @@ def paper(size: np.ndarray, path: str | None) -> Paper:
     is none.
     """
     if path is None:
-        suffix = '' if is_cube(size) else '-' + 'x'.join(f'{extent:g}' for extent in size)
         try:
-            path = str(resource_path('weights', f'paper{suffix}.safetensors'))
+            path = str(resource_path('weights', f'paper{in_file_name(size)}.safetensors'))
         except FileNotFoundError as error:
             raise WeightsError(
                 f"model 'paper' has no weights for boxes of size {in_words(size)}: train them, "

@@ -232,7 +232,7 @@ def random_calls(seed: int, rounds: int) -> None:
         (public.batch, [rows(), rows()], {'size_b': boxes, 'threads': 2, 'patch': False}),
         (public.batch, [rows()], {'sizes': boxes, 'pairs': places}),
         (solver.solve, [rows(), rows(), one, one, 2, True, places], {}),
-        (native.stages, [rows(), rows(), one, one, ['axis', 'upper_points']], {}),
+        (native.stages, [rows(), rows(), one, one, ['axis', 'features']], {}),
         (native.BroadPhase, phase_arguments(), {}),
         (native.BroadPhase(*phase_arguments()).find, [rows(), 10], {}),
         (native.message_numbers, [np.ones((4, 3)), np.ones((4, 3)), np.ones(4), np.ones(4),

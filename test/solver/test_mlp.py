@@ -4,11 +4,11 @@
 """Model `mlp`: what it promises whatever its network says, and how good its network is."""
 from __future__ import annotations
 
-import ctypes
-import ctypes.util
 import json
-import platform
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -19,39 +19,30 @@ from safetensors.numpy import save_file
 
 pytest.importorskip('benchmarks.pose_sets')
 
-from benchmarks.accuracy import limit_of
 from benchmarks.errors import contact_errors
-from benchmarks.pose_sets import LOADS, SETS, Pairs, flush_stacks
+from benchmarks.pose_sets import LOADS, SETS, Pairs
 from benchmarks.steps import drawn_paths, largest_steps
-from benchmarks.worst_case import climb, worst_start
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import (
-    BRACKET_LIMIT,
-    DEPTH_FLOOR,
     FEATURES,
+    FORCE,
     NETWORK_FORMAT,
-    SPREAD_LIMIT,
+    OUTPUTS,
+    UNITS_MAX,
+    instruction_sets,
     native,
     stages,
 )
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.contact import Contacts
-from box_contact_ros.solver.mlp import ACTIVATION, NETWORK, UNITS_MAX, core_numbers, load_mlp
-from box_contact_ros.solver.weights_file import WeightsError
+from box_contact_ros.solver.mlp import ACTIVATION, NETWORK, core_numbers, load_mlp
+from box_contact_ros.solver.weights_file import Network, WeightsError
 
 N = 4000
 LANES = native.lanes
 """Rows of a batch that are solved side by side."""
 UNIT = (1.0, 1.0, 1.0)
-EXACT = ContactSolver(UNIT, UNIT, model='exact')
 ALL_SETS = {**SETS, **LOADS}
-INSIDE = 2.0**-44
-"""How far outside a box the point may be, of the size (5.7e-14); for a contact that is pressed in,
-DEPTH_FLOOR more. Far from the origin, ulps of the coordinates are added (none here)."""
-ROUNDING = 3000 * 2.0**-24
-"""Of float32, as the model's header bounds it [of volume and covariance]."""
-
-
 def aligned(rng: np.random.Generator, n: int) -> tuple[np.ndarray, ...]:
     """Containers exactly above each other, tilted about a level axis of the box or not at all."""
     axes = np.eye(3)[rng.integers(0, 3, n)]
@@ -76,7 +67,7 @@ def drawn(name: str, n: int = N) -> Pairs:
 
 @pytest.fixture(scope='module')
 def mlp() -> ContactSolver:
-    return ContactSolver(UNIT, UNIT)
+    return ContactSolver(UNIT, UNIT, model='mlp')
 
 
 @pytest.fixture(params=FAMILIES)
@@ -94,16 +85,6 @@ def with_numbers(pairs: Pairs, numbers: np.ndarray) -> Contacts:
     return Contacts(*native.PairSolver('mlp', UNIT, UNIT, numbers).solve(*pairs, 1)[0])
 
 
-def fallbacks(pairs: Pairs) -> np.ndarray:
-    """Return which rows (n,) are left to `exact`, by asking for one after the other."""
-    solver = native.PairSolver('mlp', UNIT, UNIT, SHIPPED)
-    counts = [0]
-    for row in range(len(pairs.pose_a)):
-        solver.solve(*(part[row:row + 1] for part in pairs), 1)
-        counts.append(solver.fallbacks)
-    return np.diff(counts) > 0
-
-
 def assert_same_bits(one: Contacts, other: Contacts, where: object = None) -> None:
     for name, mine, theirs in zip(Contacts._fields, one, other, strict=True):
         assert np.array_equal(mine, theirs, equal_nan=True), (name, where)
@@ -118,22 +99,22 @@ def trace(covariance: np.ndarray) -> np.ndarray:
 
 
 def assert_sound(pairs: Pairs, found: Contacts) -> None:
-    """Points are in both boxes, volumes positive, covariances symmetric and positive definite.
-
-    Definite are those of the columns: clipping may lose the least eigenvalue of a card.
-    """
-    reach = np.maximum(np.abs(pairs.pose_a[:, :3]), np.abs(pairs.pose_b[:, :3])).max(axis=1)
-    slack = (INSIDE * np.maximum(pairs.size, reach)
-             + np.maximum(0.0, DEPTH_FLOOR * pairs.size + found.separation))
+    """Points and volumes are within the patch box, covariances symmetric and positive definite."""
     rows = found.colliding
+    box = stages(*pairs, names=('patch_axes', 'patch_middle', 'patch_half'))
+    axes, middle, half = box.patch_axes[rows], box.patch_middle[rows], box.patch_half[rows]
     assert rows.any() and np.isfinite(found.point[rows]).all()
-    assert np.all((pairs.beyond(found.point) <= slack)[rows])
+    reach = np.abs(found.point[rows]).max(axis=1) + pairs.size[rows]
+    off = np.abs(np.einsum('nji,nj->ni', axes, found.point[rows] - middle))
+    assert np.all(off <= half + ROUNDING * reach[:, None])
     volume, covariance = found.volume[rows], found.covariance[rows]
-    assert np.all(np.isfinite(volume) & (volume > 0.0))
+    most = np.prod(2.0 * half, axis=1)
+    assert np.all((volume > 0.0) & (volume <= (1.0 + ROUNDING) * most))
     assert np.array_equal(covariance, np.swapaxes(covariance, 1, 2))
-    covariance = covariance[volume != pairs.contacts().volume[rows]]
     # The covariance is turned in float64, which may lose the least eigenvalue of a sliver.
     assert np.all(np.linalg.eigvalsh(covariance)[:, 0] >= -1e-15 * trace(covariance))
+    across = np.einsum('nji,njk,nki->ni', axes, covariance, axes)
+    assert np.all(across <= half**2 + 1e-6 * trace(covariance)[:, None])
 
 
 # --- what SAT gives -------------------------------------------------------------------------------
@@ -152,72 +133,55 @@ def test_verdict_separation_normal_and_axis_are_those_of_exact(
 # --- what holds whatever the network says ---------------------------------------------------------
 
 SHIPPED = core_numbers(load_mlp().networks[NETWORK])
-LEAST, MOST = np.array([-4.0], np.float32), np.array([4.0], np.float32)
-"""Networks of no unit, which always choose the one bracket or the other."""
+ROUNDING = 2.0**-44
+"""Of places and volumes, relative."""
+
+
+def network(numbers: np.ndarray, hidden: tuple[int, int] = (12, 9)) -> np.ndarray:
+    """Return a network of `numbers`, as many as its layers need, as the core reads it."""
+    layers, at = [], 0
+    for inputs, outputs in zip((FEATURES, *hidden), (*hidden, OUTPUTS)):
+        weight = numbers[at:at + inputs * outputs].reshape(outputs, inputs)
+        at += inputs * outputs
+        layers.append((weight, numbers[at:at + outputs]))
+        at += outputs
+    return core_numbers(Network(layers))
 
 
 def garbage(kind: str) -> np.ndarray:
-    """Return the numbers of a network that was not trained."""
-    rng = np.random.default_rng(4)
-    numbers = rng.normal(size=1 + 32 * (FEATURES + 2))
+    """Return a network that was not trained."""
+    numbers = np.random.default_rng(4).normal(size=1000)
     factor = {'random': 1.0, 'large': 100.0, 'tiny': 1e-40}.get(kind)  # tiny: denormals
     if factor is None:  # as large as a loader believes
-        return (1e4 * np.sign(numbers)).astype(np.float32)
-    return (factor * numbers).astype(np.float32)
+        return network((1e4 * np.sign(numbers)).astype(np.float32))
+    return network((factor * numbers).astype(np.float32))
 
 
-GARBAGE = {'least': LEAST, 'most': MOST,
-           **{kind: garbage(kind) for kind in ('random', 'large', 'tiny', 'largest')}}
-FE_UNDERFLOW = 0x10 if platform.machine() == 'x86_64' else 0x8
-WORST = {'point': 3.0, 'volume': 100.0 * (BRACKET_LIMIT / (1.0 - BRACKET_LIMIT) + ROUNDING),
-         'covariance': 45.0}
-"""Largest errors of garbage [%]. That of the volume is proven, as the brackets hold the truth."""
-
-
-@pytest.mark.parametrize('kind', GARBAGE)
-def test_garbage_for_weights_stays_within_the_brackets(kind: str) -> None:
-    """Volumes err by what the brackets allow; points are in both boxes, covariances definite."""
+@pytest.mark.parametrize('kind', ['random', 'large', 'tiny', 'largest'])
+def test_garbage_for_weights_stays_within_the_bounds(kind: str) -> None:
+    numbers = garbage(kind)
     for name in FAMILIES:
         pairs = drawn(name, N // 2)
-        found, truth = with_numbers(pairs, GARBAGE[kind]), pairs.contacts()
-        assert_sound(pairs, found)
-        rows = truth.colliding
-        with np.errstate(invalid='ignore', divide='ignore'):  # slivers have no width in the plane
-            errors = contact_errors(rows_of(found, rows), rows_of(truth, rows), pairs.edge[rows])
-        for quantity, most in WORST.items():
-            assert getattr(errors, quantity).max() <= most, (name, quantity)
+        assert_sound(pairs, with_numbers(pairs, numbers))
 
 
-@pytest.mark.parametrize('name', FAMILIES)
-def test_the_network_has_no_more_influence_than_the_brackets_leave_it(name: str) -> None:
-    """None where the brackets meet: equal bits. Else, by Cauchy and Schwarz from the limits.
-
-    |Δpoint|² ≤ BRACKET_LIMIT · SPREAD_LIMIT · trace, |Δvolume| as the brackets are apart.
-    """
-    pairs = drawn(name)
-    least, most = with_numbers(pairs, LEAST), with_numbers(pairs, MOST)
-    found = stages(*pairs, names=('colliding', 'volume', 'true_volume', 'upper_volume',
-                                  'upper_least', 'upper_most'))
-    rows = found.colliding
-    scale = found.volume[rows] / found.true_volume[rows]
-    apart = (found.upper_volume * (found.upper_most - found.upper_least)).sum(axis=1)[rows] * scale
-    least, most = rows_of(least, rows), rows_of(most, rows)
-    meet = apart == 0.0
-    assert_same_bits(rows_of(least, meet), rows_of(most, meet))
-    change = least.volume - most.volume
-    assert np.all(change >= -ROUNDING * least.volume)
-    assert np.all(change <= apart + ROUNDING * least.volume)
-    point = np.linalg.norm(least.point - most.point, axis=1)
-    bound = np.sqrt(BRACKET_LIMIT * SPREAD_LIMIT * trace(most.covariance))
-    assert np.all(point <= bound * (1.0 + 2.0 * SPREAD_LIMIT))
-    print(f'{name}: brackets meet {meet.mean():.3f}, point {(point / bound).max():.3f}')
+def test_the_bounds_hold_the_overlap(pairs: Pairs) -> None:
+    """The exact centroid is between them, and the exact volume below theirs."""
+    truth = pairs.contacts()
+    rows = truth.colliding & (truth.separation < -1e-8 * pairs.size)
+    box = stages(*pairs, names=('patch_axes', 'patch_middle', 'patch_half'))
+    half = box.patch_half[rows]
+    off = np.einsum('nji,nj->ni', box.patch_axes, truth.point - box.patch_middle)[rows]
+    assert np.all(np.abs(off) <= half + 1e-9 * pairs.size[rows, None])
+    assert np.all(truth.volume[rows] <= (1.0 + 1e-6) * np.prod(2.0 * half, axis=1))
 
 
 def test_the_network_is_really_asked() -> None:
     """The tests above would prove nothing of a network whose answer is not used."""
     pairs = drawn('crossed bars')
-    least, most = with_numbers(pairs, LEAST), with_numbers(pairs, MOST)
-    assert (least.volume > (1.0 + 1e-4) * most.volume).mean() > 0.01
+    one, other = (with_numbers(pairs, garbage(kind)) for kind in ('random', 'tiny'))
+    for name in ('point', 'volume', 'covariance'):
+        assert (getattr(one, name) != getattr(other, name)).any(axis=-1).mean() > 0.9, name
 
 
 def test_weights_that_are_no_numbers_are_refused() -> None:
@@ -246,78 +210,40 @@ def test_extreme_sizes(mlp: ContactSolver, size_a: tuple, size_b: tuple) -> None
                   np.tile(size_b, (n, 1)))
     found = pairs.contacts(mlp)
     assert found.colliding.all()
-    covariance = found.covariance
-    found = found._replace(covariance=covariance / trace(covariance)[:, None, None])
     assert_sound(pairs, found)
-
-
-def test_boxes_that_stand_squarely_do_not_underflow(mlp: ContactSolver) -> None:
-    """Where numbers of float32 underflow, the machine takes a hundred times as long for them."""
-    libm = ctypes.CDLL(ctypes.util.find_library('m'))
-    pairs = flush_stacks(np.random.default_rng(3), N)
-    libm.feclearexcept(FE_UNDERFLOW)
-    pairs.contacts(mlp)
-    assert not libm.fetestexcept(FE_UNDERFLOW)
-    assert np.multiply(np.float32(1e-30), np.float32(1e-12)) < 1e-40
-    assert libm.fetestexcept(FE_UNDERFLOW)  # it would have been seen
-
-
-# --- left to exact --------------------------------------------------------------------------------
-
-SHARES = {'random cubes': 0.002, 'touching': 0.001, 'random sizes': 0.012, 'stacks': 0.012,
-          'tilted stacks': 0.012, 'containers': 0.004, 'parcels': 0.001, 'crossed bars': 0.1,
-          'overhang': 0.02, 'near flush': 0.001, 'landings': 0.001}
-"""Largest share of a set that may be left to `exact`: about twice what was measured."""
-
-
-def test_what_is_left_to_exact_is_exact_and_counted(pairs: Pairs) -> None:
-    """Those rows have its bits. A batch counts what its single calls count, in any order."""
-    left, exact = fallbacks(pairs), pairs.contacts()
-    for order in (np.arange(len(left)), np.random.default_rng(1).permutation(len(left))):
-        solver = ContactSolver(UNIT, UNIT)
-        found = pairs.rows(order).contacts(solver)
-        assert solver.fallbacks == left.sum()
-        at = left[order]
-        assert_same_bits(rows_of(found, at), rows_of(exact, order[at]))
-    assert not left[~exact.colliding].any()
-
-
-@pytest.mark.parametrize('name', ALL_SETS)
-def test_few_are_left_to_exact(name: str) -> None:
-    """A model that hands the hard half to `exact` has not been built."""
-    solver = ContactSolver(UNIT, UNIT)
-    pairs = drawn(name, 5 * N)
-    pairs.contacts(solver)
-    assert solver.fallbacks <= SHARES[name] * len(pairs.pose_a)
-
-
-@pytest.mark.parametrize('b', [poses.IDENTITY, poses.IDENTITY + (0.1, 0, 0, 0, 0, 0, 0)])
-def test_a_box_through_its_like_is_left_to_exact(b: np.ndarray) -> None:
-    """Deeper than any contact; single calls count, too."""
-    solver = ContactSolver(UNIT, (0.5, 0.5, 3.0))
-    assert solver(poses.IDENTITY, b).colliding and solver.fallbacks == 1
-    solver.batch([poses.IDENTITY] * 3, [b] * 3)
-    assert solver.fallbacks == 4
 
 
 # --- laws -----------------------------------------------------------------------------------------
 
 
 def test_swap(mlp: ContactSolver, pairs: Pairs) -> None:
-    """B against A: equal bits of all but the normal, by either model.
-
-    Clipping and pressing depend on the face that wins a tie, A's or B's: there `exact` may differ.
-    """
+    """B against A: equal bits of all but the normal."""
     other = Pairs(pairs.pose_b, pairs.pose_a, pairs.size_b, pairs.size_a)
-    found = stages(*pairs, names=('certain', 'separation', 'size'))
-    certain = found.certain & (found.separation < -DEPTH_FLOOR * found.size)
-    left = fallbacks(pairs)
-    assert np.array_equal(left, fallbacks(other))
-    for solver, asked in ((mlp, ~left | certain), (None, certain)):
-        one, two = (rows_of(found, asked)
-                    for found in (pairs.contacts(solver), other.contacts(solver)))
-        for name in ('colliding', 'separation', 'point', 'volume', 'covariance'):
-            assert np.array_equal(getattr(one, name), getattr(two, name), equal_nan=True), name
+    one, two = pairs.contacts(mlp), other.contacts(mlp)
+    for name in ('colliding', 'separation', 'point', 'volume', 'covariance'):
+        assert np.array_equal(getattr(one, name), getattr(two, name), equal_nan=True), name
+
+
+def test_all_instruction_sets_have_the_same_bits(tmp_path: Path) -> None:
+    """Of the shipped network and of garbage, in batches and in single calls."""
+    code = ("import sys, numpy as np\n"
+            "from box_contact_ros.core import native\n"
+            "data = np.load(sys.argv[1])\n"
+            "rows = [data[name] for name in ('pose_a', 'pose_b', 'size_a', 'size_b')]\n"
+            "unit, found = (1.0, 1.0, 1.0), []\n"
+            "for name in ('shipped', 'garbage'):\n"
+            "    solver = native.PairSolver('mlp', unit, unit, data[name])\n"
+            "    found += solver.solve(*rows, 1)[0]\n"
+            "    for i in range(0, len(rows[0]), 50):\n"
+            "        found += solver.solve(*(part[i:i + 1] for part in rows), 1)[0]\n"
+            "sys.stdout.buffer.write(b''.join(part.tobytes() for part in found))\n")
+    parts = [drawn(name, 500) for name in FAMILIES]
+    pairs = Pairs(*(np.concatenate(fields) for fields in zip(*parts)))
+    np.savez(tmp_path / 'pairs.npz', **pairs._asdict(), shipped=SHIPPED, garbage=garbage('random'))
+    answers = [subprocess.run([sys.executable, '-c', code, str(tmp_path / 'pairs.npz')],
+                              env={**os.environ, FORCE: name}, capture_output=True,
+                              check=True).stdout for name in instruction_sets()]
+    assert len(answers[0]) > 100 * len(pairs.size) and len(set(answers)) == 1
 
 
 def test_a_batch_is_its_single_calls(mlp: ContactSolver, pairs: Pairs) -> None:
@@ -333,13 +259,13 @@ def test_a_batch_is_its_single_calls(mlp: ContactSolver, pairs: Pairs) -> None:
 @pytest.mark.parametrize('first', [0, 5])
 def test_a_row_does_not_know_its_neighbours(mlp: ContactSolver, count: int, first: int) -> None:
     """Vectors that are not full, and rows in other lanes: the same bits."""
-    pairs = drawn('crossed bars', 200)  # of which some are left to `exact`
+    pairs = drawn('crossed bars', 200)
     some = slice(first, first + count)
     assert_same_bits(pairs.rows(some).contacts(mlp),
                      Contacts(*(field[some] for field in pairs.contacts(mlp))))
 
 
-def test_rows_apart_refused_or_left_do_not_disturb_neighbours(mlp: ContactSolver) -> None:
+def test_rows_apart_or_refused_do_not_disturb_neighbours(mlp: ContactSolver) -> None:
     """Side by side, contacts between rows of all other kinds keep their bits.
 
     A refused row raises, and the next call is right again.
@@ -381,17 +307,16 @@ def test_minus_q_is_q(mlp: ContactSolver, pairs: Pairs) -> None:
     assert_same_bits(pairs.contacts(mlp), other.contacts(mlp))
 
 
-MOVED = {'point': (1e-4, 0.1), 'volume': (5e-3, WORST['volume']), 'covariance': (5e-3, 3.0)}
-"""Differences after a motion [%], as poses and float32 round: of 99 rows in 100, and of a row that
-changes over to `exact` or back."""
+MOVED = {'point': 2.0, 'volume': 8.0, 'covariance': 10.0}
+"""Differences after a motion [%] of 99 rows in 100. Equal boxes have frames of equal right, and as
+poses round another one of them is chosen: the difference is that of two approximations."""
 
 
 def assert_close(found: Contacts, wanted: Contacts, pairs: Pairs) -> None:
-    """Check that all rows have the same contacts, up to MOVED."""
+    """Check that the rows have the same contacts, up to MOVED."""
     errors = contact_errors(found, wanted, pairs.edge)
-    for quantity, (usual, most) in MOVED.items():
-        error = getattr(errors, quantity)
-        assert np.percentile(error, 99) <= usual and error.max() <= most, quantity
+    for quantity, usual in MOVED.items():
+        assert np.percentile(getattr(errors, quantity), 99) <= usual, quantity
 
 
 def test_rigid_motion(mlp: ContactSolver, named_set: tuple[str, Pairs]) -> None:
@@ -424,38 +349,31 @@ def test_box_symmetries(mlp: ContactSolver, named_set: tuple[str, Pairs]) -> Non
 
 # --- errors and steps -----------------------------------------------------------------------------
 
+LIMITS = {'point': 1.5, 'volume': 8.0, 'covariance': 9.0}
+"""99th percentiles of the errors on all sets [%]."""
+WORST_STEP = 8.0
+"""Largest step of the point at a vanishing change of pose [% of the smaller box's longest edge]."""
+
 
 @pytest.mark.parametrize('name', ALL_SETS)
 def test_errors_are_within_the_limits(mlp: ContactSolver, name: str) -> None:
-    """The 99th percentile, on pairs that nobody has trained on."""
+    """On pairs that nobody has trained on."""
     pairs = ALL_SETS[name](np.random.default_rng([20270101, list(ALL_SETS).index(name)]), 5 * N)
     errors = contact_errors(pairs.contacts(mlp), pairs.contacts(), pairs.edge)
-    for quantity, found in errors._asdict().items():
-        assert np.percentile(found, 99) <= limit_of(quantity, name), quantity
-
-
-WORST_STEP = {'point': 0.1, 'volume': 1.0}
-"""Largest steps at a vanishing change of pose [%]; that of the volume is proven."""
+    for quantity, limit in LIMITS.items():
+        found = getattr(errors, quantity)
+        print(name, quantity, f'{np.median(found):.3g} {np.percentile(found, 99):.3g}')
+        assert np.percentile(found, 99) <= limit, quantity
 
 
 @pytest.mark.parametrize('name', ALL_SETS)
 def test_steps_at_a_vanishing_change_of_pose(mlp: ContactSolver, name: str) -> None:
-    """Where frame, winner, range or limits change over; from pairs that a climb finds steepest."""
+    """Where the frame or the winner changes over."""
     rng = np.random.default_rng(7)
-
-    def error(pairs: Pairs) -> np.ndarray:
-        found, truth = pairs.contacts(mlp), pairs.contacts()
-        with np.errstate(invalid='ignore', divide='ignore'):
-            return np.nan_to_num(np.where(truth.colliding, contact_errors(
-                found, truth, pairs.edge).point, -1.0), nan=-1.0)
-
-    start = worst_start(drawn(name), error, 60)
-    pairs, _ = climb(rng, start, error, generations=20)
     for flat in (False, True):
-        steps = largest_steps(mlp, drawn_paths(rng, pairs.rows(slice(30)), 0.02, flat))
+        steps = largest_steps(mlp, drawn_paths(rng, drawn(name, 30), 0.02, flat))
         print(name, [f'{step.max():.2g}' for step in steps])
-        for step, most in zip(steps, WORST_STEP.values()):
-            assert step.max() <= most
+        assert steps[0].max() <= WORST_STEP
 
 
 # --- the network ----------------------------------------------------------------------------------
@@ -468,10 +386,11 @@ def test_the_compiled_network_is_the_shipped_file() -> None:
     numbers = np.array([float(text) for text in re.findall(r'([-\d.e]+)F', body)], np.float32)
     assert np.array_equal(numbers, SHIPPED)
     pairs = drawn('crossed bars', 200)
-    assert_same_bits(pairs.contacts(ContactSolver(UNIT, UNIT)), with_numbers(pairs, SHIPPED))
+    assert_same_bits(pairs.contacts(ContactSolver(UNIT, UNIT, model='mlp')),
+                     with_numbers(pairs, SHIPPED))
 
 
-def written(path: Path, widths: tuple[int, ...] = (FEATURES, 4, 1), name: str = NETWORK,
+def written(path: Path, widths: tuple[int, ...] = (FEATURES, 4, 4, OUTPUTS), name: str = NETWORK,
             **changes: Any) -> str:
     """Return a weights file with a network of zeros and a card that fits it, but for `changes`."""
     tensors = {f'{name}.{layer}.{part}': np.zeros(shape, np.float32)
@@ -482,36 +401,43 @@ def written(path: Path, widths: tuple[int, ...] = (FEATURES, 4, 1), name: str = 
     return str(path)
 
 
-def test_a_network_of_zeros_is_taken(tmp_path: Path) -> None:
-    """It chooses the middle between the brackets."""
+def test_a_network_of_zeros_is_the_body_of_the_chords(tmp_path: Path) -> None:
     pairs = drawn('crossed bars')
-    found = pairs.contacts(ContactSolver(UNIT, UNIT, weights=written(tmp_path / 'zeros')))
-    assert_same_bits(found, with_numbers(pairs, np.zeros(1, np.float32)))
-    least, most = with_numbers(pairs, LEAST), with_numbers(pairs, MOST)
-    both = found.volume != pairs.contacts().volume  # not left to `exact` by any
-    np.testing.assert_allclose(found.volume[both], 0.5 * (least.volume + most.volume)[both],
-                               rtol=1e-6)
+    found = pairs.contacts(ContactSolver(UNIT, UNIT, model='mlp',
+                                         weights=written(tmp_path / 'zeros')))
+    rows = found.colliding
+    body = stages(*pairs, names=('body_volume', 'patch_half'))
+    np.testing.assert_allclose(
+        found.volume[rows], (body.body_volume * np.prod(2.0 * body.patch_half, axis=1))[rows],
+        rtol=1e-6)
 
 
-@pytest.mark.parametrize('hidden', [(), (8, 8), (UNITS_MAX + 1,)])
+@pytest.mark.parametrize('hidden', [(), (8,), (8, 8, 8), (UNITS_MAX + 1, 8)])
 def test_layers_that_the_core_does_not_have_are_refused(tmp_path: Path, hidden: tuple) -> None:
-    """None or two hidden layers, or too many units."""
-    weights = written(tmp_path / 'other', (FEATURES, *hidden, 1))
-    with pytest.raises(WeightsError, match=f'one hidden layer, of at most {UNITS_MAX} units'):
-        ContactSolver(UNIT, UNIT, weights=weights)
+    """None, one or three hidden layers, or too many units."""
+    weights = written(tmp_path / 'other', (FEATURES, *hidden, OUTPUTS))
+    with pytest.raises(WeightsError, match=f'two hidden layers, of at most {UNITS_MAX} units'):
+        ContactSolver(UNIT, UNIT, model='mlp', weights=weights)
 
 
 @pytest.mark.parametrize('change, words', [
-    ({'format': NETWORK_FORMAT - 1}, f'has format 2; this version reads {NETWORK_FORMAT}'),
-    ({'format': '3'}, "has format '3'"), ({'format': True}, 'has format True'),
+    ({'format': NETWORK_FORMAT - 1}, f'has format 3; this version reads {NETWORK_FORMAT}'),
+    ({'format': '4'}, "has format '4'"), ({'format': True}, 'has format True'),
     ({'format': None}, 'has format None'),
     ({'activation': 'softsign'}, "units are 'relu', not 'softsign'"),
     ({'activation': None}, "units are 'relu', not None"),
-    ({'name': 'point'}, f"no network 'share' with {FEATURES} inputs and 1 outputs"),
-    ({'widths': (FEATURES + 1, 4, 1)}, f'with {FEATURES} inputs and 1 outputs'),
-    ({'widths': (FEATURES, 4, 2)}, f'with {FEATURES} inputs and 1 outputs')])
+    ({'name': 'point'}, f"no network 'patch' with {FEATURES} inputs and {OUTPUTS} outputs"),
+    ({'widths': (FEATURES + 1, 4, 4, OUTPUTS)}, f'with {FEATURES} inputs and {OUTPUTS} outputs'),
+    ({'widths': (FEATURES, 4, 4, 2)}, f'with {FEATURES} inputs and {OUTPUTS} outputs')])
 def test_weights_with_another_meaning_are_refused(
         tmp_path: Path, change: dict[str, Any], words: str) -> None:
     """They would be taken without complaint, and answer nonsense."""
     with pytest.raises(WeightsError, match=words):
-        ContactSolver(UNIT, UNIT, weights=written(tmp_path / 'other', **change))
+        ContactSolver(UNIT, UNIT, model='mlp', weights=written(tmp_path / 'other', **change))
+
+
+@pytest.mark.parametrize('numbers', [SHIPPED[:-1], SHIPPED[2:], np.zeros(1, np.float32),
+                                     np.r_[np.float32(9), SHIPPED[1:]]])
+def test_numbers_that_are_no_network_are_refused(numbers: np.ndarray) -> None:
+    with pytest.raises(ValueError, match='the network fits'):
+        native.PairSolver('mlp', UNIT, UNIT, numbers)

@@ -23,6 +23,7 @@ from benchmarks.paper.fit import Ensemble, PaperSettings, Scaling, fit, tensors
 from benchmarks.paper.jobs import JOBS, SHIPPED, PaperJob
 from box_contact_ros.solver.weights_file import load_weights
 from training import __main__ as train
+from training import paper
 
 SMALL = PaperSettings((6, 9, 7, 4), networks=3, epochs=12, batch=50, rate=0.05)
 
@@ -136,7 +137,7 @@ def test_quick_training(quick: Path, job: PaperJob) -> None:
         assert np.all(np.isfinite(predict(weights.networks[name], external.inputs)))
 
 
-@pytest.mark.parametrize(('job', 'folded'), [('containers', True), ('table-1-dropped', False)])
+@pytest.mark.parametrize(('job', 'folded'), [('paper', True), ('table-1-dropped', False)])
 def test_one_job_is_folded_and_one_as_drawn(job: str, folded: bool, quick: Path) -> None:
     card = load_weights(quick / f'{JOBS[job].name}.safetensors').card
     assert card['data']['folded_in'] is folded
@@ -157,17 +158,34 @@ def test_a_loss_that_is_not_wrapped_sees_the_turn(sets: dict[str, dataset.Patter
     assert far - near == pytest.approx(2 * np.pi, abs=1.0)
 
 
+@pytest.mark.parametrize('output', paper.SETTINGS)
+def test_quick_training_for_a_scene(output: str, tmp_path: Path) -> None:
+    """Weights that the solver takes by its size; the point's error has fallen."""
+    assert train.main(['paper', '--scene', 'random cubes', '--output', output, '--quick', '--out',
+                       str(tmp_path)]) == 0
+    path, = tmp_path.iterdir()
+    card = load_weights(path).card
+    assert path.stem == ('paper' if output == paper.ANGLES else 'paper-place')
+    assert card['sizes'] == [[2.0, 2.0, 2.0]] * 2 and card['data']['scene'] == 'random cubes'
+    assert card['metrics']['p50'] < 40.0
+    with pytest.raises(ValueError, match='boxes of several sizes'):
+        paper.train(tmp_path, 'random sizes', output, seed=1, commit='', counts=(9, 9, 9))
+
+
 def test_each_file_has_its_folder() -> None:
     """What the package ships is in weights/, what the tables alone need beside them."""
-    assert {job.name for job in JOBS.values() if job.folder == SHIPPED} == {
-        path.stem for path in SHIPPED.iterdir()} - {train.MLP}
+    assert {job.name for job in JOBS.values() if job.folder == SHIPPED} == {'paper'}
+    containers = 'paper-12.192x2.438x2.591'
+    assert {path.stem for path in SHIPPED.iterdir()} == {
+        train.MLP, 'paper', containers, f'{containers}-place'}
     for job in JOBS.values():
         assert (job.folder / f'{job.name}.safetensors').exists()
 
 
 @pytest.mark.parametrize(('arguments', 'message'), [
-    ([], 'required: WHAT'),
-    (['mlp', '--hidden', '65'], '--hidden: must lie in 1 to 64'),
+    (['mlp', '--hidden', '65', '8'], '--hidden: must lie in 1 to 64'),
+    (['mlp', '--scene', 'containers'], '--scene is of paper alone'),
+    (['paper', '--scene', 'yard'], "invalid choice: 'yard'"),
     (['papers'], "invalid choice: 'papers'"),
     (['paper', '--seed', '-1'], "'-1' is not a whole number from 0"),
 ])

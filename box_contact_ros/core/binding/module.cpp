@@ -249,9 +249,9 @@ struct Setup {
   double size_a[3], size_b[3];  // full extents [m]
   double margin = 0.0;          // [m]
   std::vector<float> network;   // of model `mlp`
-  std::atomic<long> clipped{0}, exact{0};
+  std::atomic<long> clipped{0};
 
-  Solver solver() const { return {kernel, model, {network.data(), long(network.size())}}; }
+  Solver solver() const { return {kernel, model, network.data()}; }
   detail::PairNumbers pair(const double* pose_a, const double* pose_b) const {
     return {pose_a, pose_b, size_a, size_b};
   }
@@ -260,7 +260,6 @@ struct Setup {
   }
   void count(const Counts& counts) {
     if (counts.clipped) clipped += counts.clipped;
-    if (counts.exact) exact += counts.exact;
   }
 };
 
@@ -356,11 +355,17 @@ PyObject* solver_batch(PyObject* self, PyObject* args, PyObject* keywords) {
   return call_method(self, name_batch_general, args, keywords);
 }
 
-// Whether a model has the network that it needs. A network of `mlp` has the output's bias, then the
-// numbers of each unit.
+// Whether a model has the network that it needs. A network of `mlp` has the groups of each hidden
+// layer, then groups of eight units: their biases, and their weights for each input (mlp/network.hpp).
 bool fits(Model model, const std::vector<float>& network) {
   if (model == Model::exact) return network.empty();
-  return !network.empty() && (network.size() - 1) % detail::unit_numbers == 0;
+  constexpr long most = detail::network_units_max / 8;
+  if (network.size() < 2) return false;
+  float first = network[0], second = network[1];
+  if (!(first >= 1.0F && first <= most && second >= 1.0F && second <= most)) return false;
+  long groups = long(first), next = long(second);
+  long units = 8 * (1 + detail::network_features) * groups + 8 * (1 + 8 * groups) * next;
+  return long(network.size()) == 2 + units + 8 * (1 + 8 * next);
 }
 
 // Sizes, model and network, as `PairSolver` takes them. No network: the shipped one.
@@ -434,10 +439,6 @@ PyObject* solver_clipped(PyObject* self, void*) {
   const auto& setup = self_of(self)->setup;
   return PyLong_FromLong(setup ? setup->clipped.load() : 0);
 }
-PyObject* solver_exact(PyObject* self, void*) {
-  const auto& setup = self_of(self)->setup;
-  return PyLong_FromLong(setup ? setup->exact.load() : 0);
-}
 
 PyMethodDef solver_methods[] = {
     {"solve", method<solver_solve>(), METH_FASTCALL,
@@ -462,8 +463,6 @@ PyMethodDef solver_methods[] = {
     {nullptr, nullptr, 0, nullptr}};
 PyGetSetDef solver_attributes[] = {{"clipped", Guarded<solver_clipped>::call, nullptr,
                                     "Contacts of model exact that were clipped.", nullptr},
-                                   {"fallbacks", Guarded<solver_exact>::call, nullptr,
-                                    "Contacts that model mlp left to exact.", nullptr},
                                    {nullptr, nullptr, nullptr, nullptr, nullptr}};
 
 PyType_Slot solver_slots[] = {
@@ -562,7 +561,9 @@ struct Whole {
   long value;
 };
 constexpr Whole wholes[] = {{"NETWORK_FORMAT", detail::network_format},
-                            {"FEATURES", detail::network_features}};
+                            {"FEATURES", detail::network_features},
+                            {"OUTPUTS", detail::network_outputs},
+                            {"UNITS_MAX", detail::network_units_max}};
 struct Constant {
   const char* name;
   double value;
@@ -570,9 +571,7 @@ struct Constant {
 constexpr Constant constants[] = {
     {"LENGTH_MIN", length_min},         {"LENGTH_MAX", length_max},
     {"QUATERNION_MIN", quaternion_min}, {"QUATERNION_MAX", quaternion_max},
-    {"CONTACT_ULPS", contact_ulps},     {"DEPTH_FLOOR", depth_floor},
-    {"BRACKET_LIMIT", bracket_limit},   {"SPREAD_LIMIT", spread_limit},
-    {"UPPER_LIMIT", upper_limit}};
+    {"CONTACT_ULPS", contact_ulps},     {"DEPTH_FLOOR", depth_floor}};
 
 bool add(PyObject* module, const char* name, PyObject* value) {
   Owned owned(value);

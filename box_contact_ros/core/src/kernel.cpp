@@ -13,7 +13,6 @@ namespace box_contact::BOX_CONTACT_SET {
 namespace {
 
 using detail::Kernel;
-using detail::NetworkNumbers;
 
 #if defined(__AVX512F__)
 constexpr int lanes = 8;
@@ -31,20 +30,20 @@ constexpr const char* title = "baseline";
 #endif
 
 template <class M>
-M model_of(const NetworkNumbers& network) {
+M model_of(const float* network) {
   if constexpr (std::is_empty_v<M>) {
     return {};
   } else {
-    return {view(network.numbers, network.count)};
+    return {view(network)};
   }
 }
 template <class M>
-bool pair_by(const NetworkNumbers& network, const detail::PairNumbers& pair, double margin,
+bool pair_by(const float* network, const detail::PairNumbers& pair, double margin,
              bc_contact& contact, Counts& counts) {
   return solve_pair(model_of<M>(network), pair, margin, contact, counts);
 }
 template <class M>
-long rows_by(const NetworkNumbers& network, const Rows& rows, long begin, long end,
+long rows_by(const float* network, const Rows& rows, long begin, long end,
              const Results& results, Counts& counts) {
   return solve_rows<Lanes<double, lanes>>(model_of<M>(network), rows, begin, end, results, counts);
 }

@@ -12,11 +12,9 @@
 
 namespace box_contact::detail {
 
-// The network of model `mlp`: features of what it is asked of; it has one output. `network_format`
-// counts changes of what the numbers mean.
-constexpr int network_format = 3, network_features = 6;
-// Numbers of a unit: its bias, its weights for the features, and its weight to the output.
-constexpr int unit_numbers = 1 + network_features + 1;
+// The network of model `mlp`: its outputs, and the most units of a hidden layer. `network_format` counts
+// changes of what features and outputs mean.
+constexpr int network_format = 4, network_outputs = 7, network_units_max = 64;
 
 // A step of 0 gives all rows the same sizes, one of 3 each row its own.
 struct Rows {
@@ -45,12 +43,10 @@ struct Results {
 struct Counts {
   long contacts;
   long clipped;  // by model `exact`: clipped, because the certificate did not hold
-  long exact;    // by model `mlp`: left to `exact`
 
   void operator+=(const Counts& part) {
     contacts += part.contacts;
     clipped += part.clipped;
-    exact += part.exact;
   }
 };
 
@@ -60,12 +56,6 @@ constexpr int model_count = 2;
 // Whether a function finds point and volume alone, or all moments.
 enum class Finds { point, patch };
 
-// A network in memory: the bias of its output, then the numbers of each unit.
-struct NetworkNumbers {
-  const float* numbers;
-  long count;
-};
-
 struct Kernel {
   const char* name;   // as BOX_CONTACT_INSTRUCTION_SET has it
   const char* title;  // for people
@@ -73,10 +63,10 @@ struct Kernel {
 
   // Solve a pair alone. Returns false, and leaves `contact`, if it is refused. What is not found of the
   // overlap is NaN.
-  bool (*solve_pair[model_count][2])(const NetworkNumbers&, const PairNumbers&, double margin,
+  bool (*solve_pair[model_count][2])(const float* network, const PairNumbers&, double margin,
                                      bc_contact& contact, Counts&);
   // Solve rows `begin` to `end`. Returns the first row that is refused, or −1.
-  long (*solve_rows[model_count][2])(const NetworkNumbers&, const Rows&, long begin, long end,
+  long (*solve_rows[model_count][2])(const float* network, const Rows&, long begin, long end,
                                      const Results&, Counts&);
   // Fill one row; see stages.hpp.
   bool (*fill_stages)(const Rows&, long row, const StageArrays&);

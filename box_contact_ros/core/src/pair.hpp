@@ -35,8 +35,7 @@ BC_INLINE void store(const Moments<double>& overlap, bc_contact& contact) {
 template <class Model>
 BC_INLINE bool solve_pair(const Model& model, const detail::PairNumbers& pair, double margin,
                           bc_contact& contact, Counts& counts) {
-  Query<double> queries[1];
-  Query<double>& q = queries[0];
+  Query<double> q;
   query(pose_of(pair.pose_a), pose_of(pair.pose_b), half_of(pair.size_a), half_of(pair.size_b), q);
   if (!q.pair.valid) return false;
   contact.separation = q.axis.separation;
@@ -51,17 +50,9 @@ BC_INLINE bool solve_pair(const Model& model, const detail::PairNumbers& pair, d
   for (double(&row)[3] : contact.covariance) store(unknown, row);
   contact.volume = 0.0;
   if (!q.touching) return true;
-  typename Model::template Found<double> overlap[1];
-  unsigned left[1]{};
-  model.solve(queries, overlap, left, counts);
-  if constexpr (Model::leaves_to_exact) {
-    if (left[0] & 1) {
-      ++counts.exact;
-      Counts uncounted{};
-      typename Model::Rest{}.solve(queries, overlap, left, uncounted);
-    }
-  }
-  store(overlap[0], contact);
+  typename Model::template Found<double> overlap;
+  model.solve(q, overlap, counts);  // a pair alone is left to nobody
+  store(overlap, contact);
   return true;
 }
 

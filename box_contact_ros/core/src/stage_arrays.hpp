@@ -8,18 +8,19 @@
 
 namespace box_contact::detail {
 
+// Features of the overlap that the network of model `mlp` reads.
+constexpr int network_features = 21;
+
 // Arrays with a row for each pair, nullptr where one is not wanted. core/stages.py documents them.
 struct StageArrays {
-  bool *colliding{}, *certain{}, *accurate{};
+  bool *colliding{}, *certain{};
   int64_t *axis{}, *face{};
   double *separation{}, *touch{}, *size{}, *normal{}, *axes_a{}, *rotation{};
   double *offset_a{}, *offset_b{};
   double *pressed_offset_a{}, *pressed_offset_b{}, *centroid{}, *clipped_centroid{};
   double *volume{}, *clipped_volume{}, *covariance{}, *clipped_covariance{};
-  double *unit{}, *true_volume{}, *true_mean{}, *true_covariance{};
-  float *columns_volume{}, *columns_mean{}, *columns_covariance{};
-  float *upper_volume{}, *upper_least{}, *upper_most{}, *upper_features{}, *upper_points{},
-      *upper_carries{};
+  double *patch_axes{}, *patch_middle{}, *patch_half{};
+  float *features{}, *body_volume{}, *body_mean{}, *body_variance{}, *body_beside{}, *flip{};
 
   // Call visit(name, pointer, shape of a row) for each array.
   template <class Visit>
@@ -44,20 +45,15 @@ struct StageArrays {
     visit("clipped_volume", clipped_volume, {});
     visit("covariance", covariance, {3, 3});
     visit("clipped_covariance", clipped_covariance, {3, 3});
-    visit("accurate", accurate, {});
-    visit("unit", unit, {});
-    visit("true_volume", true_volume, {});
-    visit("true_mean", true_mean, {3});
-    visit("true_covariance", true_covariance, {3, 3});
-    visit("columns_volume", columns_volume, {});
-    visit("columns_mean", columns_mean, {3});
-    visit("columns_covariance", columns_covariance, {3, 3});
-    visit("upper_volume", upper_volume, {3});
-    visit("upper_least", upper_least, {3});
-    visit("upper_most", upper_most, {3});
-    visit("upper_features", upper_features, {3, 6});
-    visit("upper_points", upper_points, {3, 2, 3});
-    visit("upper_carries", upper_carries, {3, 2});
+    visit("patch_axes", patch_axes, {3, 3});
+    visit("patch_middle", patch_middle, {3});
+    visit("patch_half", patch_half, {3});
+    visit("features", features, {network_features});
+    visit("body_volume", body_volume, {});
+    visit("body_mean", body_mean, {3});
+    visit("body_variance", body_variance, {3});
+    visit("body_beside", body_beside, {3});
+    visit("flip", flip, {3});
   }
 };
 

@@ -24,55 +24,27 @@ inline void put(double* array, long row, const Mat<double>& m) {
     for (int j = 0; j < 3; ++j) array[9 * row + 3 * i + j] = m[i][j];
 }
 
-inline void put(float* array, long row, const Triple<float>& v) {
-  for (int k = 0; array && k < 3; ++k) array[3 * row + k] = v[k];
+template <int count>
+inline void put(float* array, long row, const float (&numbers)[count]) {
+  if (array) std::memcpy(array + count * row, numbers, sizeof numbers);
 }
 
-// The columns and what cuts them, and the exact moments in the same coordinates.
-inline void put_columns(const StageArrays& arrays, long row, const Query<double> (&queries)[1],
-                        const Moments<double>& exact) {
-  mlp::Described<double, 1> pair(queries);
-  const ContactFrame<double>& frame = pair.frames[0];
-  ColumnMoments<float> moments = column_moments(pair.columns);
-  put(arrays.accurate, row,
-      mlp::is_accurate(pair.columns, moments) && frame.depth > 0.0 &&
-          frame.depth <= frame.thickness);
-  put(arrays.unit, row, pair.unit[0]);
-  put(arrays.columns_volume, row, moments.volume);
-  put(arrays.columns_mean, row, moments.mean);
-  Triple<float> by_z = column_sums::reciprocals(pair.columns.qz);
-  for (int k = 0; k < 3; ++k) {
-    UpperFace<float> face = upper_face(pair.columns, by_z, k);
-    long at = 3 * row + k;
-    put(arrays.upper_volume, at, face.volume);
-    put(arrays.upper_least, at, face.least);
-    put(arrays.upper_most, at, face.most);
-    for (int n = 0; n < detail::network_features; ++n)
-      put(arrays.upper_features, detail::network_features * at + n, face.features[n]);
-    for (int n = 0; n < 2; ++n) {
-      put(arrays.upper_carries, 2 * at + n, face.carries[n]);
-      put(arrays.upper_points, 2 * at + n, face.at[n]);
-    }
-  }
-  // From A's frame to that of the columns.
-  const Pair<double>& boxes = queries[0].pair;
-  double by_unit = 1.0 / pair.unit[0];
-  Columns<double> to_axes = transpose(frame.b_is_incident ? boxes.axes_b : boxes.axes_a);
-  Triple<double> centre = frame.b_is_incident ? boxes.origin_b : boxes.origin_a;
-  Triple<double> t = to_axes * (triple(exact.centroid) - centre);
-  Vec<double> mean;
-  Sym<double> covariance = rotated(to_axes, exact.covariance);
-  for (int k = 0; k < 3; ++k) {
-    mean[k] = by_unit * ((frame.sign[k] * t[k] + frame.half[k]) - frame.start[k]);
-    for (int l = 0; l < 3; ++l) {
-      long at = 9 * row + 3 * k + l;
-      put(arrays.true_covariance, at,
-          by_unit * by_unit * frame.sign[k] * frame.sign[l] * covariance(k, l));
-      put(arrays.columns_covariance, at, k == l ? moments.variance[k] : moments.beside[3 - k - l]);
-    }
-  }
-  put(arrays.true_mean, row, mean);
-  put(arrays.true_volume, row, exact.volume * by_unit * by_unit / pair.depth[0]);
+// The patch box in the common frame, and what model `mlp` knows of the overlap.
+inline void put_patch(const StageArrays& arrays, long row, const Query<double>& query) {
+  mlp::PatchBox<double> box(query);
+  mlp::Chords<float> chords(box);
+  mlp::PlacedBox<double> placed(query.pair, box);
+  put(arrays.patch_axes, row, matrix(placed.axes));
+  put(arrays.patch_middle, row, components<double>(placed.middle));
+  put(arrays.patch_half, row, Vec<double>{box.half[0], box.half[1], box.half[2]});
+  float told[detail::network_features];
+  chords.tell(told);
+  put(arrays.features, row, told);
+  put(arrays.body_volume, row, chords.volume);
+  put(arrays.body_mean, row, chords.mean);
+  put(arrays.body_variance, row, chords.variance);
+  put(arrays.body_beside, row, chords.beside);
+  put(arrays.flip, row, chords.flip);
 }
 
 // A single pair as the caller names its boxes, in the frame of the caller's A.
@@ -120,21 +92,15 @@ inline bool fill_stages(const Rows& rows, long row, const StageArrays& arrays) {
   put(arrays.rotation, row, callers.rotation());
   put(arrays.offset_a, row, callers.offset_a());
   put(arrays.offset_b, row, callers.offset_b());
-  bool of_columns = arrays.accurate || arrays.unit || arrays.true_volume || arrays.true_mean ||
-                    arrays.true_covariance || arrays.columns_volume || arrays.columns_mean ||
-                    arrays.columns_covariance || arrays.upper_volume || arrays.upper_least ||
-                    arrays.upper_most || arrays.upper_features || arrays.upper_points ||
-                    arrays.upper_carries;
-  if (of_columns || arrays.centroid || arrays.volume || arrays.covariance || arrays.certain) {
+  if (arrays.centroid || arrays.volume || arrays.covariance || arrays.certain) {
     Counts counts{};
     Moments<double> exact = exact_overlap(q, counts);
     put(arrays.centroid, row, callers.from_common_frame(exact.centroid));
     put(arrays.volume, row, exact.volume);
     put(arrays.covariance, row, matrix(exact.covariance));
     put(arrays.certain, row, counts.clipped == 0);
-    Query<double> queries[1] = {q};
-    if (of_columns) put_columns(arrays, row, queries, exact);
   }
+  if (q.touching && (arrays.features || arrays.patch_half)) put_patch(arrays, row, q);
   Pair<double> pressed = q.pair;
   bool was_pressed = enforce_minimum_depth(pressed, q.axis);
   CallersFrame pressed_callers{pressed};

@@ -56,11 +56,6 @@ using Number = typename NumberOf<T>::type;
 template <class T>
 constexpr int width = sizeof(T) / sizeof(Number<T>);
 
-// The bits of float64, as integers.
-template <class T>
-using BitsOf = typename std::conditional_t<is_scalar<T>, NumberOf<uint64_t>,
-                                           LanesOf<uint64_t, is_scalar<T> ? 2 : width<T>>>::type;
-
 // What a comparison of T gives: bool, or a vector of integers, 0 or −1.
 template <class T>
 using Mask = decltype(T() < T());
@@ -68,7 +63,7 @@ using Mask = decltype(T() < T());
 // The same number in every lane.
 template <class T>
 BC_INLINE T splat(Number<T> x) {
-  return T{} + x;
+  return x - T{};  // no instruction, while −0 + 0 is one
 }
 
 template <class T>
@@ -83,8 +78,6 @@ BC_INLINE T min(T a, T b) {
 #if defined(__AVX512F__)
   if constexpr (std::is_same_v<T, Lanes<double, 8>>)
     return (T)_mm512_maskz_min_pd(0xff, (__m512d)a, (__m512d)b);
-  if constexpr (std::is_same_v<T, Lanes<float, 16>>)
-    return (T)_mm512_maskz_min_ps(0xffff, (__m512)a, (__m512)b);
 #endif
 #if defined(__AVX__)
   if constexpr (std::is_same_v<T, Lanes<double, 4>>)
@@ -102,8 +95,6 @@ BC_INLINE T max(T a, T b) {
 #if defined(__AVX512F__)
   if constexpr (std::is_same_v<T, Lanes<double, 8>>)
     return (T)_mm512_maskz_max_pd(0xff, (__m512d)a, (__m512d)b);
-  if constexpr (std::is_same_v<T, Lanes<float, 16>>)
-    return (T)_mm512_maskz_max_ps(0xffff, (__m512)a, (__m512)b);
 #endif
 #if defined(__AVX__)
   if constexpr (std::is_same_v<T, Lanes<double, 4>>)
@@ -132,7 +123,9 @@ BC_INLINE T abs(T x) {
 
 template <class T>
 BC_INLINE T sqrt(T x) {
-  if constexpr (is_scalar<T>) {
+  if constexpr (std::is_same_v<T, float>) {
+    return __builtin_sqrtf(x);  // as for abs
+  } else if constexpr (is_scalar<T>) {
     return std::sqrt(x);
 #if defined(__AVX512F__)
   } else if constexpr (std::is_same_v<T, Lanes<double, 8>>) {
@@ -141,37 +134,20 @@ BC_INLINE T sqrt(T x) {
 #if defined(__AVX__)
   } else if constexpr (std::is_same_v<T, Lanes<double, 4>>) {
     return (T)_mm256_sqrt_pd((__m256d)x);
+  } else if constexpr (std::is_same_v<T, Lanes<float, 8>>) {
+    return (T)_mm256_sqrt_ps((__m256)x);
 #endif
 #if defined(__SSE2__)
   } else if constexpr (std::is_same_v<T, Lanes<double, 2>>) {
     return (T)_mm_sqrt_pd((__m128d)x);
+  } else if constexpr (std::is_same_v<T, Lanes<float, 4>>) {
+    return (T)_mm_sqrt_ps((__m128)x);
 #endif
   } else {
     T root{};
-    for (int i = 0; i < width<T>; ++i) root[i] = std::sqrt(x[i]);
+    for (int i = 0; i < width<T>; ++i) root[i] = sqrt<Number<T>>(x[i]);
     return root;
   }
-}
-
-// The power of two at or below the root of x > 0, and what a power of two is divided into 1.
-template <class T>
-BC_INLINE T power_of_two_near_root(T x) {
-  static_assert(sizeof(Number<T>) == sizeof(uint64_t), "float64");
-  constexpr int exponent = 52, bias = 1023;
-  BitsOf<T> bits;
-  std::memcpy(&bits, &x, sizeof bits);
-  bits = ((bits >> exponent) + bias) >> 1 << exponent;
-  std::memcpy(&x, &bits, sizeof bits);
-  return x;
-}
-template <class T>
-BC_INLINE T reciprocal_of_power(T x) {
-  constexpr int exponent = 52, bias = 1023;
-  BitsOf<T> bits;
-  std::memcpy(&bits, &x, sizeof bits);
-  bits = (uint64_t(2 * bias) << exponent) - bits;
-  std::memcpy(&x, &bits, sizeof bits);
-  return x;
 }
 
 template <class T>
@@ -199,8 +175,6 @@ BC_INLINE unsigned bits(M mask) {
 #if defined(__AVX512F__)
   } else if constexpr (sizeof(M) == 64 && width<M> == 8) {
     return _mm512_test_epi64_mask((__m512i)mask, (__m512i)mask);
-  } else if constexpr (sizeof(M) == 64 && width<M> == 16) {
-    return _mm512_test_epi32_mask((__m512i)mask, (__m512i)mask);
 #endif
 #if defined(__AVX__)
   } else if constexpr (sizeof(M) == 32 && width<M> == 4) {

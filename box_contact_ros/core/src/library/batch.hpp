@@ -34,7 +34,7 @@ const Kernel* chosen_kernel();
 struct Solver {
   const Kernel* kernel;
   Model model;
-  NetworkNumbers network;  // of model `mlp`
+  const float* network;  // of model `mlp`
 
   // Solve rows `begin` to `end` in this thread. Returns the first row that is refused, or −1.
   long solve(const Rows& rows, long begin, long end, const Results& results,
@@ -56,7 +56,7 @@ inline bool solve_pair(const Solver& solver, const PairNumbers& pair, bc_patch p
   return true;
 }
 
-// Rows that a thread takes at a time: some 100 µs of work, and whole groups of blocks.
+// Rows that a thread takes at a time: some 100 µs of work, and whole blocks.
 constexpr long rows_per_chunk = 512;
 
 inline long solve_in_threads(const Solver& solver, const Rows& rows, long count,

@@ -83,8 +83,7 @@ bc_status with_query(const bc_query* given, Work work) {
   const Kernel* kernel = chosen_kernel();
   bool known = number_of(query.model) <= BC_MLP && number_of(query.patch) <= BC_COVARIANCE;
   if (!kernel || !known || !(query.margin >= 0.0)) return refuse_query(query);
-  constexpr NetworkNumbers shipped{shipped_network, long(std::size(shipped_network))};
-  return work(Solver{kernel, query.model == BC_MLP ? Model::mlp : Model::exact, shipped}, query);
+  return work(Solver{kernel, query.model == BC_MLP ? Model::mlp : Model::exact, shipped_network}, query);
 }
 
 // Whether all places of boxes are within the poses. `first`: the first row where they are not.

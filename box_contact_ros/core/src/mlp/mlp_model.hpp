@@ -1,270 +1,83 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// Model `mlp`: SAT, columns under the contact face, and a network between proven brackets.
+// Model `mlp`: SAT, chords of the overlap, and a multilayer perceptron that corrects what they sum to.
 //
-// SAT decides, and gives normal and separation. In the contact frame (columns/contact_frame.hpp)
+// All pairs take the same instructions, whatever their poses. The patch box (patch_box.hpp) holds A∩B.
+// 48 chords in it give volume, centroid and covariance of a body close to A∩B (chords.hpp). The network
+// has seven outputs. Each is the exponent of a factor, from 1/4 to 4:
 //
-//   A∩B = L − U_0 − U_1 − U_2.
+//   centroid: of the odds u / (1 − u), with u from 0 to 1 the place between the bounds of a coordinate
+//   volume: of the body's volume, up to that of the patch box
+//   covariance: of the body's deviation along each axis, up to half of the patch box's extent
 //
-// L are the columns between the reference face and the lower faces of the incident box Q, whose
-// moments are exact but for float32 (columns/column_moments.hpp). U_k is what the upper face k cuts
-// off them. Its volume without P's side faces has a closed form, and P's side faces leave a share of
-// it, between brackets that meet where they miss the body (columns/upper_faces.hpp). The network says
-// where in between. Volume, point and covariance are those of one body: L less two points of mass for
-// each U_k.
-//
-// Guarantees, whatever the weights are, for pairs that are not left to `exact`:
-//
-// 1. The volume is within `bracket_limit` of the true one, plus rounding: the brackets hold the truth,
-//    and are that close.
-// 2. The volume is positive, the covariance is positive definite. L is convex, so any point p of it
-//    has (p − c)ᵀ C⁻¹ (p − c) ≤ 15 about its centroid c and covariance C (Kannan, Lovász and
-//    Simonovits 1995). A share ε of its mass taken from such points leaves at least
-//    (1 − 15 ε − 15 ε² / (1 − ε)) C > 0.2 C for ε ≤ `upper_limit`. Points that are moved between P's
-//    side faces may leave L, so the determinant is tested as well.
-// 3. The point is in both boxes. In exact arithmetic the centroid of L is: less than 1/e of L is
-//    beyond any face (Grünbaum 1960). A test in float64 covers the rest.
-//
-// Whoever fails a test is left to `exact`, and counted: brackets too far apart, a far side, rounding, a
-// needle, a touch along several axes at once. The test of rounding compares sums with the sums of
-// magnitudes, and means with deviations.
+// So whatever the weights are, the point is within the bounds of A∩B, the volume is positive and not
+// above that of the bounds, and the covariance is positive definite.
 #pragma once
 
-#include "../columns/upper_faces.hpp"
-#include "../overlap/exact.hpp"
+#include "../overlap/moments.hpp"
+#include "chords.hpp"
 #include "network.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
 
-// How far apart the brackets may be [of the volume], and their second moments [of those of L].
-constexpr float bracket_limit = 0.0095F, spread_limit = 0.05F;
-// How much all upper faces may cut off [of the volume].
-constexpr float upper_limit = 0.05F;
-// Upper faces that cut off less than this [of the volume] are not looked at.
-constexpr float upper_least = 1e-6F;
-// Rounding of the covariance [of 2⁻²⁴]: sums of magnitudes by sums, times squared means by variances.
-constexpr float rounding_limit = 3000.0F;
-// Least determinant of the correlations of t_k: the rounding above moves it by less.
-constexpr float least_determinant = 2e-3F;
-// Second largest variance of t_k [of the largest]: float32 resolves no narrower needles.
-constexpr float least_width2 = 1e-12F;
-// Less than this [of the depth], along an edge of Q or of a side of P, is nothing. Squares of such
-// numbers underflow, which takes a hundred times as long. Boxes that stand squarely have many.
-constexpr float nothing = 0x1p-24F;
-// How near an end of Q's edges may be to an edge of the contact face, in both coordinates [of them].
-constexpr float coincidence = 1e-6F;
-
 namespace mlp {
 
-// The contact frame of a group of pairs in float32, and what leads back.
-template <class T, int count>
-struct Described {
-  ContactFrame<T> frames[count];
-  T unit[count], depth[count];  // [m]
-  ColumnFrame<Narrow<T>> columns;
+static_assert(features == network_features, "what the chords tell is what the network reads");
 
-  BC_INLINE explicit Described(const Query<T> (&queries)[count]) {
-    T by_unit[count], height[count];
-    for (int g = 0; g < count; ++g) {
-      const Pair<T>& pair = queries[g].pair;
-      frames[g] = contact_frame_of(pair, queries[g].axis);
-      T deep = max(-queries[g].axis.separation, depth_floor * pair.size);
-      unit[g] = power_of_two_near_root(pair.size * deep);
-      by_unit[g] = reciprocal_of_power(unit[g]);
-      depth[g] = max(frames[g].depth, 1e-6 * deep);
-      height[g] = depth[g] * by_unit[g];
+// Largest exponent of a factor.
+constexpr float most_exponent = 3.0F;
+// Least distance of the centroid from the bounds [of the extent].
+constexpr float least_margin = 1e-3F;
+
+// A factor from 1/4 to 4, smooth and increasing, by one division.
+template <class F>
+BC_INLINE F factor(F exponent) {
+  F x = min(splat<F>(most_exponent), abs(exponent)) + 1.0F;
+  return select<F>(exponent < 0.0F, 1.0F / x, x);
+}
+
+// Volume, centroid and covariance of a body in the coordinates of the patch box.
+template <class F>
+struct Body {
+  F volume, mean[3], variance[3], beside[3];
+
+  BC_INLINE Body(const Chords<F>& chords, const F (&answers)[8]) {
+    F deviation[3];
+    for (int i = 0; i < 3; ++i) {
+      F place = min(0.5F + 0.5F * chords.mean[i], splat<F>(1.0F - least_margin));
+      F odds = place * factor<F>(answers[i]);
+      mean[i] = chords.flip[i] * (2.0F * (odds / (odds + (1.0F - place))) - 1.0F);
+      F most = 1.0F / sqrt(chords.variance[i]);
+      deviation[i] = min(factor<F>(answers[4 + i]), most);
     }
-    using Frame = ContactFrame<T>;
-    using Narrow = box_contact::BOX_CONTACT_SET::Narrow<T>;
-    auto narrowed = [&](auto of) {
-      T parts[count];
-      for (int g = 0; g < count; ++g) parts[g] = of(frames[g], g);
-      return narrow<T>(parts);
-    };
-    auto narrowed_triple = [&](auto of) {
-      Triple<T> parts[count];
-      for (int g = 0; g < count; ++g) parts[g] = of(frames[g], g);
-      return narrow_triple<T>(parts);
-    };
-    columns.height = narrow<T>(height);
-    columns.rise = 1.0F / columns.height;
-    Triple<Narrow> whole =
-        narrowed_triple([&](const Frame& f, int g) { return by_unit[g] * f.half; });
-    Triple<Narrow> least = uniform(nothing * columns.height);
-    auto noticed = [&](auto of) {
-      return each(
-          [](auto q, auto whole, auto least) {
-            return select<decltype(q)>(abs(q) * whole > least, q, decltype(q){});
-          },
-          narrowed_triple(of), whole, least);
-    };
-    columns.qx = noticed([](const Frame& f, int) { return f.qx; });
-    columns.qy = noticed([](const Frame& f, int) { return f.qy; });
-    Triple<Narrow> qz = noticed([](const Frame& f, int) { return f.qz; });
-    columns.qz = columns.rise * qz;
-    columns.lift = columns.height * qz;
-    columns.length = narrowed_triple([&](const Frame& f, int g) { return by_unit[g] * f.length; });
-    columns.jacobian = each(
-        [](auto start, auto qz) {
-          using N = decltype(qz);
-          return select<N>(start > 0.0F, N{}, qz);
-        },
-        narrowed_triple([&](const Frame& f, int g) { return by_unit[g] * f.start; }), qz);
-    auto side = [&](auto of) {
-      Narrow at = narrowed(of);
-      return select<Narrow>(abs(at) > nothing * columns.height, at, Narrow{});
-    };
-    columns.low_x = side([&](const Frame& f, int g) { return (-f.half_x - f.x) * by_unit[g]; });
-    columns.high_x = side([&](const Frame& f, int g) { return (f.half_x - f.x) * by_unit[g]; });
-    columns.low_y = side([&](const Frame& f, int g) { return (-f.half_y - f.y) * by_unit[g]; });
-    columns.high_y = side([&](const Frame& f, int g) { return (f.half_y - f.y) * by_unit[g]; });
-  }
-
-  // The centroid of block g in Q's frame, from Q's centre [m].
-  BC_INLINE Triple<T> in_incident(const Triple<Narrow<T>>& mean, int g) const {
-    const ContactFrame<T>& frame = frames[g];
-    return frame.sign * ((frame.start + unit[g] * widen_triple<T>(mean, g)) - frame.half);
-  }
-  // Its covariance there [m²].
-  BC_INLINE Sym<T> in_incident(const ColumnMoments<Narrow<T>>& moments, int g) const {
-    const Triple<T>& sign = frames[g].sign;
-    T unit2 = unit[g] * unit[g];
-    Triple<T> variance = unit2 * widen_triple<T>(moments.variance, g);
-    Triple<T> beside =
-        (rotated(sign) * rotated_back(sign)) * (unit2 * widen_triple<T>(moments.beside, g));
-    return {{variance[0], variance[1], variance[2], beside[0], beside[1], beside[2]}};
-  }
-  BC_INLINE T volume(const Narrow<T>& v, int g) const {
-    return widen<T>(v, g) * ((unit[g] * unit[g]) * depth[g]);
+    volume = min(chords.volume * factor<F>(answers[3]), splat<F>(1.0F));
+    for (int i = 0; i < 3; ++i) {
+      int j = (i + 1) % 3, k = (i + 2) % 3;
+      variance[i] = (deviation[i] * deviation[i]) * chords.variance[i];
+      beside[i] = (deviation[j] * deviation[k]) *
+                  ((chords.flip[j] * chords.flip[k]) * chords.beside[i]);
+    }
   }
 };
 
-// Where an upper face may cut off enough to be looked at: its legs below the water, and an upper bound
-// of its volume.
-template <class F>
-BC_INLINE Mask<F> may_cut(const ColumnFrame<F>& frame, const Triple<F>& by_z, int k, F volume) {
-  int j = (k + 1) % 3, l = (k + 2) % 3;
-  F depth = max(1.0F - frame.length[k] * frame.qz[k], F{});
-  F legs = min<F>(frame.length[j], depth * by_z[j]) * min<F>(frame.length[l], depth * by_z[l]);
-  return (frame.lift[k] * frame.rise) * (depth * legs) > upper_least * volume;
-}
+// The patch box in the common frame.
+template <class T>
+struct PlacedBox {
+  Columns<T> axes;
+  Triple<T> middle;  // [m]
 
-// Take the upper faces off the columns, where they may cut. Returns where brackets and volume are
-// within their limits.
-template <class F>
-[[gnu::noinline]] Mask<F> take_off(const Network& network, const ColumnFrame<F>& frame,
-                                   const Triple<F>& by_z, const Mask<F> (&cuts)[3],
-                                   ColumnMoments<F>& moments) {
-  F cut_off{}, bracket{}, spread{}, all{};
-  Triple<F> first{}, second{}, second_beside{};
-#pragma GCC unroll 1
-  for (int k = 0; k < 3; ++k) {
-    if (!any(cuts[k])) continue;
-    UpperFace<F> face = upper_face(frame, by_z, k);
-    F whole = select<F>(cuts[k], face.volume, F{}), uncertain = whole * (face.most - face.least);
-    F volume = whole * face.least;
-    if (any(uncertain > F{})) volume += uncertain * answer(network, face.features);
-    all += whole;
-    bracket += uncertain;
-    cut_off += volume;
-    for (int n = 0; n < 2; ++n) {
-      Triple<F> from = face.at[n] - moments.mean;
-      Triple<F> weighted = (volume * face.carries[n]) * from;
-      spread += (uncertain * face.carries[n]) * dot(from, from);
-      first = first + weighted;
-      second = second + weighted * from;
-      second_beside = second_beside + rotated(weighted) * rotated_back(from);
+  BC_INLINE PlacedBox(const Pair<T>& pair, const PatchBox<T>& box) {
+    Columns<T> axes_p = select<T>(box.p_is_b, pair.axes_b, pair.axes_a);
+    middle = select(box.p_is_b, pair.origin_b, pair.origin_a);
+    for (int i = 0; i < 3; ++i) {
+      axes[i] = axes_p * box.axes[i];
+      middle = middle + box.middle[i] * axes[i];
     }
+    // B is what is pressed.
+    middle = middle + select<T>(box.p_is_b, box.pressed, T{}) * axes[2];
   }
-  F volume = moments.volume - cut_off, by_volume = 1.0F / volume;
-  Mask<F> within = (bracket <= bracket_limit * volume) & (all <= upper_limit * moments.volume) &
-                   (spread <= spread_limit * volume * sum(moments.variance));
-  Triple<F> shift = by_volume * first;
-  moments.variance = by_volume * (moments.volume * moments.variance - second) - shift * shift;
-  moments.beside = by_volume * (moments.volume * moments.beside - second_beside) -
-                   rotated(shift) * rotated_back(shift);
-  moments.mean = moments.mean - shift;
-  moments.volume = volume;
-  return within;
-}
-
-// Where an end of Q's edges is on an edge of the contact face. The waterline, a far edge and a side
-// line may then coincide. Each is to leave their piece to the next, and rounding can close the ring.
-template <class F>
-BC_INLINE Mask<F> may_lose_a_piece(const ColumnFrame<F>& frame) {
-  Mask<F> found{};
-  for (int k = 0; k < 3; ++k) {
-    F length = frame.length[k], x = length * frame.qx[k], y = length * frame.qy[k];
-    Mask<F> in_face = abs(length * frame.qz[k] - 1.0F) <= coincidence;
-    if (!any(in_face)) continue;
-    auto meets = [](F at, F side) { return abs(at - side) <= coincidence * abs(side); };
-    found |= in_face & (meets(x, frame.low_x) | meets(x, frame.high_x) | meets(y, frame.low_y) |
-                        meets(y, frame.high_y));
-  }
-  return found;
-}
-
-// Whether float32 was enough for the columns.
-template <class F>
-BC_INLINE Mask<F> is_accurate(const ColumnFrame<F>& frame, const ColumnMoments<F>& moments) {
-  F limit = rounding_limit * moments.volume;
-  Mask<F> holds = 2.0F * moments.gross < limit;
-  for (int k = 0; k < 3; ++k) {
-    F variance = moments.variance[k], mean2 = moments.mean[k] * moments.mean[k];
-    holds &= (moments.gross * (variance + mean2) < limit * variance) & (variance > F{});
-  }
-  const Triple<F>& variance = moments.variance;
-  F low = min<F>(variance[0], variance[1]), high = max<F>(variance[0], variance[1]);
-  F middle = max(low, min<F>(high, variance[2])), longest = max<F>(high, variance[2]);
-  return holds & (middle > least_width2 * longest) & (may_lose_a_piece(frame) == 0);
-}
-
-// Whether the covariance is positive definite, with a margin.
-template <class F>
-BC_INLINE Mask<F> is_definite(const ColumnMoments<F>& moments) {
-  Triple<F> by_variance = uniform(splat<F>(1.0F)) / moments.variance;
-  Triple<F> ratio = moments.beside * rotated(by_variance);
-  Triple<F> squares = ratio * (moments.beside * rotated_back(by_variance));
-  F determinant =
-      ((1.0F - squares[0]) - (squares[1] + squares[2])) + 2.0F * ((ratio[0] * ratio[1]) * ratio[2]);
-  Mask<F> definite = determinant >= least_determinant;
-  for (int k = 0; k < 3; ++k) definite &= (squares[k] <= 1.0F) & (moments.variance[k] > F{});
-  return definite;
-}
-
-// Whether a point of Q's frame is in both boxes, to 2⁻⁴⁶ of the size.
-template <class T>
-BC_INLINE Mask<T> is_inside(const ContactFrame<T>& frame, const Triple<T>& from_origin, T size) {
-  T slack = 0x1p-46 * size;
-  T x = frame.x + dot(frame.qx, from_origin), y = frame.y + dot(frame.qy, from_origin);
-  T z = dot(frame.qz, from_origin) - frame.depth;
-  Mask<T> inside = (abs(x) <= frame.half_x + slack) & (abs(y) <= frame.half_y + slack) &
-                   (z <= slack) & (-z <= frame.thickness + slack);
-  for (int k = 0; k < 3; ++k)
-    inside &=
-        (frame.start[k] + from_origin[k] >= -slack) & (from_origin[k] <= frame.length[k] + slack);
-  return inside;
-}
-
-// Whether the minimum depth along the normal is one along all axes: elsewhere `exact` presses again.
-template <class T>
-BC_INLINE Mask<T> is_deep_enough(const Query<T>& query) {
-  T distance = depth_floor * query.pair.size + query.axis.separation;
-  Mask<T> pressed = (distance > 0.0) & query.touching;
-  if (any(pressed)) {
-    Pair<T> pair = query.pair;
-    enforce_minimum_depth(pair, query.axis);
-    pressed &= has_too_little_depth(pair);
-  }
-  return pressed == 0;
-}
-
-// 1 where the mask is set, to lead it from float32 to float64.
-template <class F>
-BC_INLINE F number(Mask<F> mask) {
-  return select<F>(mask, splat<F>(1.0F), F{});
-}
+};
 
 }  // namespace mlp
 
@@ -275,49 +88,35 @@ struct MlpModelOf {
 
   template <class T>
   using Found = FoundOf<T>;
-  template <class T>
-  static constexpr int group = narrow_group<T>;
-  using Rest = ExactModelOf<FoundOf>;
-  static constexpr bool leaves_to_exact = true;
+  using Rest = void;
 
-  template <class T, int count>
-  [[gnu::noinline]] void solve(const Query<T> (&queries)[count], Found<T> (&found)[count],
-                               unsigned (&left)[count], Counts&) const {
-    using F = Narrow<T>;
-    mlp::Described<T, count> pairs(queries);
-    ColumnMoments<F> moments = column_moments(pairs.columns);
-    Mask<F> answered = mlp::is_accurate(pairs.columns, moments);
-    Triple<F> by_z = column_sums::reciprocals(pairs.columns.qz);
-    Mask<F> cuts[3], cut{};
-    for (int k = 0; k < 3; ++k)
-      cut |= cuts[k] = mlp::may_cut(pairs.columns, by_z, k, moments.volume);
-    if (any(cut)) {
-      ColumnMoments<F> less = moments;
-      Mask<F> within = mlp::take_off(network, pairs.columns, by_z, cuts, less);
-      answered &= within | (cut == 0);
-      moments.volume = select<F>(cut, less.volume, moments.volume);
-      moments.mean = select(cut, less.mean, moments.mean);
-      moments.variance = select(cut, less.variance, moments.variance);
-      moments.beside = select(cut, less.beside, moments.beside);
+  template <class T>
+  [[gnu::noinline]] unsigned solve(const Query<T>& query, Found<T>& found, detail::Counts&) const {
+    using F = Floats<T>;
+    mlp::PatchBox<T> box(query);
+    mlp::Chords<F> chords(box);
+    F told[network_features], answers[8];
+    chords.tell(told);
+    mlp::answer(network, told, answers);
+    mlp::Body<F> body(chords, answers);
+
+    mlp::PlacedBox<T> placed(query.pair, box);
+    const T(&half)[3] = box.half;
+    Triple<T> point = placed.middle;
+    for (int i = 0; i < 3; ++i)
+      point = point + (half[i] * to_doubles<T>(body.mean[i])) * placed.axes[i];
+    found.volume = (8.0 * ((half[0] * half[1]) * half[2])) * to_doubles<T>(body.volume);
+    found.centroid = components<T>(point);
+    if constexpr (std::is_same_v<FoundOf<T>, Moments<T>>) {
+      Sym<T> covariance;
+      for (int i = 0; i < 3; ++i) {
+        int j = (i + 1) % 3, k = (i + 2) % 3;
+        covariance(i, i) = (half[i] * half[i]) * to_doubles<T>(body.variance[i]);
+        covariance(j, k) = (half[j] * half[k]) * to_doubles<T>(body.beside[i]);
+      }
+      found.covariance = rotated(placed.axes, covariance);
     }
-    answered &= mlp::is_definite(moments);
-    F answers = mlp::number<F>(answered);
-    for (int g = 0; g < count; ++g) {
-      const Pair<T>& pair = queries[g].pair;
-      const ContactFrame<T>& frame = pairs.frames[g];
-      Mask<T> sure = (widen<T>(answers, g) > 0.0) & (frame.depth > 0.0);
-      sure &= (frame.depth <= frame.thickness) & mlp::is_deep_enough(queries[g]);
-      sure &= mlp::is_inside(frame, pairs.unit[g] * widen_triple<T>(moments.mean, g), pair.size);
-      left[g] = ~bits(sure);
-      Columns<T> axes = select<T>(frame.b_is_incident, pair.axes_b, pair.axes_a);
-      Triple<T> centre = select(frame.b_is_incident, pair.origin_b, pair.origin_a);
-      Found<T>& one = found[g];
-      one.volume = pairs.volume(moments.volume, g);
-      one.centroid =
-          components<T>(centre + axes * pairs.in_incident(moments.mean, g));
-      if constexpr (std::is_same_v<FoundOf<T>, Moments<T>>)
-        one.covariance = rotated(axes, pairs.in_incident(moments, g));
-    }
+    return 0;
   }
 };
 

@@ -1,45 +1,56 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// The network: one hidden layer of rectified units and one bounded output.
+// The multilayer perceptron: two hidden layers of rectified units, and seven outputs.
 #pragma once
 
-#include "../lanes/lanes.hpp"
 #include "../kernel.hpp"
+#include "eight.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
 
 using detail::network_features;
+using detail::network_outputs;
+using detail::network_units_max;
 
+// Units are read in groups of eight: their biases, then for each input their weights for it. A group
+// that is not full is padded with zeros.
 struct Network {
-  struct Unit {
-    float bias, of_features[network_features], to_output;
-  };
-  const float* output_bias;
-  const Unit* units;
-  long count;
+  int groups[2];  // of each hidden layer
+  const float* numbers;
 };
 
-static_assert(sizeof(Network::Unit) == detail::unit_numbers * sizeof(float));
-
-// A network of `count` numbers: the bias of the output, then those of each unit.
-inline Network view(const float* numbers, long count) {
-  return {numbers, reinterpret_cast<const Network::Unit*>(numbers + 1),
-          count / detail::unit_numbers};
+// A network in memory: the number of groups of each hidden layer, and then the groups of all layers.
+inline Network view(const float* numbers) {
+  return {{int(numbers[0]), int(numbers[1])}, numbers + 2};
 }
 
-// A number from 0 to 1, for any weights that are finite.
+namespace mlp {
+
+// One layer. Returns the numbers of the next one.
 template <class F>
-BC_INLINE F answer(const Network& network, const F (&features)[network_features]) {
-  F sum = splat<F>(*network.output_bias);
-  for (const Network::Unit* unit = network.units; unit < network.units + network.count; ++unit) {
-    F hidden = splat<F>(unit->bias);
-    for (int k = 0; k < network_features; ++k) hidden += unit->of_features[k] * features[k];
-    sum += unit->to_output * max(hidden, F{});
+BC_INLINE const float* layer(const float* numbers, const F* inputs, int count, int groups,
+                             bool rectified, F* outputs) {
+  for (int g = 0; g < groups; ++g) {
+    Eight<F> sum = eight<F>(numbers);
+    numbers += 8;
+    for (int k = 0; k < count; ++k, numbers += 8)
+      sum = sum + eight<F>(inputs[k]) * eight<F>(numbers);
+    if (rectified) sum = max(sum, eight<F>(F{}));
+    for (int i = 0; i < 8; ++i) outputs[8 * g + i] = number<F>(sum, i);
   }
-  // tanh, but for 2 %: it reaches ±1 at ±3.
-  F x = min(splat<F>(3.0F), max(splat<F>(-3.0F), sum)), x2 = x * x;
-  return 0.5F + 0.5F * (x * (27.0F + x2) / (27.0F + 9.0F * x2));
+  return numbers;
 }
 
+template <class F>
+BC_INLINE void answer(const Network& network, const F (&told)[network_features],
+                      F (&answers)[8]) {
+  F first[network_units_max], second[network_units_max];
+  const float* numbers = network.numbers;
+  numbers = layer(numbers, told, network_features, network.groups[0], true, first);
+  numbers = layer(numbers, first, 8 * network.groups[0], network.groups[1], true, second);
+  layer(numbers, second, 8 * network.groups[1], 1, false, answers);
+}
+
+}  // namespace mlp
 }  // namespace box_contact::BOX_CONTACT_SET

@@ -122,30 +122,23 @@ template <class T, class Found>
   return two_sided;
 }
 
-// A model has four members for lanes T:
+// A model has three members for lanes T:
 //
 //   Found<T>: what it finds of an overlap: `Moments<T>`, or `PointAndVolume<T>`.
-//   group<T>: how many queries it takes at once.
 //   Rest: the model to which it leaves pairs, or void.
-//   leaves_to_exact: whether those are counted as left to another model.
-//
-// And `solve(queries, found, left, counts)` fills `found` for the pairs that touch, with the centroid
-// in the common frame. It sets the bits in `left` of those that it leaves.
+//   solve(query, found, counts): fills `found` for the pairs that touch, with the centroid in the
+//     common frame. It returns the bits of those that it leaves.
 
 // Pairs that have two planes across an axis of a box.
 template <template <class> class FoundOf>
 struct TwoSidedModelOf {
   template <class T>
   using Found = FoundOf<T>;
-  template <class T>
-  static constexpr int group = 1;
   using Rest = void;
-  static constexpr bool leaves_to_exact = false;
 
   template <class T>
-  BC_INLINE void solve(const Query<T> (&queries)[1], Found<T> (&found)[1], unsigned (&)[1],
-                       Counts& counts) const {
-    solve_by_planes(queries[0], true, found[0], counts);
+  BC_INLINE unsigned solve(const Query<T>& query, Found<T>& found, Counts& counts) const {
+    return solve_by_planes(query, true, found, counts);
   }
 };
 
@@ -155,16 +148,12 @@ template <template <class> class FoundOf>
 struct ExactModelOf {
   template <class T>
   using Found = FoundOf<T>;
-  template <class T>
-  static constexpr int group = 1;
   using Rest = TwoSidedModelOf<FoundOf>;
-  static constexpr bool leaves_to_exact = false;
 
   // Few pairs of W that have two planes across an axis wait for others of their kind.
   template <class T>
-  BC_INLINE void solve(const Query<T> (&queries)[1], Found<T> (&found)[1], unsigned (&left)[1],
-                       Counts& counts) const {
-    left[0] = solve_by_planes(queries[0], false, found[0], counts);
+  BC_INLINE unsigned solve(const Query<T>& query, Found<T>& found, Counts& counts) const {
+    return solve_by_planes(query, false, found, counts);
   }
 };
 
@@ -173,11 +162,9 @@ using ExactPointModel = ExactModelOf<PointAndVolume>;
 
 // The exact overlap of a single pair.
 inline Moments<double> exact_overlap(const Query<double>& q, Counts& counts) {
-  Moments<double> found[1];
-  unsigned left[1]{};
-  const Query<double> queries[1] = {q};
-  ExactModel{}.solve(queries, found, left, counts);
-  return found[0];
+  Moments<double> found;
+  ExactModel{}.solve(q, found, counts);
+  return found;
 }
 
 // All moments. What a model does not find is NaN.

@@ -1,0 +1,103 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Train the paper's network 6-20-18-4 for the scene that is asked.
+
+The paper draws boxes that just touch, at any angle to ±90°. A scene asks for other pairs. Here the
+8,000 patterns are contacts of the scene, folded by the symmetries as model `paper` folds them
+(solver/paper.py). The outputs are the paper's four angles, or x, y and z of the impact point.
+"""
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.errors import point_errors
+from benchmarks.output import percentiles
+from benchmarks.paper.dataset import INPUTS, OUTPUTS, PAPER_COUNTS, SETS, Patterns, spherical
+from benchmarks.paper.fit import PaperSettings, fit
+from benchmarks.pose_sets import LOADS, Generator, Pairs, drawn
+from benchmarks.pose_sets import SETS as POSE_SETS
+from benchmarks.weights import save_weights
+from box_contact_ros.core import stages
+from box_contact_ros.solver.contact_solver import ContactSolver
+from box_contact_ros.solver.paper import (
+    STAGES,
+    in_file_name,
+    is_cube,
+    network_inputs,
+    octant_signs,
+    touching_pairs,
+    turned,
+)
+
+SCENES: dict[str, Generator] = {**POSE_SETS, **LOADS}
+ANGLES, PLACE = 'angles', 'place'
+"""Outputs: the paper's four angles, or x, y and z of the impact point."""
+SETTINGS = {ANGLES: PaperSettings((6, 20, 18, 4), networks=16, epochs=500, rate=0.1, initial=0.7),
+            PLACE: PaperSettings((6, 20, 18, 3), networks=16, epochs=500, rate=0.1, initial=0.7,
+                                 wrap=False)}
+METRIC_PAIRS = 20_000
+
+
+def scene_patterns(pairs: Pairs, output: str) -> Patterns:
+    """Return the patterns of pairs of two equal boxes, as model `paper` asks for them."""
+    found = stages(*pairs, names=(*STAGES, 'centroid'))
+    touch = touching_pairs({name: getattr(found, name) for name in STAGES})
+    # The exact centroid in the first box's frame, half the depth farther: boxes are moved apart.
+    in_b = turned(found.rotation.swapaxes(1, 2), found.centroid - found.offset_a)
+    middle = np.where(touch.first_is_b[:, None], in_b, found.centroid)
+    point = middle - 0.5 * found.separation[:, None] * touch.normal
+    unit = 0.5 * pairs.size_a[:, :1] if is_cube(pairs.size_a[0]) else 1.0
+    m, n = octant_signs(touch.offset, touch.rotation)
+    inputs = network_inputs(m * touch.offset / unit,
+                            m[:, :, None] * touch.rotation * n[:, None])
+    if output == PLACE:
+        return Patterns(inputs, m * point / (0.5 * pairs.size_a.max(axis=1, keepdims=True)))
+    return Patterns(inputs, np.concatenate(
+        [spherical(m * point), spherical(m * touch.normal)], axis=1))
+
+
+def train(folder: Path, scene: str, output: str, *, seed: int, commit: str,
+          counts: tuple[int, ...] = PAPER_COUNTS, networks: int = 0, epochs: int = 0,
+          ) -> dict[str, Any]:
+    """Train the network for a scene of two equal boxes, and write it; return its model card.
+
+    networks, epochs: instead of those of `SETTINGS`. Raises ValueError for a scene of other boxes.
+    """
+    settings = SETTINGS[output]
+    settings = PaperSettings(settings.widths, networks=networks or settings.networks,
+                             epochs=epochs or settings.epochs, rate=settings.rate,
+                             initial=settings.initial, wrap=settings.wrap, seed=seed)
+    streams = [drawn(SCENES[scene], np.random.default_rng([seed, number]), count)
+               for number, count in enumerate(counts)]
+    sizes = np.concatenate([pairs.size_a for pairs in streams]
+                           + [pairs.size_b for pairs in streams])
+    if np.ptp(sizes, axis=0).any():
+        raise ValueError(f'scene {scene!r} has boxes of several sizes; the network is for two '
+                         'equal ones')
+    sets = dict(zip(SETS, (scene_patterns(pairs, output) for pairs in streams)))
+    fitted = fit(sets['training'], sets['cross-validation'], settings,
+                 progress=f'{scene}, {output}')
+    ending = '' if output == ANGLES else f'-{output}'
+    path = folder / f'paper{in_file_name(sizes[0])}{ending}.safetensors'
+    card: dict[str, Any] = {
+        'name': path.stem, 'model': 'paper', 'architecture': {'contact': list(settings.widths)},
+        'sizes': [sizes[0].tolist()] * 2, 'seed': seed, 'commit': commit, 'metrics': {},
+        'data': {'scene': scene, 'recipe': SCENES[scene].__doc__,
+                 'counts': dict(zip(SETS, counts))},
+        'inputs': {'names': INPUTS}, 'outputs': OUTPUTS if output == ANGLES else ('x', 'y', 'z'),
+        'training': {'algorithm': 'backpropagation with momentum, stopped by cross-validation',
+                     'starts': settings.networks, 'epochs': settings.epochs,
+                     'rate': settings.rate, 'momentum': settings.momentum}}
+    layers = {'contact': fitted.export()}
+    save_weights(path, layers, card)
+    # What is measured is what was written.
+    pairs = streams[-1].rows(slice(METRIC_PAIRS))
+    solver = ContactSolver(sizes[0], sizes[0], model='paper', weights=str(path))
+    errors = point_errors(pairs.contacts(solver).point, pairs.contacts().point, pairs.edge)
+    card['metrics'] = dict(zip(('p50', 'p99'), percentiles(errors, 50, 99)))
+    save_weights(path, layers, card)
+    return card
