@@ -102,7 +102,7 @@ class PatchForces:
 
     def wrenches(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
                  wrenches: ArrayLike | None = None) -> np.ndarray:
-        """Return the wrenches (n, 6) of contacts, for a simulator that integrates by itself.
+        """Return what contacts do (n, 6), for a simulator that integrates by itself.
 
         They are constant over the step, and lead to the velocities that `step` would return.
         """

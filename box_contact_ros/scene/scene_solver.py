@@ -109,24 +109,24 @@ class Scene:
 
     @cached_property
     def index_of(self) -> Mapping[str, int]:
-        """Indices of the boxes by name."""
+        """Return the indices of the boxes by name."""
         return {name: index for index, name in enumerate(self.boxes)}
 
     @cached_property
     def is_fixed(self) -> np.ndarray:
-        """Which boxes (n,) never move."""
+        """Return which boxes (n,) never move."""
         return np.array([box.pose is not None for box in self.boxes.values()])
 
     @cached_property
     def rows(self) -> np.ndarray:
-        """The listed pairs (m, 2) as indices of their boxes."""
+        """Return the listed pairs (m, 2) as indices of their boxes."""
         index = self.index_of
         return np.array([(index[pair.a], index[pair.b]) for pair in self.pairs],
                         dtype=np.int64).reshape(-1, 2)
 
     @cached_property
     def groups(self) -> tuple[np.ndarray, np.ndarray]:
-        """The group of each box (n,), and which groups meet by patterns (g, g): 0, 1 or 2.
+        """Return the group of each box (n,), and which groups meet by patterns (g, g): 0, 1 or 2.
 
         The rows of the latter are the group of the box that comes first in the scene: 1 if it is
         box a, 2 if it is box b. Boxes of a group match the same sides of the same patterns.
@@ -167,7 +167,7 @@ class Scene:
 
     @cached_property
     def watched(self) -> tuple[Pair, ...]:
-        """What may be stale: the listed pairs, then each moving box that patterns ask for."""
+        """Return what may be stale: listed pairs, then each moving box that patterns ask for."""
         boxes = np.flatnonzero(self._is_asked & ~self.is_fixed).tolist()
         return (*self.pairs, *(self.pair_of(box, ALONE) for box in boxes))
 

@@ -58,6 +58,8 @@ class ContactSolver(native.PairSolver):
             self._model = None if core else make_model(str(model), row_a[0], weights)
         else:
             self._model = model
+        if weights is not None and model not in ('mlp', 'paper'):
+            raise ValueError(f'weights have no effect on model {short_repr(model)}: leave them out')
         if margin and self._model is not None:
             raise ValueError(f'margin {margin:g} has no effect on model {short_repr(model)}: leave '
                              'it at 0')

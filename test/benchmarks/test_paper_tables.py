@@ -149,7 +149,7 @@ def test_a_tree_holds_its_triangles() -> None:
     assert sorted(boxes.children[~leaves].ravel()) == list(range(1, 215))
 
     def middles(number: int) -> np.ndarray:
-        """Return the middles (n, 3) of the triangles' own boxes within a box."""
+        """Return where (n, 3) the triangles' own boxes within a box have their centres."""
         if leaves[number]:
             return boxes.pose[None, number, :3]
         found = np.concatenate([middles(child) for child in boxes.children[number]])

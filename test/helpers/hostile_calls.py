@@ -49,13 +49,17 @@ def exact() -> Any:
     return native.PairSolver('exact', UNIT, UNIT)
 
 
-def a_law(n: int = 2) -> Any:
-    return native.Law(np.ones(n), np.ones((n, 3)), np.zeros((n, 3)), 200.0, 0.0, 0.001, 0.5, 9.81)
+def forces(n: int = 2) -> Any:
+    """Return the forces on n bodies of 1 kg."""
+    return native.PatchForces(np.ones(n), np.ones((n, 3)), np.zeros((n, 3)), 10, 2, 0.5)
 
 
-def a_touch(pair: Any = 1) -> tuple[Any, ...]:
-    contact = (True, -0.1, np.array([0.0, 0, 1]), np.array([0.0, 0, 0.45]), 0.1, np.eye(3) * 0.08)
-    return pair, 0, 1, contact
+def held(pairs: int = 1) -> list[Any]:
+    """Return arguments that hold so many contacts of two bodies, one above the other."""
+    each = np.ones(pairs)
+    return [np.array([(0, 1)] * pairs), -0.1 * each, np.outer(each, [0.0, 0.0, 1.0]),
+            np.outer(each, [0.0, 0.0, 0.45]), 0.1 * each, np.tile(0.08 * np.eye(3), (pairs, 1, 1)),
+            rows(2), 0.5 * each, None, None, 0.0, 0.0]
 
 
 def phase_arguments(n: int = 4) -> list[Any]:
@@ -108,10 +112,17 @@ def bounds_without_an_order() -> None:
     assert len(phase.find(place, 10**9)[0]) == n - 1
 
 
+def a_network(rng: np.random.Generator | None = None) -> np.ndarray:
+    """Return the numbers of a network with eight units in each hidden layer: random, or zeros."""
+    count = 8 * (1 + native.FEATURES) + 8 * 9 + 8 * 9
+    numbers = np.zeros(count) if rng is None else rng.uniform(-1e4, 1e4, count)
+    return np.concatenate([[1.0, 1.0], numbers]).astype(np.float32)
+
+
 def networks_that_no_file_has() -> None:
     """Weights that are not finite or too large, and counts that no network has."""
     for number in (np.nan, np.inf, -np.inf, 1e5):
-        network = np.zeros(1 + 8 * 8, np.float32)
+        network = a_network()
         network[-1] = number
         refused(ValueError, native.PairSolver, 'mlp', UNIT, UNIT, network)
     for count in (0, 2, 8):
@@ -129,8 +140,7 @@ def extreme_numbers() -> None:
     """Rows of numbers at both ends of what is accepted, and beyond, alone and in batches."""
     rng = np.random.default_rng(29)
     for _ in range(100):
-        network = rng.uniform(-1e4, 1e4, 1 + 8 * rng.integers(0, 9)).astype(np.float32)
-        for solver in (exact(), native.PairSolver('mlp', UNIT, UNIT, network)):
+        for solver in (exact(), native.PairSolver('mlp', UNIT, UNIT, a_network(rng))):
             pairs = poses.extreme_pairs(rng, 200)
             solver.solve(*pairs, 2)
             for row in range(0, 200, 10):
@@ -223,10 +233,10 @@ def pairs_changed_meanwhile() -> None:
 def random_calls(seed: int, rounds: int) -> None:
     """Call each function with some arguments replaced; print how many calls were refused."""
     rng = np.random.default_rng(seed)
-    solver, public, law, one = exact(), ContactSolver(UNIT, UNIT), a_law(), np.ones((1, 3))
+    solver, public, one, law = exact(), ContactSolver(UNIT, UNIT), np.ones((1, 3)), forces()
     places, boxes = np.array([[0, 1], [2, 3]]), np.ones((4, 3))
     targets: list[tuple[Callable[..., Any], list[Any], dict[str, Any]]] = [
-        (native.PairSolver, ['mlp', UNIT, UNIT, np.zeros(9, np.float32), 0.1], {}),
+        (native.PairSolver, ['mlp', UNIT, UNIT, a_network(), 0.1], {}),
         (solver, [POSE, ABOVE], {}), (public, [POSE, ABOVE], {}),
         (solver.batch, [rows(), rows()], {'size_a': boxes, 'threads': 2, 'patch': True}),
         (public.batch, [rows(), rows()], {'size_b': boxes, 'threads': 2, 'patch': False}),
@@ -238,10 +248,9 @@ def random_calls(seed: int, rounds: int) -> None:
         (native.message_numbers, [np.ones((4, 3)), np.ones((4, 3)), np.ones(4), np.ones(4),
                                   np.ones((4, 3, 3))], {}),
         (native.patch_areas, [np.ones((4, 3)), np.ones((4, 3, 3))], {}),
-        (native.Law, [np.ones(2), np.ones((2, 3)), np.zeros((2, 3)), 200.0, 0.0, 0.001, 0.5, 9.81],
-         {}),
-        (law.hold, [[a_touch(1), a_touch(2)], rows(2)], {}),
-        (law.wrenches, [rows(2), np.zeros((2, 6))], {})]
+        (native.PatchForces, [np.ones(2), np.ones((2, 3)), np.zeros((2, 3)), 10, 2, 0.5], {}),
+        (law.hold, held(), {}), (native.PatchForces.load, [law.save()], {}), (law.forget, [1], {}),
+        (law.step, [0.001, rows(2), np.zeros((2, 6)), None, True], {})]
     answered = 0
     for _ in range(rounds):
         function, given, keywords = targets[rng.integers(len(targets))]

@@ -83,7 +83,7 @@ def broad_phase(size, fixed=None, *, margin=0.0, listed=NONE, groups=None, allow
 
 
 def gaps(size, pose):
-    """Return the largest gaps (n, n) of bounding boxes, and the scale [m] of each two boxes."""
+    """Return how far bounding boxes are apart (n, n), and the scale [m] of each two boxes."""
     x, y, z, w = pose[:, 3:].T / np.linalg.norm(pose[:, 3:], axis=1)
     turn = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
                      [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],

@@ -34,8 +34,6 @@ UNIT = (1.0, 1.0, 1.0)
 
 K = 1.0
 """|Δpoint| ≤ K · |Δpose| · size / depth: see docs/explanation/motion.md, with figures measured."""
-STEP = 1e-3
-"""What a step of `mlp` may have beyond that [of the smaller box's longest edge]."""
 
 
 class Series(NamedTuple):
@@ -95,24 +93,6 @@ def slopes(one: Pairs, other: Pairs, before: Contacts, after: Contacts) -> np.nd
     way = pose_steps(one, other)
     way[way == 0.0] = np.nan  # no step at all, or one that float64 rounds to none
     return np.linalg.norm(after.point - before.point, axis=1) / way * depth / size
-
-
-def slopes_per_step(one: Pairs, other: Pairs, before: Contacts, after: Contacts) -> np.ndarray:
-    """(n,) depth / |Δpose|: what a step of one counts in `slopes`, but for its unit."""
-    depth = np.maximum(-np.maximum(before.separation, after.separation),
-                       DEPTH_FLOOR * largest(one))
-    way = pose_steps(one, other)
-    way[way == 0.0] = np.nan
-    return depth / way
-
-
-def assert_keeps_to_its_slope(one: Pairs, other: Pairs, before: Contacts, after: Contacts) -> None:
-    """Check the law of K with a STEP more, in all steps between two contacts."""
-    slope = slopes(one, other, before, after)
-    edge = np.minimum(one.size_a.max(axis=1), one.size_b.max(axis=1))
-    step = STEP * edge * slopes_per_step(one, other, before, after) / largest(one)
-    known = np.isfinite(slope)
-    assert np.all((slope <= K + step)[known])
 
 
 def frames(whole: tuple, motions: int) -> tuple:
@@ -228,47 +208,13 @@ def test_frames_know_no_history(series):
 
 
 def test_the_point_keeps_to_its_slope(series):
-    """The law of K from frame to frame: of `exact`, and of `mlp` with a STEP more."""
+    """The law of K from frame to frame."""
     name, motion = series
     pairs, motions, _ = motion
     one, other = frames(pairs, motions)
     exact = slopes(one, other, *frames(motion.solve('exact'), motions))
     print(f'{name}: K of exact {np.nanmax(exact):.2f}')
     assert np.nanmax(exact) <= K
-    assert_keeps_to_its_slope(one, other, *frames(motion.solve('mlp'), motions))
-
-
-# --- how far the point steps ----------------------------------------------------------------------
-
-
-def beyond_exact(model: str, series: Series) -> tuple[float, float]:
-    """Share of the steps between two contacts within a bound, and the worst step.
-
-    The bound is the exact point's step plus 1 % of the boxes' shortest edge; the worst is what a
-    step has beyond the exact point's, by the smaller box's longest edge.
-    """
-    pairs, motions, _ = series
-    excess = steps(series.solve(model), motions) - steps(series.solve('exact'), motions)
-    first, _ = frames(pairs, motions)
-    shortest = np.minimum(first.size_a.min(axis=1), first.size_b.min(axis=1))
-    longest = np.minimum(first.size_a.max(axis=1), first.size_b.max(axis=1))
-    known = np.isfinite(excess)
-    return (float((excess <= 0.01 * shortest)[known].mean()),
-            float((excess / longest)[known].max()))
-
-
-def test_how_far_the_point_of_mlp_steps(series):
-    """No farther than the exact point plus 1 % of the width, but for the shares of steps below.
-
-    Where the exact point itself crosses much of the box in one frame, the errors before and after
-    may differ by more than that. The bounds leave room for other weights.
-    """
-    name, motion = series
-    share, worst = beyond_exact('mlp', motion)
-    print(f'{name}: {100 * share:.3f} % of the steps, worst {100 * worst:.2f} % of the edge')
-    least, most = (0.9995, 0.02) if name in LANDED else (0.998, 0.025)
-    assert share >= least
-    assert worst <= most
 
 
 # --- where the point may step, and where not ------------------------------------------------------
@@ -302,13 +248,12 @@ def small_steps(name: str) -> tuple[Pairs, Pairs]:
 
 @pytest.mark.parametrize('name', SETS)
 def test_points_are_continuous(name):
-    """|Δpoint| ≤ K · |Δpose| · size / depth, and for `mlp` STEP · edge more, in every step."""
+    """|Δpoint| ≤ K · |Δpose| · size / depth, in every step."""
     pairs, moved = small_steps(name)
     slope = slopes(pairs, moved, solve('exact', pairs), solve('exact', moved))
     print(f'{name}: K {np.nanmax(slope):.2f} in {np.isfinite(slope).sum()} steps')
     assert np.isfinite(slope).sum() > 0.9 * N
     assert np.nanmax(slope) <= K
-    assert_keeps_to_its_slope(pairs, moved, solve('mlp', pairs), solve('mlp', moved))
 
 
 def patch_slopes(one: Pairs, other: Pairs, before: Contacts, after: Contacts) -> np.ndarray:
@@ -326,23 +271,15 @@ def patch_slopes(one: Pairs, other: Pairs, before: Contacts, after: Contacts) ->
 
 K_PATCH = 3.0
 """A corner's volume is as the cube of its depth, hence three."""
-PATCH_STEP = 0.01, 0.03
-"""Largest steps of `mlp` [of the volume, and of the covariance's trace]."""
 
 
 @pytest.mark.parametrize('name', SETS)
 def test_patches_are_continuous(name):
-    """|Δvolume| ≤ K_PATCH · volume · |Δpose| / depth, and so for the covariance by its trace.
-
-    For `mlp` PATCH_STEP more.
-    """
+    """|Δvolume| ≤ K_PATCH · volume · |Δpose| / depth, and so for the covariance by its trace."""
     pairs, moved = small_steps(name)
-    exact = patch_slopes(pairs, moved, solve('exact', pairs), solve('exact', moved))
-    before, after = solve('mlp', pairs), solve('mlp', moved)
+    before, after = solve('exact', pairs), solve('exact', moved)
     slope = patch_slopes(pairs, moved, before, after)
-    step = np.multiply.outer(slopes_per_step(pairs, moved, before, after), PATCH_STEP)
     both = np.isfinite(slope).all(axis=1) & before.colliding & after.colliding
-    print(f'{name}: exact {exact[both].max(axis=0)}, mlp {slope[both].max(axis=0)}')
+    print(f'{name}: {slope[both].max(axis=0)}')
     assert both.mean() > 0.9
-    assert exact[both].max() <= K_PATCH
-    assert np.all((slope <= K_PATCH + step)[both])
+    assert slope[both].max() <= K_PATCH

@@ -351,7 +351,9 @@ def test_weights_that_are_no_file(tmp_path):
     os.mkfifo(fifo)
     for path in (tmp_path, fifo, '/dev/null', 'x' * 5000, 'a\0b', tmp_path / 'nothing'):
         with pytest.raises(ValueError, match='weights file .* (cannot be read|does not exist)'):
-            ContactSolver(poses.CUBE, poses.CUBE, weights=str(path))
+            ContactSolver(poses.CUBE, poses.CUBE, model='mlp', weights=str(path))
+    with pytest.raises(ValueError, match="^weights have no effect on model 'exact'"):
+        ContactSolver(poses.CUBE, poses.CUBE, weights='mlp.safetensors')
 
 
 def test_warnings_would_fail_here():

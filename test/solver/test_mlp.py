@@ -43,6 +43,8 @@ LANES = native.lanes
 """Rows of a batch that are solved side by side."""
 UNIT = (1.0, 1.0, 1.0)
 ALL_SETS = {**SETS, **LOADS}
+
+
 def aligned(rng: np.random.Generator, n: int) -> tuple[np.ndarray, ...]:
     """Containers exactly above each other, tilted about a level axis of the box or not at all."""
     axes = np.eye(3)[rng.integers(0, 3, n)]

@@ -80,7 +80,7 @@ constexpr double outside_by_rounding = 0x1p-48;
 // Shares of the accuracy that the twelve equations may be off by. The covariance may be wrong by some
 // times as much as the diagonal is.
 constexpr double off_diagonal_share = 0.01, diagonal_share = 0.3, closure_share = 0.1;
-constexpr double covariance_diagonal_share = 0.05;
+constexpr double covariance_diagonal_share = 0.17;
 
 // Reciprocals of the entries of R, given by its columns. Three need one division.
 template <class T>
