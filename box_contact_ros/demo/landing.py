@@ -90,9 +90,9 @@ class LoadForces:
             self._places.setdefault(name, len(self._places) + 1)
         fixed = Body(mass=0.0, inertia=np.zeros(3))
         self._forces.set_bodies([self._load, *[fixed] * len(self._places)])
-        self._forces.hold(np.array([(0, self._places[name]) for name in contacts]).reshape(-1, 2),
-                          Contacts.of(list(contacts.values())),
-                          self._rows(pose, NO_TURN), age=age, period=self._period)
+        pairs = np.array([(0, self._places[name]) for name in contacts]).reshape(-1, 2)
+        self._forces.hold(pairs, Contacts.of(list(contacts.values())), self._rows(pose, NO_TURN),
+                          age=age, period=self._period)
 
     def wrench(self, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return force and torque (6,) at `pose` (7,) and `velocity` (6,), a physics step each."""

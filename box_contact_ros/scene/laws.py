@@ -87,6 +87,8 @@ class PatchForces:
         0 is the time since the answer before.
         ValueError: a contact without a patch, or a pair that comes twice; nothing changes then.
         """
+        if not np.size(pairs):  # NumPy takes an empty list for floats
+            pairs = np.empty((0, 2), np.int64)
         self._native.hold(pairs, contacts.separation, contacts.normal, contacts.point,
                           contacts.volume, contacts.covariance, poses, friction, surface_velocity,
                           stiffness, age, period)

@@ -10,11 +10,11 @@ it then gives the velocities.
 It prints:
 
     50 ms: -6.99 mm deep, 583.4 mm/s
-    100 ms: 0.06 mm deep, 178.7 mm/s
-    200 ms: 0.05 mm deep, 1.8 mm/s
-    500 ms: 0.05 mm deep, 0.0 mm/s
-    2000 ms: 0.05 mm deep, 0.0 mm/s
-    force / weight 1.0000, slid 30 mm
+    100 ms: 0.14 mm deep, 10.8 mm/s
+    200 ms: 0.03 mm deep, 0.0 mm/s
+    500 ms: 0.03 mm deep, 0.0 mm/s
+    2000 ms: 0.03 mm deep, 0.0 mm/s
+    force / weight 1.0000, slid 20 mm
 """
 import numpy as np
 import rclpy

@@ -125,14 +125,14 @@ def test_a_run_writes_table_and_rows(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(landing, 'ADDED', ADDED[9:10])
     assert landing.main(['--quick', '--ways', 'exact', 'manifold', '--out', str(tmp_path)]) == 0
     page = (tmp_path / 'landing.md').read_text()
-    assert '**2 of 2** landings by held patches' in page
-    assert '| held patch | exact | 200 | 2 | 1 of 1 | 1 of 1 | 1 of 1 |' in page
+    assert '**2 of 2** landings by patches' in page
+    assert '| patch | exact | 200 | 2 | 1 of 1 | 1 of 1 | 1 of 1 |' in page
     with (tmp_path / 'landing.csv').open() as file:
         rows = list(csv.DictReader(file))
     assert [(row['way'], row['as_expected']) for row in rows] == [
         ('exact', '1'), ('exact', '1'), ('manifold', '1'), ('manifold', '1')]
     assert (tmp_path / 'landing.png').stat().st_size > 10_000
-    assert '| held patch | exact | 200 | 2 | 1 of 1 | 1 of 1 |' in capsys.readouterr().out
+    assert '| patch | exact | 200 | 2 | 1 of 1 | 1 of 1 |' in capsys.readouterr().out
 
 
 def test_held_patches_have_limits_of_their_own():
@@ -162,7 +162,7 @@ def test_figures_worse_than_the_manifolds_are_bold():
         landing.Outcome(way, timing, planned, result)
         for way, result in (('exact', ours), ('manifold', manifold), ('point', Landed()))])
     assert table.splitlines()[2:] == [
-        '| held patch | exact | 200 | 2 | 1 of 1 | 1 of 1 | 0 of 1 | 1 | 0.05 | 1e-06 | 1e-09 | '
+        '| patch | exact | 200 | 2 | 1 of 1 | 1 of 1 | 0 of 1 | 1 | 0.05 | 1e-06 | 1e-09 | '
         '**0.011** | 0.1 | 1 | – |',
         '| MuJoCo | its manifold, in the simulator | – | – | 1 of 1 | 1 of 1 | – | 1 | 0.1 | 1e-06 '
         '| 1e-09 | 0.0057 | 0.1 | 1 | – |',
@@ -185,7 +185,7 @@ def test_what_is_not_as_expected_ends_with_status_1(tmp_path, monkeypatch, capsy
     monkeypatch.setattr(landing, 'draw', lambda path, scenario: path.touch())
     assert landing.main(['--quick', '--ways', 'exact', '--out', str(tmp_path)]) == 1
     assert 'exact at 200 Hz and 2 ms, grid 17: not as expected' in capsys.readouterr().err
-    assert '**0 of 1** landings by held patches' in (tmp_path / 'landing.md').read_text()
+    assert '**0 of 1** landings by patches' in (tmp_path / 'landing.md').read_text()
 
 
 ASKED = """
