@@ -26,6 +26,9 @@ from typing import Any
 
 import pytest
 
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in `nohup make test &`
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
 FIRST = (
     'test_install.py', 'test_training.py', 'test_hostile.py', 'test_view.py', 'test_library.py',
     'test_builds.py', 'test_core.py', 'test_exact.py', 'test_readme.py', 'test_faults.py',
