@@ -66,6 +66,10 @@ class LoadLaw(Protocol):
         """Return force and torque (6,) at `pose` (7,) and `velocity` (6,), a physics step each."""
 
 
+LATE_STEPS = 3
+"""Physics steps by which answers of a real node vary: the load is held no stiffer."""
+
+
 class LoadForces:
     """`PatchForces` of one load on boxes that are fixed; made by `at_rate`."""
 
@@ -74,6 +78,7 @@ class LoadForces:
         self._load, self._step, self._period = load, step, period
         self._places: dict[str, int] = {}  # of the fixed boxes, by the names of their pairs
         self._forces = PatchForces([load], friction=FRICTION)
+        self._latest = LATE_STEPS * step  # how late an answer came at most [s]
 
     @classmethod
     def at_rate(cls, load: Body, *, rate_hz: float, step: float, **_: float) -> LoadForces:
@@ -88,11 +93,13 @@ class LoadForces:
         """Take the contacts that were asked for `age` [s] ago with the load at `pose` (7,)."""
         for name in contacts:
             self._places.setdefault(name, len(self._places) + 1)
+        # As stiff as the latest answer allows: a stiffness that changes would shake the load.
+        self._latest = max(self._latest, age)
         fixed = Body(mass=0.0, inertia=np.zeros(3))
         self._forces.set_bodies([self._load, *[fixed] * len(self._places)])
         pairs = np.array([(0, self._places[name]) for name in contacts]).reshape(-1, 2)
         self._forces.hold(pairs, Contacts.of(list(contacts.values())), self._rows(pose, NO_TURN),
-                          age=age, period=self._period)
+                          age=self._latest, period=self._period)
 
     def wrench(self, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return force and torque (6,) at `pose` (7,) and `velocity` (6,), a physics step each."""
