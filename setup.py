@@ -3,15 +3,12 @@
 
 """Build and installation, for colcon (ROS 2 workspaces) and for pip alike."""
 
-import copy
 import hashlib
 import os
-import platform
 import shutil
 import subprocess
 import sys
 import sysconfig
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from setuptools import Distribution, Extension, find_packages, setup
@@ -21,16 +18,9 @@ NAME = 'box_contact_ros'
 CORE = f'{NAME}/core'
 CORE_EXTENSION = f'{NAME}.core._native'
 LIBRARY = 'libbox_contact.so'
-
-# No fused multiply-add in float64 and no fast-math: a pair has the same bits with every instruction
-# set. GCC's SLP vectoriser makes fused instructions in spite of -ffp-contract=off.
-FLAGS = ['-std=c++17', '-O3', '-g0', '-fvisibility=hidden', '-ffp-contract=off',
-         '-fno-tree-slp-vectorize', '-Wall', '-Wextra', '-Wno-psabi']
-# The core is compiled once for each; library.cpp chooses when it is loaded.
-INSTRUCTION_SETS = {'baseline': []}
-if platform.machine() in ('x86_64', 'AMD64'):
-    INSTRUCTION_SETS |= {'avx2': ['-march=x86-64-v3'],
-                         'avx512': ['-march=x86-64-v4', '-mprefer-vector-width=512']}
+COMPILER = os.environ.get('CXX', 'c++').split()
+# A wheel of CMake may lie in an environment that is not activated.
+os.environ['PATH'] += os.pathsep + sysconfig.get_path('scripts')
 
 PROGRAMS = {'bench': 'bench.bench', 'contact_node': 'node.contact_node',
             'crane': 'demo.crane_node', 'markers': 'view.markers',
@@ -58,74 +48,41 @@ class PipDistribution(Distribution):
 
 
 class BuildCore(build_ext):
-    """Builds all extensions side by side, and names what is missing to do so."""
-
-    def finalize_options(self):
-        super().finalize_options()
-        self.parallel = self.parallel or os.cpu_count()
-        self.force = True  # `build_extension` knows what has changed
+    """Builds the library and Python's module by CMake, and names what is missing to do so."""
 
     def run(self):
-        compiler = os.environ.get('CXX', 'g++').split()[0]
         header = Path(sysconfig.get_path('include'), 'Python.h')
         version = f'{sys.version_info[0]}.{sys.version_info[1]}'
-        if not shutil.which(compiler):
-            raise SystemExit(f'error: {NAME} needs a C++17 compiler, and {compiler} is not here '
-                             f'(Debian, Ubuntu: apt install g++)')
+        for tool, package in ((COMPILER[0], 'g++'), ('cmake', 'cmake'), ('make', 'make')):
+            if not shutil.which(tool):
+                raise SystemExit(f'error: {NAME} is built with {tool}, which is not here '
+                                 f'(Debian, Ubuntu: apt install {package})')
         if not header.is_file():
             raise SystemExit(f"error: {NAME} needs Python's headers, and {header} is not here "
                              f'(Debian, Ubuntu: apt install python{version}-dev)')
+        self.force = True  # CMake knows what has changed
         super().run()
 
     def build_extension(self, ext):
-        made = [Path(self.get_ext_fullpath(ext.name))]
-        made.append(made[0].with_name(LIBRARY))
-        note, now = Path(self.build_temp, 'built_from'), self.built_from()
-        if not (all(path.is_file() for path in made)
-                and note.is_file() and note.read_text() == now):
-            note.unlink(missing_ok=True)
-            ext.extra_objects = self.build_library(ext)
-            super().build_extension(ext)
-            note.write_text(now)
+        import numpy
+
+        # A new folder for what CMake does not look at once it has configured one.
+        compiler = subprocess.run([*COMPILER, '--version'], stdout=subprocess.PIPE).stdout
+        settings = repr((os.getcwd(), compiler, COMPILER, os.environ.get('CXXFLAGS')))
+        folder = Path(self.build_temp, hashlib.sha256(settings.encode()).hexdigest()[:8])
+        includes = f'{sysconfig.get_path("include")};{numpy.get_include()}'
+        subprocess.run(['cmake', '-S', '.', '-B', str(folder), '-DCMAKE_BUILD_TYPE=Release',
+                        '-DCMAKE_PLATFORM_NO_VERSIONED_SONAME=ON',
+                        f'-DBOX_CONTACT_PYTHON_INCLUDES={includes}'], check=True)
+        subprocess.run(['cmake', '--build', str(folder), '--parallel', str(os.cpu_count())],
+                       check=True)
+        module = Path(self.get_ext_fullpath(ext.name))
+        library = module.with_name(LIBRARY)
+        self.mkpath(str(module.parent))
+        self.copy_file(str(folder / '_native.so'), str(module))
+        self.copy_file(str(folder / LIBRARY), str(library))
         if not BY_PIP:  # where linkers look; `install_data` and colcon come to it after this
-            self.distribution.data_files.append(('lib', [str(made[1])]))
-
-    def built_from(self) -> str:
-        """Return a hash of all that the core is built from. Times of files know no flags."""
-        compiler = subprocess.run([os.environ.get('CXX', 'g++').split()[0], '--version'],
-                                  stdout=subprocess.PIPE).stdout
-        settings = (self.distribution.get_version(), sys.version, FLAGS, INSTRUCTION_SETS,
-                    os.environ.get('CXX', ''), os.environ.get('CXXFLAGS', ''))
-        parts = [compiler, repr(settings).encode()]
-        for path in sorted(Path(CORE).rglob('*')):
-            if path.suffix in ('.cpp', '.hpp', '.h', '.map'):
-                parts += [str(path).encode(), path.read_bytes()]
-        return hashlib.sha256(b'\0'.join(parts)).hexdigest()
-
-    def build_library(self, ext) -> list[str]:
-        """Build libbox_contact next to the extension `ext`; return its objects."""
-        compiler, folder = copy.copy(self.compiler), Path(self.build_temp, 'library')
-
-        def compiled(name: str, source: str, flags: list[str]) -> list[str]:
-            # A file that is compiled several times has objects in folders of their own.
-            macros = [('BOX_CONTACT_VERSION', f'"{self.distribution.get_version()}"')]
-            macros += [(f'BOX_CONTACT_{one.upper()}', '1') for one in INSTRUCTION_SETS]
-            return compiler.compile([f'{CORE}/src/{source}'], str(folder / name), macros,
-                                    extra_postargs=[*FLAGS, *flags])
-
-        jobs = {name: ('kernel.cpp', flags) for name, flags in INSTRUCTION_SETS.items()}
-        jobs |= {name: (f'library/{name}.cpp', []) for name in ('library', 'broad_phase', 'force')}
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            # The longest first.
-            running = [pool.submit(compiled, name, *job) for name, job in reversed(jobs.items())]
-            objects = [one for job in running for one in job.result()]
-        path = Path(self.get_ext_fullpath(ext.name)).with_name(LIBRARY)
-        self.mkpath(str(path.parent))
-        linker = [] if sys.platform == 'darwin' else [
-            f'-Wl,--version-script={CORE}/src/library/exports.map', f'-Wl,-soname,{LIBRARY}']
-        compiler.link_shared_object(objects, str(path), extra_postargs=['-pthread', *linker],
-                                    target_lang='c++')
-        return objects
+            self.distribution.data_files.append(('lib', [str(library)]))
 
     def copy_extensions_to_source(self):
         super().copy_extensions_to_source()
@@ -136,16 +93,6 @@ class BuildCore(build_ext):
         # Of `develop` and of installations that list their files.
         extension = self.get_ext_fullpath(CORE_EXTENSION)
         return [*super().get_outputs(), str(Path(extension).with_name(LIBRARY))]
-
-
-def extensions() -> list[Extension]:
-    """Return the native module: the core."""
-    import numpy
-
-    settings = {'include_dirs': [numpy.get_include()], 'language': 'c++',
-                'extra_compile_args': FLAGS}
-    return [Extension(CORE_EXTENSION, [f'{CORE}/binding/module.cpp'],
-                      extra_link_args=['-pthread'], **settings)]
 
 
 def data_files() -> list[tuple[str, list[str]]]:
@@ -187,7 +134,8 @@ setup(
     package_dir={'': '.'},
     package_data={NAME: ['py.typed', '**/*.pyi', 'core/cmake/*', 'core/include/**/*.h*',
                          'node/include/**/*.hpp']},
-    ext_modules=extensions(),
+    # What it is made of stands in CMakeLists.txt.
+    ext_modules=[Extension(CORE_EXTENSION, [])],
     data_files=data_files(),
     entry_points={
         'console_scripts': [

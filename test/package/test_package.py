@@ -214,5 +214,5 @@ def test_a_build_without_a_compiler_names_it() -> None:
     done = _run('setup.py', 'build_ext', CXX='/no/such/compiler -O3')
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == (
-        'error: box_contact_ros needs a C++17 compiler, and /no/such/compiler is not here '
+        'error: box_contact_ros is built with /no/such/compiler, which is not here '
         '(Debian, Ubuntu: apt install g++)')

@@ -51,8 +51,8 @@ def test_the_lock_pins_all_that_is_asked_for(setup_arguments: dict[str, Any]) ->
 def clone(tmp_path: Path) -> Path:
     """Return a folder, with a blank in its path, that has what .ci/setup reads."""
     folder = tmp_path / 'a clone'
-    for name in ('.ci/setup', '.ci/lock.txt', 'setup.py', 'setup.cfg', 'pyproject.toml',
-                 'box_contact_msgs/pyproject.toml'):
+    for name in ('.ci/setup', '.ci/lock.txt', 'CMakeLists.txt', 'setup.py', 'setup.cfg',
+                 'pyproject.toml', 'box_contact_msgs/pyproject.toml'):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, folder / name)
     (folder / 'box_contact_ros').mkdir()
