@@ -66,12 +66,14 @@ class BuildCore(build_ext):
     def build_extension(self, ext):
         import numpy
 
+        # colcon --symlink-install calls a link to this file, in a folder without CMakeLists.txt.
+        sources = str(Path(__file__).resolve().parent)
         # A new folder for what CMake does not look at once it has configured one.
         compiler = subprocess.run([*COMPILER, '--version'], stdout=subprocess.PIPE).stdout
-        settings = repr((os.getcwd(), compiler, COMPILER, os.environ.get('CXXFLAGS')))
+        settings = repr((sources, compiler, COMPILER, os.environ.get('CXXFLAGS')))
         folder = Path(self.build_temp, hashlib.sha256(settings.encode()).hexdigest()[:8])
         includes = f'{sysconfig.get_path("include")};{numpy.get_include()}'
-        subprocess.run(['cmake', '-S', '.', '-B', str(folder), '-DCMAKE_BUILD_TYPE=Release',
+        subprocess.run(['cmake', '-S', sources, '-B', str(folder), '-DCMAKE_BUILD_TYPE=Release',
                         '-DCMAKE_PLATFORM_NO_VERSIONED_SONAME=ON',
                         f'-DBOX_CONTACT_PYTHON_INCLUDES={includes}'], check=True)
         subprocess.run(['cmake', '--build', str(folder), '--parallel', str(os.cpu_count())],
