@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,8 +28,7 @@ def resource_path(*parts: str) -> Path:
     """Return the path of a data file or folder by its parts, as `'weights', 'x.safetensors'`.
 
     The first place that has it wins: the checkout, the prefix this package was installed into,
-    the ament prefixes (`AMENT_PREFIX_PATH`), Python's own prefix. `FileNotFoundError` names all of
-    them when none has it.
+    the ament prefixes (`AMENT_PREFIX_PATH`). `FileNotFoundError` names all of them if none has it.
     """
     if not parts or Path(parts[0]).is_absolute():
         raise ValueError(f'resource_path: a path below the data folders is needed, got {parts!r}')
@@ -40,8 +38,7 @@ def resource_path(*parts: str) -> Path:
             return path
     raise FileNotFoundError(
         f'box_contact_ros has no {os.path.join(*parts)}; looked at:'
-        + ''.join(f'\n  {path}' for path in places)
-    )
+        + ''.join(f'\n  {path}' for path in places))
 
 
 def find_file(name: str | os.PathLike[str]) -> Path:
@@ -69,4 +66,3 @@ def _roots() -> Iterator[Path]:
     for prefix in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep):
         if prefix:
             yield Path(prefix) / _SHARE
-    yield Path(sys.prefix) / _SHARE

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import textwrap
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -15,17 +14,10 @@ from .models import MODELS, check_model
 Number = TypeVar('Number', int, float)
 
 
-class WholeNames(argparse.RawDescriptionHelpFormatter):
-    """Help that keeps its description as written, and breaks no name at a hyphen."""
-
-    def _split_lines(self, text: str, width: int) -> list[str]:
-        return textwrap.wrap(' '.join(text.split()), width, break_on_hyphens=False)
-
-
 def program_parser(program: str, doc: str | None, **options: Any) -> argparse.ArgumentParser:
     """Return the parser of a program, whose help begins with `doc`."""
-    return argparse.ArgumentParser(
-        prog=program, description=doc, formatter_class=WholeNames, **options)
+    return argparse.ArgumentParser(prog=program, description=doc, **options,
+                                   formatter_class=argparse.RawDescriptionHelpFormatter)
 
 
 def add_model(parser: argparse.ArgumentParser, default: str) -> None:

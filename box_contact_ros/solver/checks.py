@@ -123,11 +123,9 @@ def as_places(value: ArrayLike, name: str, count: int) -> np.ndarray:
         array = np.empty((), dtype=object)
     if array.shape == (0,):  # an empty list
         array = array.reshape(0, 2)
-    if array.dtype.kind not in 'iu' and not (array.size == 0 and array.ndim == 2):
+    whole = array.dtype.kind in 'iu' or array.size == 0
+    if not whole or array.ndim != 2 or array.shape[1] != 2:
         raise ValueError(f'{name} must be whole numbers (n, 2), not {short_repr(value)}')
-    if array.ndim != 2 or array.shape[1] != 2:
-        raise ValueError(f'{name} must be whole numbers (n, 2), not an array of shape '
-                         f'{array.shape}')
     outside = ((array < 0) | (array >= count)).any(axis=1)
     if outside.any():
         row = int(np.argmax(outside))

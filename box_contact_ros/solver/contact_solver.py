@@ -50,14 +50,13 @@ class ContactSolver(native.PairSolver):
             raise ValueError(f'margin must be 0 or more, not {margin:g}')
         if weights is not None and not isinstance(weights, (str, os.PathLike)):
             raise ValueError(f'weights must be the path of a file, not {short_repr(weights)}')
-        core: str | None = None  # the model in C++, or
-        self._model: Model | None = None  # the object that answers
-        if isinstance(model, (str, type)) or not hasattr(model, 'solve'):
-            check_model('model', model)
-            core = str(model) if model in NATIVE else None
-            self._model = None if core else make_model(str(model), row_a[0], weights)
-        else:
+        self._model: Model | None = None  # what answers, where C++ does not
+        if not isinstance(model, (str, type)) and hasattr(model, 'solve'):
             self._model = model
+        else:
+            check_model('model', model)
+            if model not in NATIVE:
+                self._model = make_model(str(model), row_a[0], weights)
         if weights is not None and model not in ('mlp', 'paper'):
             raise ValueError(f'weights have no effect on model {short_repr(model)}: leave them out')
         if margin and self._model is not None:
@@ -67,10 +66,11 @@ class ContactSolver(native.PairSolver):
         if fault := self._size_fault(row_a[0], row_b[0]):
             raise ValueError(fault)
         network = None
-        if core == 'mlp' and weights is not None:
+        if model == 'mlp' and weights is not None:
             network = core_numbers(load_mlp(weights).networks[NETWORK])
         # Calls are answered in C++, which calls `_call_general` and `_batch_general` for the rest.
-        super().__init__(core, tuple(row_a[0]), tuple(row_b[0]), network, margin)
+        super().__init__(str(model) if self._model is None else None, tuple(row_a[0]),
+                         tuple(row_b[0]), network, margin)
         self.model = model
         self._size_a, self._size_b, self._weights, self._margin = row_a, row_b, weights, margin
 
@@ -164,24 +164,13 @@ class ContactSolver(native.PairSolver):
     def _refusal(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
                  at: tuple[int, int], names: Names) -> str:
         """Return why a pair is refused, by anyone or by the model; at: places of A and of B."""
-        fault = _fault(a, b, size_a, size_b, at, names)
-        if not fault:
-            fault = self._size_fault(size_a[at[0] % len(size_a)], size_b[at[1] % len(size_b)])
-        if not fault:
-            raise AssertionError(f'row {at} was refused without a fault')
-        return fault
-
-
-def _fault(a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
-           at: tuple[int, int], names: Names) -> str | None:
-    """Return the first fault of a pair's poses and sizes, or None; at: places of A and of B."""
-    for values, name, fault_of, row in ((a, names[0], pose_fault, at[0]),
-                                        (b, names[1], pose_fault, at[1]),
-                                        (size_a, names[2], size_fault, at[0]),
-                                        (size_b, names[3], size_fault, at[1])):
-        fault = fault_of(values[0 if len(values) == 1 else row])
-        if fault:
-            numbered = name.startswith('poses') or len(a) > 1
-            order = '; a pose is x y z qx qy qz qw' if fault_of is pose_fault else ''
-            return f'{name}[{row}] {fault}{order}' if numbered else f'{name} {fault}{order}'
-    return None
+        for values, name, fault_of, row in ((a, names[0], pose_fault, at[0]),
+                                            (b, names[1], pose_fault, at[1]),
+                                            (size_a, names[2], size_fault, at[0]),
+                                            (size_b, names[3], size_fault, at[1])):
+            if fault := fault_of(values[row % len(values)]):
+                numbered = name.startswith('poses') or len(a) > 1
+                order = '; a pose is x y z qx qy qz qw' if fault_of is pose_fault else ''
+                return f'{name}[{row}] {fault}{order}' if numbered else f'{name} {fault}{order}'
+        fault = self._size_fault(size_a[at[0] % len(size_a)], size_b[at[1] % len(size_b)])
+        return fault or f'model {short_repr(self.model)} refuses row {at[0]}'

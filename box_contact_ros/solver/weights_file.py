@@ -70,11 +70,8 @@ class Weights:
 
 def load_weights(path: Path | str) -> Weights:
     """Read and check a weights file; raises `WeightsError` that says what is wrong with it."""
-    try:
-        from safetensors import SafetensorError
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(f'{error}: weights files need it; pip install safetensors',
-                                  name=error.name) from None
+    from safetensors import SafetensorError
+
     path = Path(path)
     file = f'weights file {short_repr(str(path))}'
     try:

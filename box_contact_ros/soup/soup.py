@@ -29,7 +29,7 @@ import fcl
 import numpy as np
 
 from box_contact_ros.solver.contact import Contacts, without_patch
-from box_contact_ros.solver.exact import Exact
+from box_contact_ros.solver.models import Exact
 
 Size = tuple[float, ...]  # three full extents [m], as a key of what is kept
 

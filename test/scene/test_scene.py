@@ -21,7 +21,7 @@ from box_contact_ros.scene.scene_solver import (
     SceneSolver,
     two_boxes,
 )
-from box_contact_ros.solver.exact import Exact
+from box_contact_ros.solver.models import Exact
 
 IDENTITY = (0, 0, 0, 0, 0, 0, 1)
 
