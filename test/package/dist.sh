@@ -38,10 +38,9 @@ import platform
 import sys
 from pathlib import Path
 
-from box_contact_ros import ContactSolver
+from box_contact_ros import ContactSolver, read_scene
 from box_contact_ros.core import instruction_sets
 from box_contact_ros.resources import resource_path
-from box_contact_ros.scene.files.scene_file import read_scene
 
 container = (12.192, 2.438, 2.591)
 contact = ContactSolver(container, container)([0, 0, 0, 0, 0, 0, 1], [0.5, 0.25, 2.581, 0, 0, 0, 1])
