@@ -248,15 +248,6 @@ def test_all_instruction_sets_have_the_same_bits(tmp_path: Path) -> None:
     assert len(answers[0]) > 100 * len(pairs.size) and len(set(answers)) == 1
 
 
-def test_a_batch_is_its_single_calls(mlp: ContactSolver, pairs: Pairs) -> None:
-    """Row i of a batch is the single call of row i, to the bit."""
-    many = pairs.contacts(mlp)
-    for i in range(0, len(pairs.pose_a), 7):
-        one = native.PairSolver('mlp', tuple(pairs.size_a[i]), tuple(pairs.size_b[i]), SHIPPED)(
-            pairs.pose_a[i], pairs.pose_b[i])
-        assert_same_bits(one, Contacts(*(field[i] for field in many)), i)
-
-
 @pytest.mark.parametrize('count', [1, 2, LANES - 1, LANES, LANES + 1, 2 * LANES, 4 * LANES + 2])
 @pytest.mark.parametrize('first', [0, 5])
 def test_a_row_does_not_know_its_neighbours(mlp: ContactSolver, count: int, first: int) -> None:
@@ -287,26 +278,6 @@ def test_rows_apart_or_refused_do_not_disturb_neighbours(mlp: ContactSolver) -> 
         with pytest.raises(ValueError, match=r'poses_b\[17\]'):
             refused.contacts(mlp)
         assert_same_bits(pairs.contacts(mlp), clean)
-
-
-@pytest.mark.parametrize('power', [-30, 1, 30])
-def test_scale_by_powers_of_two_is_exact(mlp: ContactSolver, pairs: Pairs, power: int) -> None:
-    """Everything scaled by 2^k: point, volume and covariance scale to the bit."""
-    factor = 2.0**power
-    scaling = np.array([factor] * 3 + [1.0] * 4)
-    scaled = Pairs(pairs.pose_a * scaling, pairs.pose_b * scaling, pairs.size_a * factor,
-                   pairs.size_b * factor)
-    one, two = pairs.contacts(mlp), scaled.contacts(mlp)
-    assert np.array_equal(one.point * factor, two.point, equal_nan=True)
-    assert np.array_equal(one.volume * factor**3, two.volume)
-    assert np.array_equal(one.covariance * factor**2, two.covariance, equal_nan=True)
-
-
-def test_minus_q_is_q(mlp: ContactSolver, pairs: Pairs) -> None:
-    """To the bit."""
-    minus = np.array([1, 1, 1, -1, -1, -1, -1.0])
-    other = pairs._replace(pose_a=pairs.pose_a * minus, pose_b=pairs.pose_b * minus)
-    assert_same_bits(pairs.contacts(mlp), other.contacts(mlp))
 
 
 MOVED = {'point': 2.0, 'volume': 8.0, 'covariance': 10.0}
