@@ -19,7 +19,6 @@ from box_contact_ros.core import native
 CORE = Path(native.__file__).parent
 FLAGS = ('-std=c++17', '-O2', '-ffp-contract=off', '-Wno-psabi', '-DBOX_CONTACT_VERSION=""')
 BUILDS: dict[str, tuple[str, tuple[str, ...]]] = {
-    'g++ for the baseline': ('g++', ()),
     'clang++': ('clang++', ()),
     'arm': ('aarch64-linux-gnu-g++', ('qemu-aarch64', '-L', '/usr/aarch64-linux-gnu'))}
 """By name, the compiler, and what its programs run in."""

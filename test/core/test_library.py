@@ -12,13 +12,11 @@ import copy
 import ctypes
 import json
 import os
-import platform
 import shlex
 import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from ctypes import POINTER, byref, c_bool, c_double, c_int, c_int32, c_int64, c_size_t
 from pathlib import Path
 
@@ -370,28 +368,6 @@ def test_a_plain_installation(tmp_path: Path, from_source: tuple[str, ...], kind
 
 
 # --- machines -------------------------------------------------------------------------------------
-
-@pytest.mark.slow
-def test_kernels_share_no_symbol(tmp_path: Path) -> None:
-    """The linker keeps one of two equal names, and a machine could run another set's code.
-
-    Without optimisation, functions that are inlined otherwise are symbols.
-    """
-    if platform.machine() not in ('x86_64', 'AMD64'):
-        pytest.skip('other machines have one instruction set')
-    machines = {'baseline': 'x86-64', 'avx2': 'x86-64-v3', 'avx512': 'x86-64-v4'}
-    with ThreadPoolExecutor(2) as pool:
-        list(pool.map(lambda name: run(
-            tool('g++'), '-std=c++17', '-O0', '-w', f'-march={machines[name]}', '-c',
-            CORE / 'src/kernel.cpp', '-o', tmp_path / f'{name}.o'), machines))
-    symbols = {name: {line.split(maxsplit=2)[2] for line in run(
-        'nm', '--defined-only', '-g', tmp_path / f'{name}.o').splitlines()} for name in machines}
-    for one, other in (('baseline', 'avx2'), ('baseline', 'avx512'), ('avx2', 'avx512')):
-        assert any(f'kernel_{one}' in symbol for symbol in symbols[one])
-        # Pointers that exceptions need; no code.
-        assert not {name for name in symbols[one] & symbols[other]
-                    if not name.startswith('DW.ref.')}
-
 
 def test_a_machine_without_avx_takes_the_baseline(tmp_path: Path) -> None:
     """One library runs on each: it asks the processor. A set that this one lacks is refused."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -18,6 +19,7 @@ import tarfile
 import venv
 import zipfile
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -72,12 +74,24 @@ def copy_sources(to: Path) -> Path:
     return to
 
 
+def defined_symbols(path: Path) -> set[str]:
+    """Return the names that an object file gives to the linker."""
+    if not shutil.which('nm'):
+        return set()
+    lines = run('nm', '--defined-only', '-g', path, cwd=path.parent).splitlines()
+    return {line.split(maxsplit=2)[2] for line in lines}
+
+
 @dataclass(frozen=True)
 class Installation:
-    """One that has been made below `folder`, and the names of the files of its wheel."""
+    """One that has been made below `folder`, the names of the files of its wheel, and symbols.
+
+    symbols: those that each instruction set's object defines.
+    """
 
     folder: Path
     wheel_files: list[str]
+    symbols: dict[str, set[str]]
 
     @property
     def bin(self) -> Path:
@@ -99,6 +113,8 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Installation:
     options = ('--no-index', '--no-deps', '--no-build-isolation')
     run('env', f'CXX={compiler}', sys.executable, '-m', 'pip', 'wheel', *options,
         '--wheel-dir', folder, sources, cwd=folder)
+    symbols = {path.parts[path.parts.index('library') + 1]: defined_symbols(path)
+               for path in sources.glob('build/temp*/**/kernel.o')}
     shutil.rmtree(sources)
     venv.create(folder / 'venv', symlinks=True)
     python, (wheel,) = folder / 'venv' / 'bin' / 'python', folder.glob('*.whl')
@@ -107,7 +123,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Installation:
     # A .pth in a borrowed folder is not read, so an editable install of this package stays out.
     (site_packages / 'borrowed.pth').write_text(sysconfig.get_path('purelib'))
     run(sys.executable, '-m', 'pip', '--python', python, 'install', *options, wheel, cwd=folder)
-    return Installation(folder, zipfile.ZipFile(wheel).namelist())
+    return Installation(folder, zipfile.ZipFile(wheel).namelist(), symbols)
 
 
 def test_a_wheel_answers_with_files_of_its_own(installed: Installation) -> None:
@@ -119,6 +135,21 @@ def test_a_wheel_answers_with_files_of_its_own(installed: Installation) -> None:
     assert all(Path(place).is_relative_to(installed.folder) for place in answer['places'])
     tops = {name.partition('/')[0] for name in installed.wheel_files}
     assert {top for top in tops if not top.endswith(('.data', '.dist-info'))} == {NAME}
+
+
+def test_kernels_share_no_symbol(installed: Installation) -> None:
+    """The linker keeps one of two equal names, and a machine could run another set's code.
+
+    Without optimisation, functions that are inlined otherwise are symbols.
+    """
+    if platform.machine() not in ('x86_64', 'AMD64') or not shutil.which('nm'):
+        pytest.skip('nm is not installed, or the machine has one instruction set')
+    assert set(installed.symbols) == {'baseline', 'avx2', 'avx512'}
+    for name, symbols in installed.symbols.items():
+        assert any(f'kernel_{name}' in symbol for symbol in symbols)
+    for one, other in combinations(installed.symbols.values(), 2):
+        # Pointers that exceptions need; no code.
+        assert not {name for name in one & other if not name.startswith('DW.ref.')}
 
 
 def test_cmake_finds_the_library(installed: Installation, tmp_path: Path) -> None:
