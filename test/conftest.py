@@ -30,10 +30,10 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in `nohup make test 
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 FIRST = (
-    'test_install.py', 'test_training.py', 'test_hostile.py', 'test_view.py', 'test_library.py',
-    'test_builds.py', 'test_core.py', 'test_exact.py', 'test_readme.py', 'test_faults.py',
-    'test_bench.py', 'test_contact_node.py', 'test_crane_node.py')
-"""The longest files. Begun late, one of them would leave the other workers idle."""
+    'test_hostile.py', 'test_install.py', 'test_training.py', 'test_view.py', 'test_library.py',
+    'test_exact.py', 'test_readme.py', 'test_message_bytes.py', 'test_search.py', 'test_faults.py',
+    'test_bench.py', 'test_contact_node.py', 'test_crane_node.py', 'test_core.py')
+"""The longest files, longest first. Begun late, one would leave the other workers idle."""
 
 _modules = count()
 _claims: list[int] = []
@@ -105,7 +105,8 @@ EXTRAS = {
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put the longest files first."""
-    items.sort(key=lambda item: item.path.name not in FIRST)
+    items.sort(key=lambda item: FIRST.index(item.path.name) if item.path.name in FIRST
+               else len(FIRST))
 
 
 class TestFile(pytest.Module):

@@ -310,19 +310,6 @@ def test_kinds_and_shapes_of_a_patch() -> None:
 ABOVE = np.array([0.1, 0.05, 1.9, 0.02, 0.01, 0.0, 1.0])
 
 
-@every_model
-def test_a_solver_is_pickled(model: str) -> None:
-    """With its sizes, its model and the name of its weights; counts begin anew."""
-    solver = ContactSolver((1, 2, 30), poses.CUBE, model=model)
-    above = ABOVE + (0, 0, 14, 0, 0, 0, 0)
-    solver(poses.IDENTITY, above)
-    for protocol in range(2, pickle.HIGHEST_PROTOCOL + 1):
-        other = pickle.loads(pickle.dumps(solver, protocol))
-        assert other.clipped == 0
-        assert_same_bits(other(poses.IDENTITY, above), solver(poses.IDENTITY, above))
-        assert_same_bits(solve(other, MIXED.first(9)), solve(solver, MIXED.first(9)))
-
-
 def test_a_solver_is_made_once() -> None:
     """A second __init__ is refused, and leaves all of the first."""
     solver = ContactSolver((2, 2, 2), poses.CUBE, model='exact')

@@ -118,12 +118,6 @@ def test_a_missing_extra_is_one_line_that_names_it() -> None:
     assert 'Traceback' in done.stderr and 'no_such' in done.stderr
 
 
-def test_places_of_the_library_are_told() -> None:
-    for option, tail in (('--cmakedir', 'core/cmake'), ('--includes', 'core/include')):
-        done = _run('-m', 'box_contact_ros', option)
-        assert done.returncode == 0 and done.stdout.rstrip().endswith(tail)
-
-
 @pytest.mark.parametrize('program, module', PROGRAMS.items())
 def test_help_of_each_program(program: str, module: str) -> None:
     done = _run('-m', f'box_contact_ros.{module}', '--help')

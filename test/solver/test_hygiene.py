@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import os
-import warnings
 from decimal import Decimal
 from fractions import Fraction
 
@@ -364,9 +363,3 @@ def test_weights_that_are_no_file(tmp_path):
             ContactSolver(poses.CUBE, poses.CUBE, model='mlp', weights=str(path))
     with pytest.raises(ValueError, match="^weights have no effect on model 'exact'"):
         ContactSolver(poses.CUBE, poses.CUBE, weights='mlp.safetensors')
-
-
-def test_warnings_would_fail_here():
-    """The tests above rely on it."""
-    with pytest.raises(RuntimeWarning):
-        warnings.warn('seen', RuntimeWarning, stacklevel=1)
