@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -113,8 +114,8 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Installation:
     options = ('--no-index', '--no-deps', '--no-build-isolation')
     run('env', f'CXX={compiler}', sys.executable, '-m', 'pip', 'wheel', *options,
         '--wheel-dir', folder, sources, cwd=folder)
-    symbols = {path.parts[path.parts.index('library') + 1]: defined_symbols(path)
-               for path in sources.glob('build/temp*/**/kernel.o')}
+    symbols = {re.search(r'/box_contact_(\w+)\.dir/', str(path))[1]: defined_symbols(path)
+               for path in sources.glob('build/temp*/**/kernel.cpp.o')}
     shutil.rmtree(sources)
     venv.create(folder / 'venv', symlinks=True)
     python, (wheel,) = folder / 'venv' / 'bin' / 'python', folder.glob('*.whl')
