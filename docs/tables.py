@@ -26,13 +26,13 @@ BLOCK = re.compile(r'(<!-- table ([\w-]+) -->\n).*?(<!-- end of table -->)', re.
 Row = dict[str, str]
 
 CHOICES = {
-    'exact': ('`exact`, the default', 'every program'),
-    'mlp': ('`mlp`', 'a hard limit on the worst time of a batch, research'),
-    'mujoco': ("MuJoCo's own, deepest corner", 'programs that simulate in MuJoCo'),
+    'exact': '`exact`, the default',
+    'mlp': '`mlp`, the network',
+    'mujoco': 'MuJoCo, deepest corner',
 }
 MEASURED_AS = {'mujoco': {'contestant': 'MuJoCo mj_collision', 'point': 'deepest'}}
 """Rows of the frontier for a contestant that is measured by its library's own call."""
-SHOWN = ('AVX-512', 'AVX2')  # instruction sets, the one of the README first
+SHOWN = ('AVX-512', 'AVX2')  # instruction sets, the README's first
 CONTAINER = 12_192.0  # longest edge [mm]
 SETS = {
     'random cubes': 'cubes in any pose, 0.1–10 % deep',
@@ -59,24 +59,48 @@ def cell(row: Row, column: str, unit: float = 1.0, digits: int = 3) -> str:
 
 
 def models() -> str:
-    """Return how far each model is off on containers, what it costs, and when to take it."""
+    """Return how far each model is off on containers, what it costs, and where `mlp` lost."""
     body = []
-    for model, (name, when) in CHOICES.items():
-        found = {row['instruction_set']: row for row in rows(
-            'frontier.csv', set='containers', **MEASURED_AS.get(model, {'contestant': model}),
-            **{'class': 'all'})}
-        shown = [found[one] for one in SHOWN if one in found] or list(found.values())
+    for model, name in CHOICES.items():
+        measured = rows('frontier.csv', set='containers', **{'class': 'all'},
+                        **MEASURED_AS.get(model, {'contestant': model}))
+        by_set = {row['instruction_set']: row for row in measured}
+        shown = next((by_set[each] for each in SHOWN if each in by_set), measured[0])
         # A number stands in one table: that of 100,000 pairs, where the model has one.
         errors = rows('accuracy.csv', model=model, set='containers', part='all', quantity='point')
-        judged, prefix = (errors[0], '') if errors else (shown[0], 'point_')
+        judged, prefix = (errors[0], '') if errors else (shown, 'point_')
         body.append([name, *(cell(judged, f'{prefix}{column}', 100.0 / CONTAINER, digits=2)
                              for column in ('p50', 'p99')),
-                     cell(shown[0], 'call_p50', 1e3), cell(shown[0], 'batch_p50', 1e3), when])
+                     cell(shown, 'call_p50', 1e3), cell(shown, 'batch_p50', 1e3)])
     table = markdown_table(
         ['Model', 'half of the points within [mm]', '99 % within [mm]', 'a call [µs]',
-         'a million pairs [s]', 'take it for'], body)
+         'a million pairs [s]'], body)
     return (f'{table}\n\nMedian times on one core with {SHOWN[0]}, called from Python: '
-            f'{processor()}.')
+            f'{processor()}. {hot_calls()}\n\n{network_by_exact()}')
+
+
+def hot_calls() -> str:
+    """Return what other work between two calls does to them, from the speed report."""
+    if not (RESULTS / 'speed_cold.csv').exists():  # `make reports` writes it
+        return 'Calls run one after another: after other work, each takes longer.'
+    exact = rows('speed_cold.csv', name='exact')[-1]
+    return (f'Calls run one after another: after work that touches {float(exact["megabytes"]):g} '
+            f'MB, a call of `exact` takes {cell(exact, "call_p50", 1e3, digits=2)} µs, '
+            f'{cell(exact, "call_by_unit", digits=2)} of `mj_geomDistance` '
+            '([Speed](docs/results/speed.md)).')
+
+
+def network_by_exact() -> str:
+    """Return the times of `mlp` relative to `exact` on containers, by instruction set."""
+    by_set = {row['instruction_set']: row for row in rows(
+        'frontier.csv', set='containers', contestant='mlp', **{'class': 'all'})}
+    ratios = [(name, by_set[name]) for name in SHOWN if name in by_set]
+    lost = all(float(row[column]) > 1.0 for _, row in ratios
+               for column in ('call_by_exact', 'batch_by_exact'))
+    words = '; '.join(f'{cell(row, "call_by_exact")} per call and {cell(row, "batch_by_exact")} '
+                      f'per pair of a batch with {name}' for name, row in ratios)
+    return (f'{"The network lost to `exact` on this machine" if lost else "The network"}: '
+            f'it has an error, and its time divided by that of `exact` is {words}.')
 
 
 def processor() -> str:
