@@ -33,7 +33,7 @@ from box_contact_ros.solver.contact import Contacts
 UNIT = (1.0, 1.0, 1.0)
 
 K = 1.0
-"""|Δpoint| ≤ K · |Δpose| · size / depth: see docs/explanation/motion.md, with figures measured."""
+"""|Δpoint| ≤ K · |Δpose| · size / depth: see docs/explanation/contact_point.md."""
 
 
 class Series(NamedTuple):
