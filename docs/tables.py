@@ -98,9 +98,9 @@ def network_by_exact() -> str:
     lost = all(float(row[column]) > 1.0 for _, row in ratios
                for column in ('call_by_exact', 'batch_by_exact'))
     words = '; '.join(f'{cell(row, "call_by_exact")} per call and {cell(row, "batch_by_exact")} '
-                      f'per pair of a batch with {name}' for name, row in ratios)
-    return (f'{"The network lost to `exact` on this machine" if lost else "The network"}: '
-            f'it has an error, and its time divided by that of `exact` is {words}.')
+                      f'in a batch with {name}' for name, row in ratios)
+    return (f'{"The network lost on this machine. It" if lost else "The network"} has an error. '
+            f'Its time divided by that of `exact` is {words}.')
 
 
 def processor() -> str:

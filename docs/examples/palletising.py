@@ -8,8 +8,8 @@ all contacts as arrays. A box is supported if its centre is above the hull of th
 what it stands on. The overlap's covariance gives each patch: a rectangle has half lengths of √3
 standard deviations.
 
-For each order it names the boxes that are not supported, by number, and tells how far inside its
-patches the centre of the worst one is. It prints:
+For each order it names the boxes that are not supported, by number. It tells how far inside its
+patches the centre of the worst box is. It prints:
 
     00100408: 26 contacts, worst -87.5 mm, not supported: 25
     00100001: 56 contacts, worst -95.0 mm, not supported: 5 7 9 12 20 27 28 29 36 42

@@ -45,7 +45,7 @@ class LandingEnv:
         return np.column_stack([self.contacts.separation, offset, self.speed])
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Move the loads that have not landed; return observation, reward and who has landed."""
+        """Move the loads that have not landed; return observation, reward and which have landed."""
         self.speed = np.where(self.landed, 0.0, action)
         self.load[:, 2] -= self.speed * self.period
         seen = self.observe()
