@@ -13,6 +13,7 @@ from __future__ import annotations
 import codeop
 import contextlib
 import io
+import math
 import os
 import re
 import shlex
@@ -31,15 +32,19 @@ from geometry_msgs.msg import PoseStamped
 
 from box_contact_msgs.msg import Box
 from box_contact_msgs.srv import Check
+from box_contact_ros.core import DEPTH_FLOOR
+from box_contact_ros.node import check, diagnostics, topics
 from box_contact_ros.node.check import Checker
 from box_contact_ros.node.contact_node import PARAMETERS
 from box_contact_ros.resources import resource_path
+from box_contact_ros.scene import pairing, scene_file
 from box_contact_ros.scene.scene_solver import SceneSolver, two_boxes
+from box_contact_ros.solver.models import most_near
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [*sorted(ROOT.glob('*.md'), key=lambda page: page.name != 'README.md'),
          *sorted((ROOT / 'docs').rglob('*.md'))]
-FENCE = re.compile(r'^```(\w*)\n(.*?)^```$', re.MULTILINE | re.DOTALL)
+FENCE = re.compile(r'^```([\w{}-]*)[^\n]*\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 
 
 def blocks(*languages: str) -> Iterator[tuple[Path, str, str]]:
@@ -382,6 +387,56 @@ def test_figures_are_made(tmp_path):
 def test_tables_have_the_figures_of_the_reports():
     """No number stands in two places with two values: `make tables` renews them."""
     assert run(sys.executable, 'docs/tables.py', '--check') == ''
+
+
+LIMITS = {
+    'how-to/security.md': (
+        f'at most {check.MOST_BOXES} boxes and {check.MOST_PAIRS:,} pairs',),
+    'reference/conventions.md': (
+        f'more than {most_near("exact"):,} pairs near each other, of a soup {most_near("soup-8")}',
+        f'δ = 1e{math.log10(DEPTH_FLOOR):.0f} · size'),
+    'reference/diagnostics.md': (
+        f'every {diagnostics.REMINDER_SECONDS:g} s',
+        f'`unanswered for {diagnostics.UNANSWERED_SECONDS:g} s: PAIRS`',
+        f'{diagnostics.LATE_TICKS:g} ticks old'),
+    'reference/messages.md': (f'at most {most_near("soup-8")} pairs',),
+    'reference/scenes.md': (
+        f'At most {scene_file.MOST_STREAMS:,} boxes may have a topic',
+        f'More than {topics.MOST_PAIRS_WITH_TOPICS:,} pairs need `pair_topics:=false`',
+        f'for {pairing.PATIENCE} later ticks'),
+}
+"""What pages say of the limits of Python code."""
+CONSTANTS = (
+    ('explanation/force.md', 'force/patch_forces.hpp', r'soft_frequency = ([\d.]+)', '{}/step'),
+    ('explanation/force.md', 'force/patch_forces.hpp', r'late_frequency = ([\d.]+)',
+     'the frequency is {}/T'),
+    ('explanation/force.md', 'force/patch_forces.hpp', r'push_out_limit = (\d+)',
+     'faster than {} m/s'),
+    ('explanation/mlp.md', 'mlp/chords.hpp', r'least_variance = ([\d.]+)',
+     '{} of the squared half extents'),
+    ('contributing/decisions/planes.md', 'overlap/planes.hpp', r'flush_limit = ([\d.e-]+)',
+     'less than {} of the overlap'),
+    ('reference/conventions.md', 'separating_axis.hpp', r'parallel = ([\d.e-]+)',
+     'closer to parallel than {} rad'),
+)
+"""What pages say of constants of the core: page, file, the constant, the page's words."""
+
+
+def words_of(page: str) -> str:
+    """Return the text of a page below docs/ in one line."""
+    return ' '.join((ROOT / 'docs' / page).read_text('utf-8').split())
+
+
+@pytest.mark.parametrize('page', sorted(LIMITS))
+def test_pages_name_the_limits_of_the_code(page):
+    assert [text for text in LIMITS[page] if text not in words_of(page)] == []
+
+
+@pytest.mark.parametrize(('page', 'name', 'constant', 'text'), CONSTANTS)
+def test_pages_name_the_constants_of_the_core(page, name, constant, text):
+    source = (ROOT / 'box_contact_ros' / 'core' / 'src' / name).read_text('utf-8')
+    value = re.search(constant, source)
+    assert value and text.format(value[1]) in words_of(page)
 
 
 def test_cpp_examples(tmp_path):
