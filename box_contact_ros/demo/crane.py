@@ -206,7 +206,7 @@ class Crane:
         """Advance one tick, under a wrench that may change from one physics step to the next.
 
         wrench: from the simulated time [s] at which a physics step starts to force [N] and torque
-        [N m] over it (6,), world frame, at the load's centre of mass. None for no wrench.
+        [N m] over it (6,). World frame, at the load's centre of mass. None for no wrench.
         """
         for substep in range(1, self._substeps + 1):
             start = (self._ticks + (substep - 1) / self._substeps) / self._rate_hz

@@ -110,7 +110,7 @@ class TickMonitor:
         return lines
 
     def take_load(self, lost: int) -> Load:
-        """Return what happened since the last call, of which the caller knows what was lost."""
+        """Return what happened since the last call; the caller knows how many poses were lost."""
         now = time.monotonic()
         times = self._times[:min(self._evaluations, KEPT_TIMES)].copy()
         load = Load(now - self._taken, self._evaluations, lost, times[:, 0], times[:, 1])

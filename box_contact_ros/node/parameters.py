@@ -3,8 +3,8 @@
 
 """The parameters of a node as one table: checked, declared to rclpy, and listed by `--help`.
 
-Parameters are declared with dynamic typing, so that the check of each one refuses a value of
-another type, and not rclpy: 200 is as good as 200.0 where a double is meant.
+Parameters are declared with dynamic typing. So the check of each one refuses a value of another
+type, and not rclpy. Where a double is meant, 200 is as good as 200.0.
 """
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ class PoseQueue:
     """What is lost of a stream of poses, and which of those that come are old.
 
     A full queue pushes its oldest pose out. EventsExecutor still has an event for it, and timers
-    and services come behind all events: of a node that is too slow, they would wait ever longer.
+    and services come behind all events. In a node that is too slow, they would wait ever longer.
     So poses that wait when a loss shows are dropped. That takes no time, and empties both queues.
     """
 

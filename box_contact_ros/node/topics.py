@@ -55,7 +55,7 @@ class SceneTopics:
     """The topics of a node from configure to cleanup.
 
     contacts: the publisher of all contacts. of_pair: those of point and normal, by the indices of
-    the boxes of a pair; none without topics of their own.
+    the boxes of a pair. Empty without topics of their own.
     """
 
     def __init__(self, node: Node, prefix: str, scene: Scene, *, pair_topics: bool) -> None:

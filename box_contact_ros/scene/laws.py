@@ -4,7 +4,7 @@
 """From contacts to forces: the patches of all pairs as velocity constraints.
 
 A simulator asks for contacts, at every physics step or less often. `PatchForces` takes each answer
-with the poses for which it was asked. At every physics step it then gives the velocities of all
+with the poses of the question. At every physics step it then gives the velocities of all
 bodies, or the wrenches that lead to them. One load on fixed boxes is a scene like any other.
 
 It is a face of code in libbox_contact; docs/explanation/force.md describes the method, sequential
@@ -81,7 +81,7 @@ class PatchForces:
         """Take the contacts of pairs of bodies (k, 2), asked for at `poses`; forget other pairs.
 
         A contact whose separation is NaN is stale: the patch of its pair stays.
-        friction: μ (k,). surface_velocity: of B's surface relative to A's (k, 3) [m/s], beside that
+        friction: μ (k,). surface_velocity: of B's surface relative to A's (k, 3) [m/s], added to that
         of the bodies, as of a belt. stiffness: (k,) [N/m]; 0 is as stiff as step and answers bear.
         age: how long ago the answer was asked for [s]. period: from one question to the next [s];
         0 is the time since the answer before.
@@ -97,7 +97,7 @@ class PatchForces:
              wrenches: ArrayLike | None = None) -> np.ndarray:
         """Return the velocities (n, 6) with which the bodies move during a step of `dt` [s].
 
-        wrenches: those that act beside contacts, gravity among them. Call `step` or `wrenches` once
+        wrenches: all but those of contacts, gravity among them. Call `step` or `wrenches` once
         a step.
         """
         return self._native.step(dt, poses, velocities, wrenches, False)

@@ -61,7 +61,7 @@ import numpy as np
 from .scene_solver import ALL_BOXES, Scene
 
 PATIENCE = 5
-"""Whole ticks for which a tick waits: a few periods, whatever the rate. Executor and transport let
+"""How many whole ticks a tick waits: a few periods, whatever the rate. Executor and transport let
 the streams of one publisher drift apart by one or two."""
 WAITING_TICKS = 128
 """Ticks that may wait: memory stays bounded."""

@@ -30,11 +30,11 @@ POSE_ARRAY = 'poses'
 ALL_BOXES = 'all boxes'
 """Source of these poses: no box of a scene file can have this name."""
 NOWHERE = np.full(7, np.nan)
-"""In place of the pose of a box that is not there."""
+"""Instead of the pose of a box that is not there."""
 EVERY_PAIR = (('*', '*'),)
 """Patterns of a scene in which each two boxes are a pair, if one of them moves."""
 ALONE = -1
-"""In place of box b, in rows of boxes: all pairs of box a that patterns ask for."""
+"""Instead of box b, in rows of boxes: all pairs of box a that patterns ask for."""
 
 CONTAINER = (12.192, 2.438, 2.591)
 """Full extents of an ISO 40 ft container [m]."""
@@ -128,8 +128,8 @@ class Scene:
     def groups(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the group of each box (n,), and which groups meet by patterns (g, g): 0, 1 or 2.
 
-        The rows of the latter are the group of the box that comes first in the scene: 1 if it is
-        box a, 2 if it is box b. Boxes of a group match the same sides of the same patterns.
+        The rows of the latter are the group of the box that comes first in the scene. 1: it is
+        box a. 2: it is box b. Boxes of a group match the same sides of the same patterns.
         """
         if not self.patterns:
             return np.zeros(len(self.boxes), np.int32), np.zeros((0, 0), np.uint8)
@@ -172,7 +172,7 @@ class Scene:
         return (*self.pairs, *(self.pair_of(box, ALONE) for box in boxes))
 
     def _partners(self, index: int) -> np.ndarray:
-        """Return which boxes (n,) patterns pair a box with, beside those of listed pairs."""
+        """Return which boxes (n,) patterns pair a box with, without those of listed pairs."""
         group, allowed = self.groups
         if not self.patterns:
             return np.zeros(len(self.boxes), bool)

@@ -3,8 +3,8 @@
 
 """Models: the names that users ask for, and the objects that answer under them.
 
-`exact` and `mlp` are answered in C++. Every other model is an object with `solve`: those that the
-package ships are imported when their name is asked for, and a user passes an object of their own.
+`exact` and `mlp` are answered in C++. Every other model is an object with `solve`. Those that the
+package ships are imported when their name is asked for. A user passes an object of their own.
 """
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Exact:
 
 
 def check_model(where: str, name: object) -> None:
-    """Raise ValueError, which begins with `where`, for a name that is none of `MODELS`."""
+    """Raise ValueError, which begins with `where`, for a name that is not in `MODELS`."""
     if isinstance(name, str) and (name in MODELS[:-1] or soup_divisions(name)):
         return
     if isinstance(name, str) and name.startswith('soup-'):

@@ -31,7 +31,7 @@ from ..scene.scene_solver import Scene
 
 KEPT = 1000  # poses kept per topic: a second at 1 kHz
 UNANSWERED = 0.5
-"""Time [s] for which poses may come without contacts; then nobody answers, and none are drawn."""
+"""Time [s] that poses may come without contacts; then nobody answers, and none are drawn."""
 QUIET = 1.0  # time [s] without a pose, after which nobody moves the boxes any more
 FORCE_AGE = 100_000_000  # [ns] between a force and a tick: the crane publishes every 33 ms
 MOST_FORCE = 1e12  # [N]: a chart of more shows nothing else

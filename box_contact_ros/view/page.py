@@ -190,7 +190,7 @@ class Page:
     # --- figures and charts -----------------------------------------------------------------------
 
     def show(self, tick: Tick | None, force: float, *, model: str, awaited: str) -> None:
-        """Show figures and charts of a tick; where there is none, what is awaited.
+        """Show figures and charts of a tick; without a tick, what the page waits for.
 
         The charts then stay as they are until the next tick begins them anew.
 
@@ -220,7 +220,7 @@ class Page:
         known = ~np.isnan(values)
         if known.sum() < 2:  # which make no axis of times
             return
-        # Axes are those of the data, which have a line at zero: axes that are set lose their labels
+        # Axes are those of the data, which have a line at zero. Axes that are set lose their labels
         # where the browser gives the chart its width later, or builds it anew.
         data = times[known] - times[-1], values[known], np.zeros(known.sum())
         if label in self._charts:

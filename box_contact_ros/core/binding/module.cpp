@@ -243,7 +243,7 @@ struct ContactArrays {
 
 // --- PairSolver ---------------------------------------------------------------------------------
 
-// Who answers, for boxes of which sizes, and how many contacts took another way than most.
+// Who answers, the sizes of the boxes, and how many contacts took another way than most.
 struct Setup {
   Model model = Model::exact;
   double size_a[3], size_b[3];  // full extents [m]

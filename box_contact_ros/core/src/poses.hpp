@@ -33,7 +33,7 @@ struct Pose {
 };
 
 // A pair of boxes, ready for the separating-axis test. The boxes are put in an order of the data
-// here, and the answer names them as the caller does: swapping them changes no bit in between. From
+// here, and the answer names them as the caller does. Swapping them changes no bit in between. From
 // here on A is the first of both.
 template <class T>
 struct Pair {

@@ -131,8 +131,8 @@ BC_INLINE void offer_face_axes(const Pair<T>& pair, BestAxis<T>& best) {
   best.offer(3, face_gaps<T>(pair.offset_b, pair.half_b, pair.half_a, pair.a_in_b), one, tolerance);
 }
 
-// Whether no edge axis of a single pair can win over the gap `best` of a face, or is doubtful: overlap
-// divided by length is at most `best` for all nine. That takes no root.
+// Whether no edge axis of a single pair can win over the gap `best` of a face, or is doubtful.
+// Overlap divided by length is at most `best` for all nine, which takes no root.
 template <class T>
 BC_INLINE bool edges_stay_below(const Pair<T>& pair, T best) {
   constexpr double least2 = cross_product_min * cross_product_min, used2 = parallel * parallel;

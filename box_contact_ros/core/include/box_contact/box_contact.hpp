@@ -59,7 +59,7 @@ using Contact = bc_contact;  // see above
 enum class Model { exact = BC_EXACT, mlp = BC_MLP };
 enum class Patch { none = BC_NO_PATCH, volume = BC_VOLUME, covariance = BC_COVARIANCE };
 
-// What is asked of boxes.
+// A question about boxes.
 struct Query {
   Model model = Model::exact;
   Patch patch = Patch::covariance;  // of single calls; a batch computes what has an array

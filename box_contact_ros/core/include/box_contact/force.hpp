@@ -73,7 +73,7 @@ class PatchForces {
     detail::check(bc_patch_forces_hold(forces_.get(), &answer, poses.data()));
   }
 
-  // The velocities during a step of `dt` [s]; `outside` are the wrenches beside those of contacts.
+  // The velocities during a step of `dt` [s]; `outside` are all wrenches but those of contacts.
   void step(double dt, Span<const Pose> poses, Span<const Velocity> velocities,
             Span<const Wrench> outside, Span<Velocity> after) {
     check_count(after.size());

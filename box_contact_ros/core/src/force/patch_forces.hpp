@@ -125,7 +125,7 @@ class PatchForces {
     clock_ = {};
   }
 
-  // Take an answer, and the poses for which it was asked. Pairs that are missing are forgotten.
+  // Take an answer, and the poses of its question. Pairs that are missing are forgotten.
   // Returns false, and changes nothing, for a pair that comes twice.
   bool hold(const bc_patches& answer, const bc_pose* poses) {
     next_.clear();
@@ -147,8 +147,8 @@ class PatchForces {
     return true;
   }
 
-  // From poses, velocities and outside wrenches at the start of a step h to the velocities during it,
-  // or to the wrenches of contacts that lead to them.
+  // From poses, velocities and outside wrenches at the start of a step h to the velocities during it.
+  // Or to the wrenches of contacts that lead to them.
   void step(double h, const bc_pose* poses, const bc_velocity* velocities, const bc_wrench* outside,
             bc_velocity* after, bc_wrench* wrenches) {
     begin(h, poses, velocities, outside);

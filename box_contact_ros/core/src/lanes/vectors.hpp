@@ -57,7 +57,7 @@ template <class T>
 BC_INLINE void operator+=(Vec<T>& a, const Vec<T>& b) {
   a = a + b;
 }
-// Comparisons by components: masks, which combine likewise.
+// Comparisons by components: masks.
 template <class T>
 BC_INLINE Vec<Mask<T>> operator==(const Vec<T>& a, const Vec<T>& b) {
   return {a[0] == b[0], a[1] == b[1], a[2] == b[2]};

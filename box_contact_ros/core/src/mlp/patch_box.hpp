@@ -4,13 +4,13 @@
 // The patch box: a cuboid around A∩B in which every overlap looks alike, whatever the sizes and the
 // depth are.
 //
-// Its z axis is SAT's normal, so faces and pairs of edges are described alike. P is the box of which
-// less is within the depth, Q the other. The x axis is along the edge of P of which most is, across z.
+// Its z axis is SAT's normal, so faces and pairs of edges are described alike. P is the box that has
+// less within the depth, Q the other. The x axis is along the edge of P that has most of it across z.
 // The bounds hold A∩B:
 //
 // 1. Along z they are the ends of the two boxes on the axis, which are `depth` apart.
-// 2. What P has beyond the lowest point of Q reaches at most depth / |n_k| along P's axis k, and Q
-//    likewise. These two cuboids bound x and y.
+// 2. What P has beyond the lowest point of Q reaches at most depth / |n_k| along P's axis k. The
+//    same holds for Q. These two cuboids bound x and y.
 // 3. Each of the six slabs |a · u| of both boxes then bounds each coordinate by the bounds of the
 //    other two (Benhamou and others 1999, hull consistency).
 //
@@ -176,8 +176,8 @@ struct PatchBox {
     }
   };
 
-  // Move the bounds of y, then those of x, to where slabs end, and the slabs into the coordinates of
-  // the new bounds: faces of P that meet in the edge along x bound y, whatever x is.
+  // Move the bounds of y, then those of x, to where slabs end. Move the slabs into the coordinates of
+  // the new bounds. Faces of P that meet in the edge along x bound y, whatever x is.
   BC_INLINE void tighten(Slabs (&slabs)[2], T size) {
     for (int i = 1; i >= 0; --i) {
       T up = splat<T>(1.0), down = up;

@@ -5,7 +5,7 @@
 //
 // The frame is that of the reference box, the one with the best face axis. Its contact face is the
 // plane w = 0, the box lies below, and (u, v) run along the face. Over each (u, v) the incident box
-// is a column from w_bottom to w_top; clamped to [−thickness, 0], the difference of the two is the
+// is a column from w_bottom to w_top. Clamped to [−thickness, 0], the difference of the two is the
 // part inside the reference box. So volume and moments of A∩B are sums, over the incident box's six
 // faces, of integrals of the clamped height over the face's projection:
 //
@@ -14,8 +14,8 @@
 // 3. What comes out below the reference box counts with the height −thickness. It is cut triangle by
 //    triangle, because no part of a face may count twice.
 // 4. Signed integrals of w, u w, v w and w²/2 over the polygon, triangle by triangle.
-// 5. The same polygons once more, about the centroid, for the second moments: squares of the way to
-//    the centroid from anywhere else would cancel in a small overlap.
+// 5. The same polygons once more, about the centroid, for the second moments. Squares of distances
+//    to any other point would cancel in a small overlap.
 //
 // No face of the reference box is clipped, and every integrand vanishes on the plane w = 0. Coplanar
 // faces need no case: they contribute nothing, in exact arithmetic and in rounded.

@@ -5,7 +5,7 @@
 // right.
 //
 // The overlap K is what the twelve half-spaces of both boxes have in common. A plane that does not
-// meet K can be left out: from K, the first plane that is crossed on the way to any point outside
+// meet K can be left out. From K, the first plane that is crossed on the way to any point outside
 // touches K. Of two boxes in contact six or seven planes are left as a rule, so 15 to 20 lines.
 //
 // Which are left. P is the box with the best face axis, D its depth, Q the other box.
@@ -32,7 +32,7 @@
 //
 // Whether they are right. Rounding may decide twice, and differently, which plane a line meets first.
 // Then a piece is lost, or counts twice. Over the surface of K, ∫ n dA is zero and ∫ x nᵀ dA is the
-// volume times the identity: twelve equations, which hold to a share of the accuracy that is asked
+// volume times the identity. These twelve equations hold to a share of the accuracy that is asked
 // for. What does not pass is clipped (clipping.hpp).
 #pragma once
 
@@ -41,14 +41,14 @@
 
 namespace box_contact::BOX_CONTACT_SET {
 
-// What is asked of the centroid: an error of size · max(1e-9, 1e-14 · size / depth).
+// The centroid is accepted with an error of size · max(1e-9, 1e-14 · size / depth).
 constexpr double least_centroid_error = 1e-9, centroid_rounding = 1e-14;
 // And of the covariance: max(1e-8, 1e-14 · size / depth) of its trace.
 constexpr double least_covariance_error = 1e-8;
 
 namespace planes {
 
-// Least magnitude of an entry of R that is inverted: an edge exactly along a slab must not give
+// Least magnitude of an entry of R that is inverted. An edge exactly along a slab must not give
 // 0 · ∞, and three of them multiplied must not underflow.
 constexpr double least_entry = 1e-90;
 // Rounding of a place [of the size] that may not decide whether a plane meets the overlap.
@@ -71,7 +71,7 @@ constexpr double most_cancelled = 4.0;
 constexpr double area_rounding = 0x1p-53, sliver_limit = 18.0;
 
 // Depth [of the size] below which the centroid may be outside a box by rounding. The centroid is at
-// least 0.14 · depth from every face, and off by at most 1.4e-15 · size² / depth; the two are equal
+// least 0.14 · depth from every face, and off by at most 1.4e-15 · size² / depth. The two are equal
 // at a depth of 1e-7 of the size.
 constexpr double safely_inside = 1e-6;
 // Distance from a box [of the size] up to which rounding alone puts a point outside.
@@ -299,7 +299,7 @@ struct Weighted {
   N yy{}, zz{}, yz{};
 };
 
-// Symmetric tensors: xx yy zz, and yz xz xy beside the diagonal.
+// Symmetric tensors: xx yy zz, and yz xz xy off the diagonal.
 template <class T>
 struct Squares {
   Triple<T> diagonal{}, beside{};
@@ -350,8 +350,8 @@ BC_INLINE const auto& of_axis(const Triple<T>& x, int j) {
   }
 }
 
-// One line of a plane of P with one of Q, for W pairs; three with the planes across all of Q's axes,
-// for a single pair.
+// For W pairs, one line of a plane of P with one of Q. For a single pair, three: with the planes
+// across all of Q's axes.
 template <class T>
 using Line = std::conditional_t<packed<T>, Triple<T>, T>;
 template <class T>
