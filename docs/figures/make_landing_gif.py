@@ -4,8 +4,8 @@
 """Make docs/figures/landing.gif: one landing from the side, with contact point, patch and forces.
 
 Run as `python docs/figures/make_landing_gif.py [--out FILE]`. The crane lands by the exact contact,
-offline, as `benchmarks.landing_ways.land` does it. Tilt and gap are drawn larger, and the picture
-says so.
+offline, as `benchmarks.landing_ways.land` does it. Tilt and gap are drawn larger, as the
+picture notes.
 """
 from __future__ import annotations
 
