@@ -81,8 +81,8 @@ class PatchForces:
         """Take the contacts of pairs of bodies (k, 2), asked for at `poses`; forget other pairs.
 
         A contact whose separation is NaN is stale: the patch of its pair stays.
-        friction: μ (k,). surface_velocity: of B's surface relative to A's (k, 3) [m/s], on top of
-        that of the bodies, as of a belt. stiffness: (k,) [N/m]; 0 is as stiff as step and answers bear.
+        friction: μ (k,). surface_velocity: of B's surface relative to A's (k, 3) [m/s], plus that
+        of the bodies, as of a belt. stiffness: (k,) [N/m]; 0 is as stiff as step and answers bear.
         age: how long ago the answer was asked for [s]. period: from one question to the next [s];
         0 is the time since the answer before.
         ValueError: a contact without a patch, or a pair that comes twice; nothing changes then.
