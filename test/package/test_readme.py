@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import codeop
 import contextlib
+import inspect
 import io
 import math
 import os
@@ -30,8 +31,10 @@ import yaml
 from conftest import PROGRAMS
 from geometry_msgs.msg import PoseStamped
 
+from benchmarks import hard_poses
 from box_contact_msgs.msg import Box
 from box_contact_msgs.srv import Check
+from box_contact_ros import PatchForces
 from box_contact_ros.core import DEPTH_FLOOR
 from box_contact_ros.node import check, diagnostics, topics
 from box_contact_ros.node.check import Checker
@@ -39,6 +42,7 @@ from box_contact_ros.node.contact_node import PARAMETERS
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene import pairing, scene_file
 from box_contact_ros.scene.scene_solver import SceneSolver, two_boxes
+from box_contact_ros.solver.mlp import NETWORK, load_mlp
 from box_contact_ros.solver.models import most_near
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -389,7 +393,14 @@ def test_tables_have_the_figures_of_the_reports():
     assert run(sys.executable, 'docs/tables.py', '--check') == ''
 
 
+HARD = [len(cases.pairs.pose_a) for cases in hard_poses.load().values()]
+LAYERS = [weights.shape for weights, _ in load_mlp().networks[NETWORK].layers]
 LIMITS = {
+    'contributing/testing.md': (f'{sum(HARD):,} cases in {len(HARD)} families',),
+    'explanation/force.md': (
+        f'up to {inspect.signature(PatchForces).parameters["iterations"].default} times per step',),
+    'explanation/mlp.md': (
+        f'reads {LAYERS[0][1]} features', f'two hidden layers of {LAYERS[1][0]} rectified units'),
     'how-to/security.md': (
         f'at most {check.MOST_BOXES} boxes and {check.MOST_PAIRS:,} pairs',),
     'reference/conventions.md': (
@@ -398,7 +409,8 @@ LIMITS = {
     'reference/diagnostics.md': (
         f'every {diagnostics.REMINDER_SECONDS:g} s',
         f'`unanswered for {diagnostics.UNANSWERED_SECONDS:g} s: PAIRS`',
-        f'{diagnostics.LATE_TICKS:g} ticks old'),
+        f'{diagnostics.LATE_TICKS:g} ticks old',
+        f'{0.5 * diagnostics.MARGIN:g} times the period of the faster box'),
     'reference/messages.md': (f'at most {most_near("soup-8")} pairs',),
     'reference/scenes.md': (
         f'At most {scene_file.MOST_STREAMS:,} boxes may have a topic',
@@ -416,6 +428,7 @@ CONSTANTS = (
      '{} of the squared half extents'),
     ('contributing/decisions/planes.md', 'overlap/planes.hpp', r'flush_limit = ([\d.e-]+)',
      'less than {} of the overlap'),
+    ('reference/conventions.md', 'separating_axis.hpp', r'tie = 0x1p-(46)', '2⁻⁴⁶ (1.4e-14)'),
     ('reference/conventions.md', 'separating_axis.hpp', r'parallel = ([\d.e-]+)',
      'closer to parallel than {} rad'),
 )
