@@ -34,6 +34,9 @@ from .dataset import Patterns
 from .errors import difference
 
 CHECKS = 200  # least number of times that the cross-validation error is looked at in a training
+DEVIATION_MIN = 1e-3
+"""Least deviation by which an input is divided: folding multiplies its weights by the inverse.
+Tilts of 1e-4 rad would give weights beyond those that a loader accepts (`WEIGHT_LIMIT`)."""
 ROWS = 5000  # patterns whose answers are in memory at a time, of all networks
 
 
@@ -116,11 +119,12 @@ class Scaling:
     @staticmethod
     def of(inputs: np.ndarray) -> Scaling:
         """Return the scaling that gives inputs (…, inputs) mean 0 and deviation 1."""
-        # Summed in float64: there are tens of millions. An input that never varies stays as it is.
+        # Summed in float64: there are tens of millions.
         axes = tuple(range(inputs.ndim - 1))
         mean = inputs.mean(axes, dtype=np.float64)
         deviation = inputs.std(axes, dtype=np.float64)
-        return Scaling(mean.astype(np.float32), (deviation + 1e-6).astype(np.float32))
+        deviation = np.maximum(deviation + 1e-6, DEVIATION_MIN)
+        return Scaling(mean.astype(np.float32), deviation.astype(np.float32))
 
     def folded(self, layers: Layers) -> Layers:
         """Return the network that takes raw inputs, from one that takes normalised inputs."""
