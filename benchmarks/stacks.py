@@ -19,7 +19,7 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -47,6 +47,9 @@ CORNERS = 0.5 * np.array(list(product((-1, 1), repeat=3)))
 REST_SPEED = 1e-3  # of the fastest corner of a scene at rest [m/s]
 SEARCHED = 10  # steps from one search of neighbours to the next
 JUDGED = 10  # steps from one judgement to the next
+PUSHES = (0.15, 0.3)  # on every box of a real pallet [weight]
+PUSHED = 2.0  # how long [s]
+NEAR_MM, NEAR_DEG = 5.0, 0.5  # a box stays that moves and turns less
 
 Wrenches = Callable[[float, 'Boxes', np.ndarray, np.ndarray], np.ndarray]
 
@@ -491,6 +494,31 @@ def real_pallet(order: str) -> Scene:
                  Boxes.of([rows[k] for k in kept]), 5.0)
 
 
+def sideways(order: str, share: float) -> Scene:
+    """Return a real pallet whose boxes are all pushed along x by a share of their weight."""
+    scene = real_pallet(order)
+    push = np.zeros((len(scene.boxes.mass), 6))
+    push[:, 0] = share * GRAVITY * scene.boxes.mass
+    return replace(scene, seconds=PUSHED, act=lambda *_: push)
+
+
+def stays(make: Callable[[], Scene], timing: Timing | None) -> np.ndarray:
+    """Return which free boxes (n,) of a scene end within `NEAR_MM` and `NEAR_DEG` of the start.
+
+    A timing of None is MuJoCo with a step of 1 ms.
+    """
+    scene = make()
+    loop = Ours(scene, timing) if timing else Theirs(scene, STEP)
+    start = scene.boxes.pose.copy()
+    for _ in range(round(scene.seconds / loop.step_size)):
+        loop.step()
+    free, pose = scene.boxes.mass > 0, scene.boxes.pose
+    way = 1e3 * np.linalg.norm(pose[:, :3] - start[:, :3], axis=1)
+    dots = np.abs((pose[:, 3:] * start[:, 3:]).sum(axis=1))
+    turned = np.degrees(2 * np.arccos(np.clip(dots, 0, 1)))
+    return ((way < NEAR_MM) & (turned < NEAR_DEG))[free]
+
+
 ORDERS = ('00100408', '00100001', '00100002', '00100003', '00100004')
 SCENES: tuple[Callable[[], Scene], ...] = (
     partial(tower, 20), partial(tower, 20, jitter=0.03), wall, pyramid, pile, bars, mixed, pallet,
@@ -517,6 +545,7 @@ class Timing(NamedTuple):
 
 TIMINGS = (Timing(0.001, 1000.0, 0.0), Timing(0.004, 250.0, 0.0), Timing(0.001, 200.0, 0.0),
            Timing(0.001, 200.0, 0.002), Timing(0.001, 50.0, 0.005))
+CONVERGED = Timing(0.0001, 10_000.0, 0.0)
 MUJOCO = 'MuJoCo, 1 ms'
 
 # --- the report -----------------------------------------------------------------------------------
@@ -526,6 +555,24 @@ def verdict(outcome: Outcome) -> str:
     """Return when a scene came to rest [s], or how fast its fastest corner is at the end."""
     return (f'{outcome.rest:.2f}' if not math.isnan(outcome.rest) else
             f'**{1e3 * outcome.end_speed:.2g} mm/s**')
+
+
+def pushed(orders: Sequence[str]) -> str:
+    """Return a table: boxes of real pallets that stay under pushes, and the verdicts that differ.
+
+    Verdicts differ from those of a converged run of ours (`CONVERGED`).
+    """
+    rows = []
+    for order, share in product(orders, PUSHES):
+        make = partial(sideways, order, share)
+        truth = stays(make, CONVERGED)
+        verdicts = [stays(make, timing) for timing in (TIMINGS[0], None)]
+        rows.append([order, f'{share:g}', f'{len(truth)}', f'{truth.sum()}',
+                     *(f'{(each != truth).sum()}' for each in verdicts)])
+        print('pushed', *rows[-1], flush=True)
+    return output.markdown_table(
+        ['order', 'push [weight]', 'boxes', 'stay, 0.1 ms', 'differ, 1 ms', f'differ, {MUJOCO}'],
+        rows)
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -559,7 +606,8 @@ def main(args: Sequence[str] | None = None) -> int:
         for name, ways in found.items() for way, each in ways.items()), digits=3, about=about)
     (folder / 'stacks.md').write_text(output.page(
         'benchmarks/pages/stacks', command=output.command_line('benchmarks.stacks', args),
-        machine=about, rest=rest, both=both), encoding='utf-8')
+        machine=about, rest=rest, both=both,
+        pushed=pushed(ORDERS[:1] if options.quick else ORDERS)), encoding='utf-8')
     missed = [name for name, ways in found.items() if math.isnan(ways[ours].rest)]
     for name in missed:
         print(f'stacks: {name} does not come to rest', file=sys.stderr)
