@@ -58,11 +58,14 @@ class Landings:
                                f'{printed(self._output)}')
         now = time.monotonic()
         if self._crane is not None and self._crane.poll() is not None:
+            if self._crane.returncode:
+                print(f'view: the landing failed; what contact node and crane printed:\n'
+                      f'{printed(self._output)}', file=sys.stderr, flush=True)
             self.awaited = (f'the landing {"failed" if self._crane.returncode else "passed"}; '
                             'the next begins in a few seconds')
             self._crane, self._next_at = None, now + PAUSE
         if self._crane is None and now >= self._next_at:
-            self._crane = processes.start(program('demo.crane_node', wait=WAIT))
+            self._crane = processes.start(program('demo.crane_node', wait=WAIT), self._output)
 
     def close(self) -> None:
         """End both at once."""
