@@ -32,6 +32,7 @@ UNANSWERED_SECONDS = 5.0
 """A pair unanswered for this long is an error; so long nobody has to publish after a start."""
 LATE_TICKS = 3.0
 """Answers that are older than so many periods of the poses are late: poses wait in the queue."""
+NEWEST_ANSWERS = 10  # how many tell whether answers are late; half of a second would tell late
 REMINDER_SECONDS = 10.0  # a finding that stays is logged again after this long
 KEPT_TIMES = 4096
 """Evaluations whose times are kept for a report: more a second than any node makes."""
@@ -232,7 +233,7 @@ class Diagnostics:
 
 def _lateness(load: Load, sent: float, overtaken: int) -> Iterator[Finding]:
     """Yield that answers are late, or poses left out for newer ones; sent: poses per box."""
-    age = float(np.median(load.ages))
+    age = float(np.median(load.ages[-NEWEST_ANSWERS:]))
     ticks = 1e-3 * age * sent / load.seconds
     if ticks > LATE_TICKS or overtaken:
         yield Finding('late', f'answers are late: {age:.0f} ms, {ticks:.0f} ticks; '

@@ -409,7 +409,7 @@ LIMITS = {
     'reference/diagnostics.md': (
         f'every {diagnostics.REMINDER_SECONDS:g} s',
         f'`unanswered for {diagnostics.UNANSWERED_SECONDS:g} s: PAIRS`',
-        f'{diagnostics.LATE_TICKS:g} ticks old',
+        f'last {diagnostics.NEWEST_ANSWERS} answers are more than {diagnostics.LATE_TICKS:g} ticks',
         f'{0.5 * diagnostics.MARGIN:g} times the period of the faster box'),
     'reference/messages.md': (f'at most {most_near("soup-8")} pairs',),
     'reference/scenes.md': (
