@@ -47,9 +47,9 @@ SETS = {
 _table = functools.cache(read_csv)
 
 
-def rows(name: str, **wanted: str) -> list[Row]:
+def rows(file: str, **wanted: str) -> list[Row]:
     """Return the rows of a CSV file whose columns have the wanted values."""
-    return [row for row in _table(RESULTS / name)
+    return [row for row in _table(RESULTS / file)
             if all(row[column] == value for column, value in wanted.items())]
 
 
