@@ -137,8 +137,9 @@ def test_the_judge_measures_what_is_stated():
 
 
 def test_what_ends_too_early_is_not_judged():
-    assert Landing() == record_of([1.0] * 9, [0.0] * 9).judge()
-    assert Landing() == LandingRecord(CraneScenario(), 100.0).judge()
+    nothing = repr(Landing())  # of NaN, which differ from each other
+    assert repr(record_of([1.0] * 9, [0.0] * 9).judge()) == nothing
+    assert repr(LandingRecord(CraneScenario(), 100.0).judge()) == nothing
     result = record_of([0.1, 0.0, -0.01] + [-0.01] * 200, [0.0] * 203).judge()
     assert result.touched == 0.01 and math.isnan(result.corner_speed) and not result.carried
     assert str(result) == '  not judged: that takes a touch and 15 s more'
