@@ -41,6 +41,8 @@ def main(folder: str) -> None:
     node = rclpy.create_node('record')
     with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         def write(connection, data):
+            if not writer.counts[connection.id]:
+                node.get_logger().info(f'hears {connection.topic}')
             writer.write(connection, node.get_clock().now().nanoseconds, data)
 
         for topic, (message, name) in TOPICS.items():
