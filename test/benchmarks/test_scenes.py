@@ -4,10 +4,14 @@
 """The reports on thousands of boxes: the same pairs as MuJoCo, and nothing lost over ROS."""
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from benchmarks import scenes
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_bricks_touch_their_neighbours_alone():
@@ -26,11 +30,12 @@ def test_the_same_pairs_as_mujoco():
     assert [row.boxes for row in scenes.grow([50, 60], rounds=1)] == [50, 60]
 
 
-def test_two_thousand_boxes_over_ros():
+def test_two_thousand_boxes_over_ros(monkeypatch):
     """75 arrays, two of them on their way at most: all are answered, with all contacts."""
     pytest.importorskip('rclpy')
     from benchmarks import scene_node
 
+    monkeypatch.chdir(ROOT)  # where `python -m benchmarks.scene_node` runs
     contact, echo = scene_node.streams(2000, 50.0, 1.5, ahead=2)
     assert contact.lost == echo.lost == 0 and contact.sent == echo.sent == 75
     boxes = scenes.bricks(2000)
