@@ -12,7 +12,7 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 python=$(realpath -s "${1:-$root/.venv/bin/python}")
 # All files are read. Left out are slow tests, and long files that no installation changes.
-long='core|faults|laws|markers|readme|scene_node|scenes|series'
+long='core|faults|laws|markers|readme|scene_node|series'
 quick=(-m 'not slow' -k "not (test_${long//|/ or test_})")
 arguments=("${@:2}")
 if [ $# -lt 2 ]; then arguments=("${quick[@]}"); fi
