@@ -5,8 +5,8 @@
 
 `python -m benchmarks.stability` asks every model for every stored case, and writes stability.md and
 stability.csv: wrong verdicts and normals, the worst error of depth, point, volume and covariance.
-The truth is stored, in 60 digits. The exit status is 1 if `exact` or `mlp` has a fault that it must
-not have.
+The truth is stored, in 60 digits. The exit status is 1 if `exact` or `mlp` has a fault; points of
+`mlp` outside the boxes are known of needles.
 """
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ from .hard_poses import Cases, load
 from .judge import NOT_FINITE, NOT_UNIT, OUTSIDE, judge
 from .pose_sets import Pairs
 
-FAULTS = ('verdicts', 'normals', 'outside', 'not_finite')
-GATES = {'exact': FAULTS, 'mlp': ('verdicts', 'normals', 'not_finite')}
-"""The faults that a model must not have. A point of `mlp` is within bounds of the overlap alone."""
-GATED = tuple(GATES)
+GATED = ('exact', 'mlp')  # models that must have no faults
+KNOWN = ('mlp', 'e5_needles', 'outside')
+"""A fault that breaks no gate: points of `mlp` are within bounds of the overlap alone."""
 MODELS = (*GATED, 'soup-8')
 QUICK = 10  # `--quick` asks every so-many-th family
+FAULTS = ('verdicts', 'normals', 'outside', 'not_finite')
 COUNTS, ERRORS = ('cases', 'contacts', *FAULTS), ('depth', 'point_worst', 'volume', 'covariance')
 
 
@@ -118,7 +118,8 @@ def over_all(rows: Sequence[StabilityRow]) -> StabilityRow:
 def gates(rows: Sequence[StabilityRow]) -> list[str]:
     """Return the faults of models that must have none, in words."""
     return [f'{row.model}, {row.family}: {getattr(row, name)} {name}' for row in rows
-            for name in GATES.get(row.model, ()) if getattr(row, name)]
+            if row.model in GATED for name in FAULTS
+            if getattr(row, name) and (row.model, row.family, name) != KNOWN]
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -147,8 +148,8 @@ def main(args: Sequence[str] | None = None) -> int:
         shown=options.models[0], families=table(by[options.models[0]]),
         command=output.command_line('benchmarks.stability', args),
         verdict=f'Goals missed: {"; ".join(broken)}.' if broken else 'Of `exact` and `mlp`, every '
-        'verdict and normal is right. Of `exact`, every point is in both boxes.'),
-        encoding='utf-8')
+        'verdict and normal is right. Every point is in both boxes, but some of `mlp` of '
+        f'`{KNOWN[1]}`.'), encoding='utf-8')
     print(summary)
     for text in broken:
         print(f'stability: gate broken: {text}', file=sys.stderr)
