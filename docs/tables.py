@@ -81,8 +81,6 @@ def models() -> str:
 
 def hot_calls() -> str:
     """Return what other work between two calls does to them, from the speed report."""
-    if not (RESULTS / 'speed_cold.csv').exists():  # `make reports` writes it
-        return 'Calls run one after another: after other work, each takes longer.'
     exact = rows('speed_cold.csv', name='exact')[-1]
     return (f'Calls run one after another: after work that touches {float(exact["megabytes"]):g} '
             f'MB, a call of `exact` takes {cell(exact, "call_p50", 1e3, digits=2)} µs, '

@@ -32,7 +32,8 @@ UNANSWERED_SECONDS = 5.0
 """A pair unanswered for this long is an error; so long nobody has to publish after a start."""
 LATE_TICKS = 3.0
 """Answers that are older than so many periods of the poses are late: poses wait in the queue."""
-NEWEST_ANSWERS = 10  # how many tell whether answers are late; half of a second would tell late
+NEWEST_ANSWERS = 10
+"""How many tell whether answers are late: all of a report would tell it a report later."""
 REMINDER_SECONDS = 10.0  # a finding that stays is logged again after this long
 KEPT_TIMES = 4096
 """Evaluations whose times are kept for a report: more a second than any node makes."""

@@ -534,7 +534,6 @@ def test_two_hundred_boxes_in_a_browser(page):
         wait_for_drawing(tab, 5e-4)
 
 
-@pytest.mark.timeout(1800)
 @in_browser
 def test_a_landing_in_a_browser(program):
     """What is awaited, the landing, and again; the model is the one that was asked for."""
