@@ -27,17 +27,16 @@ PARAMETERS = ('scene', 'model', 'pairing')
 
 def contact_node(context: LaunchContext) -> list[Node]:
     """Return the node with what was given."""
-    given = {name: LaunchConfiguration(name).perform(context)
-             for name in (*ARGUMENTS, *PARAMETERS, 'params_file')}
+    given = {name: LaunchConfiguration(name) for name in (*ARGUMENTS, *PARAMETERS, 'params_file')}
     values = {name: ParameterValue(given[name], value_type=str)
-              for name in PARAMETERS if given[name]}
+              for name in PARAMETERS if given[name].perform(context)}
     values |= {name: ParameterValue(given[name], value_type=bool)
                for name in ('use_sim_time', 'autostart')}
     return [Node(
         package='box_contact_ros', executable='contact_node', output='screen',
         namespace=given['namespace'], ros_arguments=['--log-level', given['log_level']],
         parameters=[given['params_file'], values],
-        respawn=given['use_respawn'] == 'true', respawn_delay=2.0)]
+        respawn=given['use_respawn'], respawn_delay=2.0)]
 
 
 def generate_launch_description() -> LaunchDescription:

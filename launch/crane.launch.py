@@ -6,16 +6,23 @@
     ros2 launch box_contact_ros crane.launch.py model:=exact rate:=500 soup:=true
 
 Takes the arguments of contact_node.launch.py too, which starts the contact node. Ends with the
-crane; the crane's first line names MuJoCo where it is missing.
+crane. Without MuJoCo it starts nothing, and prints how to install it.
 """
 from pathlib import Path
 
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription, Shutdown
+from launch.actions import (
+    DeclareLaunchArgument,
+    IncludeLaunchDescription,
+    OpaqueFunction,
+    Shutdown,
+)
 from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
+
+from box_contact_ros.extras import require
 
 PATIENCE = 30.0
 """How long the crane waits for the contact node [s]: a busy machine starts nodes slowly."""
@@ -39,6 +46,7 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription([
         *(DeclareLaunchArgument(name, default_value=default, description=description)
           for name, (default, description) in ARGUMENTS.items()),
+        OpaqueFunction(function=lambda _: require('sim')),
         node('crane', parameters=[values | {'wait': PATIENCE}], emulate_tty=True,
              on_exit=Shutdown(reason='the crane has ended')),
         node('soup_node', condition=IfCondition(LaunchConfiguration('soup'))),
