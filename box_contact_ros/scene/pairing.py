@@ -49,12 +49,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import Counter, deque
-from collections.abc import Container, Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice
 from statistics import median
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -190,7 +190,7 @@ class Pairing(ABC):
             else:
                 self._count(RESETS, box, stamp)
                 self.reset()
-        state = self._boxes[box]
+            state = self._boxes[box]
         state.came = True
         return state
 
@@ -199,9 +199,9 @@ class Pairing(ABC):
         self.counts[reason] += 1
         self.rejections[reason] = Rejection(box, stamp, self._boxes[box].newest)
 
-    def _has_partner(self, box: str, present: Container[str]) -> bool:
+    def _has_partner(self, box: str, present: Mapping[str, Any]) -> bool:
         """Return whether the other box of some pair of a box is present, or fixed."""
-        return any(partner in present for partner in self._partners[box])
+        return not present.keys().isdisjoint(self._partners[box])
 
 
 class StampPairing(Pairing):
@@ -232,14 +232,16 @@ class StampPairing(Pairing):
         """Take a pose; return the ticks that await nothing any more, in their order."""
         stamp = pose.stamp
         state = self._state_at(box, stamp)
-        if stamp <= state.newest:
+        if stamp > state.newest:
+            state.newest = stamp
+        else:
             if len(state.taken) == REMEMBERED_STAMPS and stamp < state.taken[0]:
                 self._count(OLD, box, stamp)
                 return []
             if stamp in state.taken:
                 self._count(REPEATED, box, stamp)
                 return []
-        state.is_late = PATIENCE == sum(
+        state.is_late = bool(state.missed) and PATIENCE == sum(
             missed > stamp for missed in islice(reversed(state.missed), PATIENCE))
         key = self._tick_of(box, stamp) if self.tolerance else stamp
         tick = self._waiting.get(key)
@@ -249,7 +251,6 @@ class StampPairing(Pairing):
             state.gaps.append(number - state.heard_at)
         state.heard_at = number
         state.taken.append(stamp)
-        state.newest = max(state.newest, stamp)
         if is_too_late:
             self._count(TOO_LATE, box, stamp)
             return []
@@ -264,11 +265,12 @@ class StampPairing(Pairing):
             for earlier, waiting in self._whole.items():
                 waiting.passed += earlier < key
             self._whole[key] = tick
-        ready = [key for key, tick in self._whole.items()
-                 if tick.passed >= PATIENCE or not self._is_awaiting(key, tick)]
-        if not ready:
+        newest = NEVER  # tick that can be answered
+        for key, tick in self._whole.items():
+            if key > newest and (tick.passed >= PATIENCE or not self._is_awaiting(key, tick)):
+                newest = key
+        if newest == NEVER:
             return []
-        newest = max(ready)
         return [self._answer(key) for key in sorted(self._whole) if key <= newest]
 
     @property
@@ -304,6 +306,8 @@ class StampPairing(Pairing):
     def _is_awaiting(self, key: int, tick: WaitingTick) -> bool:
         """Return whether a box that is missing from a tick may still give its pose."""
         names = self._scene.streams
+        if len(tick.poses) == len(names):
+            return False
         while tick.settled < len(names):
             box = names[tick.settled]
             if box not in tick.poses and self._may_come(self._boxes[box], key, tick.number):
@@ -329,7 +333,7 @@ class StampPairing(Pairing):
             for box, state in self._boxes.items():
                 if box not in poses:
                     state.missed.append(key)
-        return [poses.get(box) for box in self._boxes]
+        return list(map(poses.get, self._boxes))
 
 
 class LatestPairing(Pairing):
@@ -356,11 +360,11 @@ class LatestPairing(Pairing):
         state.newest, state.last = stamp, pose
         recent = dict(self._recent(stamp))
         if not self._can_answer:
-            given = {name for name, other in self._boxes.items() if other.last}
+            given = {name: other for name, other in self._boxes.items() if other.last}
             self._can_answer = any(self._has_partner(name, given) for name in given)
         if not self._can_answer:
             return []
-        return [[recent.get(name) for name in self._boxes]]
+        return [list(map(recent.get, self._boxes))]
 
     def _recent(self, now: int) -> Iterator[tuple[str, StampedPose]]:
         """Yield the last pose of each box that is not stale at a stamp [ns]."""
