@@ -29,6 +29,7 @@ POSE_ARRAY = 'poses'
 """Topic of the poses of all moving boxes, where they come as one message."""
 ALL_BOXES = 'all boxes'
 """Source of these poses: no box of a scene file can have this name."""
+FLOAT64 = np.dtype(np.float64)
 NOWHERE = np.full(7, np.nan)
 """Instead of the pose of a box that is not there."""
 EVERY_PAIR = (('*', '*'),)
@@ -337,7 +338,7 @@ class Answer(NamedTuple):
     @property
     def touching(self) -> int:
         """Return how many pairs are in contact: the first rows."""
-        return int(np.count_nonzero(self.contacts.colliding))
+        return self.contacts.colliding.tobytes().count(True)  # numpy takes three times as long
 
     def named(self) -> list[tuple[Pair, Contact]]:
         """Return each pair with its contact, by name."""
@@ -429,8 +430,8 @@ class SceneSolver:
                               'are not answered')
         contacts = self._solver._solve(self._poses, self._poses, self._size, self._size,
                                        BY_PLACE, places=pairs)
-        listed = contacts.separation <= self.margin if self.margin else contacts.colliding
-        if np.count_nonzero(listed) < near or self.margin:
+        if self.margin or False in contacts.colliding.tobytes():
+            listed = contacts.separation <= self.margin if self.margin else contacts.colliding
             rows = np.flatnonzero(listed)
             if self.margin:
                 rows = rows[np.argsort(~contacts.colliding[rows], kind='stable')]
@@ -446,10 +447,10 @@ class SceneSolver:
         if isinstance(poses, np.ndarray):
             self._poses[self._moving] = as_floats(poses, 'poses', 'poses (n, 7)', (None, 7))
             return
-        for place, index, pose in zip(self._places, self._moving, poses):
+        for name, place, pose in zip(self.scene.moving, self._places, poses):
             if pose is None:
                 pose = NOWHERE
-            elif type(pose) is not np.ndarray or pose.dtype != np.float64 or pose.shape != (7,):
-                pose = as_floats(pose, f'pose of {self.scene.names[index]}',
+            elif type(pose) is not np.ndarray or pose.dtype is not FLOAT64 or pose.shape != (7,):
+                pose = as_floats(pose, f'pose of {name}',
                                  'a pose (x y z qx qy qz qw)', (7,))
             place[:] = pose

@@ -144,7 +144,8 @@ class ContactSolver(native.PairSolver):
     def _solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
                names: Names, threads: int = 1, patch: bool = True,
                places: np.ndarray | None = None) -> Contacts:
-        threads = min(int(threads), 1 + len(a if places is None else places))
+        if threads > 1:
+            threads = min(int(threads), 1 + len(a if places is None else places))
         if self._model is None:
             rows, refused = self.solve(a, b, size_a, size_b, threads, bool(patch), places)
             contacts = Contacts(*rows)
