@@ -10,6 +10,7 @@ Bytes halve the latency: docs/contributing/decisions/contact-node.md.
 from __future__ import annotations
 
 import struct
+from functools import lru_cache
 from math import hypot
 
 import numpy as np
@@ -30,6 +31,7 @@ _PADDING = 3
 """Most bytes after the body, of any value: RTPS pads a message to a multiple of four."""
 _STAMP = struct.Struct('<iI')
 _POSE = struct.Struct('<7d')
+VECTOR_BYTES = 8 * 3
 _LAYOUT = '<2s2xiI{}s{}x7d'
 """Of a whole little-endian pose, by the sizes of frame_id, its length included, and of what aligns
 the numbers."""
@@ -156,10 +158,6 @@ class ContactWriter:
         self._scene = scene
         self._names_of: dict[tuple[int, int, int], bytes] = {}
 
-    def vector(self, header: bytes, vector: np.ndarray) -> bytes:
-        """Return a PointStamped or a Vector3Stamped of a header and three numbers."""
-        return _aligned(header) + vector.tobytes()
-
     def contacts(self, header: bytes, answer: Answer) -> bytes:
         """Return the `Contacts` of an answer."""
         names_of, contacts = self._names_of, answer.contacts
@@ -190,11 +188,15 @@ def header_bytes(stamp: int, frame_id: str) -> bytes:
     return LITTLE + b'\0\0' + _STAMP.pack(*divmod(stamp, NANOSECONDS)) + _string(frame_id)
 
 
-def _aligned(data: bytes) -> bytes:
-    """Return the start of a message, padded so that doubles may follow."""
+def aligned(data: bytes) -> bytes:
+    """Return the start of a message, padded so that doubles may follow.
+
+    Behind a header, three make a PointStamped or a Vector3Stamped.
+    """
     return data + b'\0' * ((ENCAPSULATION - len(data)) % 8)
 
 
+@lru_cache  # of the frame, in each tick
 def _string(text: str) -> bytes:
     """Return a string with its length before it, and padded to a multiple of 4 behind it."""
     data = text.encode() + b'\0'

@@ -19,7 +19,7 @@ from ..scene.pairing import NEVER, OVERTAKEN, PAIRINGS, Pairing, StampedPose, Ti
 from ..scene.scene_solver import ALL_BOXES, SceneSolver, TooManyNear
 from ..solver.checks import absent_poses, are_poses, pose_fault, short_repr
 from .diagnostics import TickMonitor
-from .message_bytes import ContactWriter, PoseReader, header_bytes
+from .message_bytes import VECTOR_BYTES, ContactWriter, PoseReader, aligned, header_bytes
 from .messages import NANOSECONDS, Refused
 from .topics import PoseCallback, SceneTopics
 
@@ -86,10 +86,13 @@ class TickAnswerer:
         """Take `tolerance` and `max_age` of checked parameters [s]."""
         self.pairing.tolerance, self.pairing.max_age = (
             round(NANOSECONDS * settings[name]) for name in ('tolerance', 'max_age'))
+        self._stamps_differ = not self.solver.scene.pose_array and (
+            settings['pairing'] == 'latest' or self.pairing.tolerance > 0)
 
     def callback_of(self, box: str, topic: str) -> PoseCallback:
         """Return the callback for the bytes of a box, or of all; it raises nothing at all."""
         queue = self._queues[box] = PoseQueue()
+        read = self._read_all if box == ALL_BOXES else self._reader.read_pose
 
         def callback(data: bytes, info: Mapping[str, Any]) -> None:
             if not self.active:
@@ -100,8 +103,7 @@ class TickAnswerer:
                 self._counts[OVERTAKEN] += 1
                 return
             try:
-                pose = (self._read_all(data) if box == ALL_BOXES else self._reader.read_pose(data))
-                ticks = self.pairing.add(box, pose)
+                ticks = self.pairing.add(box, read(data))
             except Exception as error:
                 self._refuse(error, topic, box)
                 return
@@ -145,17 +147,17 @@ class TickAnswerer:
         answer = self.solver(tick[0].numbers if is_array and tick[0] is not None
                              else [pose and pose.numbers for pose in tick])
         took = time.perf_counter_ns() - started
-        writer, of_pair = self._writer, self._topics.of_pair
-        header = header_bytes(stamp, frame_id)
-        touching, contacts = answer.touching, answer.contacts
-        for row, (a, b) in enumerate(answer.pairs[:touching].tolist() if of_pair else ()):
+        header = head = header_bytes(stamp, frame_id)
+        touching, of_pair = answer.touching, self._topics.of_pair
+        points, normals = answer.contacts.point.tobytes(), answer.contacts.normal.tobytes()
+        for row, (a, b) in enumerate(answer.pairs.tolist()[:touching] if of_pair else ()):
+            if self._stamps_differ:
+                head = header_bytes(self._newest_stamp(tick, a, b), frame_id)
+            start, numbers = aligned(head), slice(VECTOR_BYTES * row, VECTOR_BYTES * (row + 1))
             publishers = of_pair[a, b]
-            own = stamp if is_array else max(
-                [pose.stamp for side in self._sides[a, b] if (pose := tick[side])])
-            head = header if own == stamp else header_bytes(own, frame_id)
-            publishers[0].publish(writer.vector(head, contacts.point[row]))
-            publishers[1].publish(writer.vector(head, contacts.normal[row]))
-        self._topics.contacts.publish(writer.contacts(header, answer))
+            publishers[0].publish(start + points[numbers])
+            publishers[1].publish(start + normals[numbers])
+        self._topics.contacts.publish(self._writer.contacts(header, answer))
         # What nobody waits for comes last. A box that an array leaves out is not there: nobody
         # asks for its pairs.
         age = time.time_ns() - arrived if arrived else 0
@@ -164,6 +166,10 @@ class TickAnswerer:
         counts['contacts'] += touching
         counts['evaluations'] += 1
         counts['stale pairs'] += len(answer.stale)
+
+    def _newest_stamp(self, tick: Tick, a: int, b: int) -> int:
+        """Return the newer stamp [ns] of the poses of a pair that has topics."""
+        return max([pose.stamp for side in self._sides[a, b] if (pose := tick[side])])
 
     def _header_of(self, tick: Tick) -> tuple[int, str]:
         """Return the newest stamp [ns] of a tick and its frame; raise Refused if frames differ."""

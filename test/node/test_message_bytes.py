@@ -28,7 +28,7 @@ from typed_messages import (
 
 from box_contact_msgs.msg import Contacts as ContactsMessage
 from box_contact_ros import ContactSolver
-from box_contact_ros.node.message_bytes import ContactWriter, PoseReader, header_bytes
+from box_contact_ros.node.message_bytes import ContactWriter, PoseReader, aligned, header_bytes
 from box_contact_ros.node.messages import Refused, contacts_by_pair, make_header, read_answer
 from box_contact_ros.scene.scene_solver import Answer, Pair, two_boxes
 from box_contact_ros.solver.contact import Contact, Contacts
@@ -195,10 +195,9 @@ def test_answers_are_written_alike(data, stamp, frame_id, touching, close, stale
         written = deserialize_message(writer.contacts(header, answer), ContactsMessage)
         assert str(written) == str(wanted)  # as text, where NaN is NaN
     for c in contacts[:touching]:
-        assert deserialize_message(writer.vector(header, c.point), PointStamped) == make_point(
-            typed_header, c)
-        assert deserialize_message(writer.vector(header, c.normal), Vector3Stamped) == make_normal(
-            typed_header, c)
+        point, normal = (aligned(header) + vector.tobytes() for vector in (c.point, c.normal))
+        assert deserialize_message(point, PointStamped) == make_point(typed_header, c)
+        assert deserialize_message(normal, Vector3Stamped) == make_normal(typed_header, c)
 
 
 def test_what_a_client_reads_is_the_contact_again():
