@@ -154,7 +154,7 @@ setup(
     extras_require={
         'ros': [
             'ros-jazzy-common-interfaces',
-            'ros-jazzy-rclpy',
+            'ros-jazzy-rclpy>=7.1.4',  # the first with EventsExecutor
             'ros-jazzy-rmw-fastrtps-cpp',
             # What builds box_contact_msgs. The wheels do not ask for all that they need.
             'catkin-pkg',

@@ -22,7 +22,8 @@ from typing import Any, TypeVar
 
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
@@ -37,10 +38,6 @@ from .rclpy_workarounds import (
     keep_for_ever,
     shut_down,
 )
-
-EventsExecutor: Any = None
-with contextlib.suppress(ImportError):  # rclpy before 7.1.4
-    from rclpy.experimental.events_executor import EventsExecutor
 
 REFUSALS = (ValueError, rclpy.exceptions.ParameterException, RCLError)
 """What a node raises on parameters or arguments that it cannot start with."""
@@ -125,13 +122,6 @@ class GuardedNode(Node):
             else:
                 logger.error(line)
             logger.debug(''.join(traceback.format_exception(error)))
-
-
-def make_executor(context: Context) -> Any:
-    """Return the executor that loses nothing at 1 kHz where rclpy has it, else the default one."""
-    if EventsExecutor is None:
-        return SingleThreadedExecutor(context=context)
-    return EventsExecutor(context=context)
 
 
 def spin_for(node: Node, executor: Any, seconds: float) -> None:
@@ -246,7 +236,7 @@ def running_node(make_node: Callable[[Context], NodeKind], args: Sequence[str] |
             if interrupted():  # before rclpy's handlers were installed
                 raise KeyboardInterrupt
             node = make_node(context)
-            executor = make_executor(context)
+            executor = EventsExecutor(context=context)
             executor.add_node(node)
             yield node, executor
         except Exception as error:

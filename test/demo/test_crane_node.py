@@ -14,13 +14,13 @@ pytest.importorskip('mujoco')
 
 import rclpy
 from rclpy.context import Context
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.parameter import Parameter
 
 from box_contact_msgs.msg import Contact, Contacts
 from box_contact_ros.demo import crane_node
 from box_contact_ros.demo.landing import Landing
 from box_contact_ros.node.messages import make_header
-from box_contact_ros.node.runtime import make_executor
 
 HARD = {'rope_angle': 3.0, 'rope_heading': 100.0, 'pitch': 2.0, 'roll': -2.0, 'yaw': 1.0,
         'offset': [0.2, 0.4]}
@@ -127,7 +127,7 @@ def crane():
     values = {'lockstep': True} | HARD
     node = crane_node.CraneNode(
         context, parameter_overrides=[Parameter(name, value=v) for name, v in values.items()])
-    executor = make_executor(context)
+    executor = EventsExecutor(context=context)
     executor.add_node(node)
     yield node, executor
     executor.shutdown()

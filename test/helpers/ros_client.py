@@ -17,6 +17,7 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
 from rclpy.context import Context
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from typed_messages import pose_stamped
@@ -24,7 +25,6 @@ from typed_messages import pose_stamped
 from box_contact_msgs.msg import Contacts
 from box_contact_ros.node.messages import NANOSECONDS, contacts_by_pair
 from box_contact_ros.node.rclpy_workarounds import ends_within
-from box_contact_ros.node.runtime import make_executor
 from box_contact_ros.solver.contact import Contact
 
 TWO_BOXES = {'box_a': 'box_a/pose', 'box_b': 'box_b/pose'}
@@ -56,7 +56,7 @@ class Client:
         self.context = Context()
         rclpy.init(context=self.context)
         self.node = Node('client', context=self.context, namespace=namespace or '/')
-        self.executor = make_executor(self.context)
+        self.executor = EventsExecutor(context=self.context)
         self.executor.add_node(self.node)
         self.points: dict[int, PointStamped] = {}
         self.normals: dict[int, Vector3Stamped] = {}
@@ -195,7 +195,7 @@ def serving(make_node: Callable[[Context], Node]) -> Iterator[Any]:
     context = Context()
     rclpy.init(context=context)
     node: Any = make_node(context)
-    executor = make_executor(context)
+    executor = EventsExecutor(context=context)
     executor.add_node(node)
     stop = Event()
     asked: SimpleQueue[Callable[[], None]] = SimpleQueue()

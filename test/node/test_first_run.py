@@ -20,6 +20,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped, Pose, PoseStamped
 from rcl_interfaces.msg import Log
 from rclpy.context import Context
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -28,7 +29,6 @@ from ros_client import PATIENCE, stamp_of
 from typed_messages import pose_stamped
 
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.runtime import make_executor
 
 SECOND = 10**9
 RATE = 20  # Hz
@@ -99,7 +99,7 @@ class FirstRuns:
                 node.start()
         self.nodes['inactive'].trigger_configure()
         self.client = Node('client', context=self.contexts[1])
-        self.executors = [make_executor(context) for context in self.contexts]
+        self.executors = [EventsExecutor(context=context) for context in self.contexts]
         for node in (*self.nodes.values(), self.client):
             self.executors[node is self.client].add_node(node)
         self.lines = defaultdict(list)

@@ -16,7 +16,6 @@ from types import SimpleNamespace
 import pytest
 from geometry_msgs.msg import PoseStamped
 from rcl_interfaces.srv import ListParameters
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -186,7 +185,7 @@ def test_an_end_that_fails_goes_on(monkeypatch):
         raise RuntimeError('not now')
 
     kept = []
-    monkeypatch.setattr(runtime, 'make_executor', lambda _: SimpleNamespace(
+    monkeypatch.setattr(runtime, 'EventsExecutor', lambda context: SimpleNamespace(
         add_node=lambda _: None, shutdown=fail))
     monkeypatch.setattr(runtime, 'keep_for_ever', kept.append)
     with pytest.raises(RuntimeError, match='not now'), runtime.running_node(
@@ -229,21 +228,11 @@ def test_handlers_of_other_threads_and_callers_stay():
     assert seen == [before, own]
 
 
-def test_rclpy_without_events_executor(monkeypatch):
-    """Older Jazzy has the default executor only; a node is answered from it all the same."""
-    monkeypatch.setattr(runtime, 'EventsExecutor', None)
-    client = Client()
-    assert isinstance(client.executor, SingleThreadedExecutor)
-    client.close()
-
-
-@pytest.mark.parametrize('executor', [runtime.EventsExecutor, None])
-def test_both_executors_tell_when_a_message_came(monkeypatch, executor):
+def test_a_message_comes_with_its_time_and_number():
     """By the wall clock; and the number that its publisher gave it."""
-    monkeypatch.setattr(runtime, 'EventsExecutor', executor)
     client, came = Client(), []
     client.node.create_subscription(
-        PoseStamped, 'pose', with_info(lambda message, info: came.append((message, info))), 10)
+        PoseStamped, 'pose', with_info(lambda given: came.append(given)), 10)
     publisher = client.node.create_publisher(PoseStamped, 'pose', 10)
     before = time.time_ns()
     assert client.spin(lambda: len(came) > 1 or publisher.publish(PoseStamped()))
