@@ -259,6 +259,9 @@ class StampPairing(Pairing):
         if box in tick.poses:  # with a tolerance: an earlier pose near the stamp of this one
             self.counts[NO_PARTNER] += 1
         tick.poses[box] = pose
+        if len(tick.poses) == len(self._boxes) and not self._whole:  # as almost always
+            self._whole_so_far += 1
+            return [self._answer(key)]
         if key not in self._whole and self._has_partner(box, tick.poses):
             self._whole_so_far += 1
             tick.number = self._whole_so_far
@@ -326,7 +329,7 @@ class StampPairing(Pairing):
     def _answer(self, key: int) -> Tick:
         """Remove a tick from those that wait, and return its poses."""
         poses = self._waiting.pop(key).poses
-        del self._whole[key]
+        self._whole.pop(key, None)
         self._has_answered = True
         if len(poses) < len(self._boxes):
             self._newest_missed = max(self._newest_missed, key)

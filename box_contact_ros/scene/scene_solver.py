@@ -374,7 +374,8 @@ class SceneSolver:
         self._size = np.array([box.size for box in boxes], dtype=float)
         self._poses = np.array([box.pose or [np.nan] * 7 for box in boxes], dtype=float)
         self._moving = np.array([scene.index_of[name] for name in scene.moving])
-        self._places = [self._poses[index] for index in self._moving]  # faster than rows by index
+        self._places = [(name, self._poses[index])  # views: faster than rows by index
+                        for name, index in zip(scene.moving, self._moving)]
         self._broad_phase = native.BroadPhase(self._size, scene.is_fixed, margin, scene.rows,
                                               *scene.groups)
         a, b = scene.rows[0] if scene.pairs else (0, 0)
@@ -447,7 +448,7 @@ class SceneSolver:
         if isinstance(poses, np.ndarray):
             self._poses[self._moving] = as_floats(poses, 'poses', 'poses (n, 7)', (None, 7))
             return
-        for name, place, pose in zip(self.scene.moving, self._places, poses):
+        for (name, place), pose in zip(self._places, poses):
             if pose is None:
                 pose = NOWHERE
             elif type(pose) is not np.ndarray or pose.dtype is not FLOAT64 or pose.shape != (7,):
