@@ -12,8 +12,6 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import islice
-from math import ceil, floor, log10
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -277,49 +275,23 @@ def _why_stale(box: str, pairing: Pairing, topics: SceneTopics) -> str:
 def _without_partner(unmatched: Sequence[Pair], pairing: Pairing) -> Finding:
     """Return by how much the stamps of a pair differ, and the tolerance that would do."""
     message = 'poses without a partner'
-    for pair in islice(unmatched, COMPARED):
-        a, b = pairing.stamps(pair.a), pairing.stamps(pair.b)
-        if not len(a) or not len(b):
+    for pair in unmatched[:COMPARED]:
+        a, b = np.sort(pairing.stamps(pair.a)), np.sort(pairing.stamps(pair.b))
+        if max(len(a), len(b)) < FEWEST_STAMPS or not len(a) or not len(b):
             continue
-        difference, tolerance = _compare(a, b)
-        if difference <= pairing.tolerance:
+        difference = 1e-9 * int(abs(a[:, None] - b).min())
+        if difference <= 1e-9 * pairing.tolerance:
             continue
-        message += f': stamps of {pair.a} and {pair.b} differ by {1e-9 * difference:.3g} s'
-        if not tolerance:
+        message += f': stamps of {pair.a} and {pair.b} differ by {difference:.3g} s'
+        # Half a period of the faster box joins each pose of the slower one, wherever it falls.
+        tolerance = 0.5e-9 * MARGIN * min(
+            np.median(np.diff(stamps)) for stamps in (a, b) if len(stamps) > 1)
+        if difference > tolerance:
             return Finding('clocks', message, 'none could be answered; stamp both by one clock '
                                               '(use_sim_time for all, or for none)')
-        return Finding('apart', message, 'none could be answered; set tolerance:='
-                       f'{_rounded_up(1e-9 * tolerance):g}, or start with pairing:=latest')
+        return Finding('apart', message, f'none could be answered; set tolerance:={tolerance:.2g}, '
+                                         'or start with pairing:=latest')
     return Finding('alone', message, 'none could be answered, as no tick had all its boxes')
-
-
-def _compare(a: np.ndarray, b: np.ndarray) -> tuple[int, int]:
-    """Return the difference of the stamps [ns] of two boxes, and the tolerance that joins them.
-
-    Half a period of the faster box joins each pose of the slower one, wherever it falls. The
-    tolerance is 0 where none would do. Both are 0 while there are too few stamps to tell.
-    """
-    slow, fast = sorted((np.sort(a), np.sort(b)), key=_period, reverse=True)
-    if len(fast) < FEWEST_STAMPS:
-        return 0, 0
-    period = _period(fast)
-    met = slow[(slow > fast[0] - period) & (slow < fast[-1] + period)]
-    if not len(met):
-        return int(_to_nearest(slow, fast).min()), 0
-    return int(np.median(_to_nearest(met, fast))), int(0.5 * MARGIN * period)
-
-
-def _period(stamps: np.ndarray) -> float:
-    """Return the median time between stamps [ns], given in their order."""
-    return float(np.median(np.diff(stamps))) if len(stamps) > 1 else np.inf
-
-
-def _to_nearest(stamps: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return how far each stamp is from the nearest of others, in their order."""
-    after = np.searchsorted(others, stamps)
-    before, after = np.maximum(after - 1, 0), np.minimum(after, len(others) - 1)
-    nearest: np.ndarray = np.minimum(abs(stamps - others[before]), abs(stamps - others[after]))
-    return nearest
 
 
 def _rejection_line(reason: str, rejection: Rejection) -> str:
@@ -347,9 +319,3 @@ def _some(names: Sequence[str]) -> str:
     """Return the first names, and how many there are besides."""
     more = len(names) - NAMED
     return ', '.join(names[:NAMED]) + (f' and {more} more' if more > 0 else '')
-
-
-def _rounded_up(value: float) -> float:
-    """Return a positive number rounded up to two digits."""
-    unit = 10.0 ** (floor(log10(value)) - 1)
-    return ceil(value / unit) * unit
