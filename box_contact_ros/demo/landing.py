@@ -68,6 +68,8 @@ class LoadLaw(Protocol):
 
 LATE_STEPS = 3
 """Physics steps by which answers of a real node vary: the load is held no stiffer."""
+REMEMBERED, FADING = 1.0, 1.0
+"""How long a late answer counts in full, and then the time constant in which it fades [s]."""
 
 
 class LoadForces:
@@ -78,7 +80,8 @@ class LoadForces:
         self._load, self._step, self._period = load, step, period
         self._places: dict[str, int] = {}  # of the fixed boxes, by the names of their pairs
         self._forces = PatchForces([load], friction=FRICTION)
-        self._latest = LATE_STEPS * step  # how late an answer came at most [s]
+        self._ages = deque([0.0], maxlen=max(1, round(REMEMBERED / period)))  # of the answers [s]
+        self._late = 0.0  # how late answers are taken to be [s]
 
     @classmethod
     def at_rate(cls, load: Body, *, rate_hz: float, step: float, **_: float) -> LoadForces:
@@ -93,13 +96,18 @@ class LoadForces:
         """Take the contacts that were asked for `age` [s] ago with the load at `pose` (7,)."""
         for name in contacts:
             self._places.setdefault(name, len(self._places) + 1)
-        # As stiff as the latest answer allows: a stiffness that changes would shake the load.
-        self._latest = max(self._latest, age)
+        self._ages.append(age)
+        latest = max(LATE_STEPS * self._step, *self._ages)
+        # As stiff as late answers allow. A stiffness that changes shakes the load, so what is
+        # within twice the latest stays, and what is beyond fades.
+        if self._late > 2.0 * latest:
+            self._late *= 1.0 - min(1.0, self._period / FADING)
+        self._late = max(self._late, latest)
         fixed = Body(mass=0.0, inertia=np.zeros(3))
         self._forces.set_bodies([self._load, *[fixed] * len(self._places)])
         pairs = np.array([(0, self._places[name]) for name in contacts]).reshape(-1, 2)
         self._forces.hold(pairs, Contacts.of(list(contacts.values())), self._rows(pose, NO_TURN),
-                          age=self._latest, period=self._period)
+                          age=self._late, period=self._period)
 
     def wrench(self, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return force and torque (6,) at `pose` (7,) and `velocity` (6,), a physics step each."""

@@ -64,6 +64,23 @@ def test_lost_answers_are_bridged_by_the_patches_that_are_held():
     assert result.at_rest and result.corner_speed < 1e-7, f'\n{result}'
 
 
+@pytest.mark.parametrize('late_at', [5.0, 7.5])
+def test_one_late_answer_is_forgotten(late_at):
+    """Before or after the touch, at 7 s, one is 50 ms late: the load rests flat and not deep."""
+    scenario = CraneScenario()
+    solver = ContactSolver(scenario.size, scenario.stack_size, model='exact')
+    loop, came = ClosedLoop(scenario, 200.0), 0.0
+    while not loop.record.ended:
+        state = loop.ask()
+        came = max(came, state.time + (0.05 if state.tick == 200 * late_at else 0.001))
+        loop.answer(state, {'pair': solver(state.pose, scenario.stack_pose)},
+                    latency=came - state.time)
+        loop.step()
+    result = loop.record.judge()
+    assert result.at_rest and result.corner_speed < 1e-7, f'\n{result}'
+    assert -1e-4 < loop.record.separations()[-1] < 0.0
+
+
 def test_an_answer_acts_from_its_time_on():
     """It is held with the pose for which it was asked, and the next takes its place."""
     held = []
