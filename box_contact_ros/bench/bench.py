@@ -35,7 +35,7 @@ from ..node.parameters import outside_ros_args
 from ..node.processes import add_domain, asked_to_end, on_this_host
 from ..node.runtime import exit_on_refusal, running_node
 from ..solver.arguments import add_model, program_parser, within
-from .drive import NODES, Bench, BenchNode, MeasuredNode
+from .drive import NODES, BenchNode, MeasuredNode
 from .poses import swaying_containers
 from .report import comparison, figures, table, void_reason
 
@@ -62,11 +62,11 @@ def main(args: Sequence[str] | None = None) -> int:
                                rate=options.rate)
     with contextlib.ExitStack() as ended:
         stop = ended.enter_context(asked_to_end())
-        client, executor = ended.enter_context(running_node(partial(BenchNode, names=names), args))
-        bench = Bench(client, executor, poses, rate=options.rate, stop=stop)
+        bench, executor = ended.enter_context(running_node(partial(
+            BenchNode, names=names, poses=poses, rate=options.rate, stop=stop), args))
         nodes = [ended.enter_context(contextlib.closing(MeasuredNode(
             name, model=options.model, cores=cores - own or cores))) for name in names]
-        logs = bench.run(nodes)
+        logs = bench.run(executor, nodes)
         faults = [node.fault for node in nodes if node.fault]
     rows, compared = figures(logs), comparison(logs, block=bench.block)
     void = void_reason(rows, options.rate)

@@ -38,8 +38,7 @@ from .report import AnswerLog
 
 BLOCK_SECONDS = 0.5
 SLICE = 0.05  # time [s] between looks at whether the bench was called off
-# Bounds on everything that waits, so that a bench always ends.
-START_LIMIT = 60.0  # time [s] until all nodes answer
+START_LIMIT = 60.0  # time [s] until a node answers
 DRAIN_SECONDS = 1.0  # time [s] without an answer, after which what is still out is lost
 
 NODES = {'echo': ('bench.echo_node', 'echo/'), 'contact': ('node.contact_node', ''),
@@ -83,14 +82,24 @@ class MeasuredNode:
 
 
 class BenchNode(GuardedNode):
-    """Publishes poses that were serialised before, keeps the bytes of what comes back."""
+    """Plays the stream of poses to all nodes, and keeps the logs of what they answered."""
 
-    def __init__(self, context: Context, names: Sequence[str]) -> None:
-        """Take the names of the nodes."""
+    def __init__(self, context: Context, *, names: Sequence[str],
+                 poses: tuple[np.ndarray, np.ndarray], rate: float, stop: Stop) -> None:
+        """Take the names of the nodes and the stream: poses (n, 7) of A and of B.
+
+        rate: pairs per second [Hz]; stop: set to call all off.
+        """
         super().__init__('bench', context=context)
-        self.arrivals: list[tuple[int, str, bytes]] = []
+        self.rate, self.stop = rate, stop
+        self.block = max(1, round(rate * BLOCK_SECONDS))  # pairs
+        self._truth = ContactSolver(SIZE, SIZE, model='exact').batch(*poses)
+        header = make_header(0, FRAME)
+        self._pairs = [[serialize_message(pose_message(header, pose)) for pose in pair]
+                       for pair in zip(*poses)]
+        self._arrivals: list[tuple[int, str, bytes]] = []
         """(received [ns], kind, message); stamps tell the nodes apart."""
-        self.senders = {
+        self._senders = {
             name: [self.create_publisher(
                 PoseStamped, f'bench/{name}/box_{box}/pose', DEEP_RELIABLE).publish
                 for box in 'ab'] for name in names}
@@ -101,99 +110,81 @@ class BenchNode(GuardedNode):
                                          partial(self._keep, kind), DEEP_RELIABLE, raw=True)
 
     def _keep(self, kind: str, data: bytes) -> None:
-        self.arrivals.append((time.time_ns(), kind, data))
+        self._arrivals.append((time.time_ns(), kind, data))
 
-
-class Bench:
-    """Plays the stream to all nodes, and keeps the logs of what they answered."""
-
-    def __init__(self, client: BenchNode, executor: Any, poses: tuple[np.ndarray, np.ndarray], *,
-                 rate: float, stop: Stop) -> None:
-        """Take the stream: poses (n, 7) of A and of B.
-
-        rate: pairs per second [Hz]; stop: set to call all off.
-        """
-        self.client, self.executor, self.rate, self.stop = client, executor, rate, stop
-        self.block = max(1, round(rate * BLOCK_SECONDS))  # pairs
-        self._truth = ContactSolver(SIZE, SIZE, model='exact').batch(*poses)
-        header = make_header(0, FRAME)
-        self._pairs = [[serialize_message(pose_message(header, pose)) for pose in pair]
-                       for pair in zip(*poses)]
-
-    def run(self, nodes: Sequence[MeasuredNode]) -> list[AnswerLog]:
+    def run(self, executor: Any, nodes: Sequence[MeasuredNode]) -> list[AnswerLog]:
         """Play the stream to all nodes; return a log for each, of what was sent before `stop`.
 
         Raises ValueError where a node does not answer.
         """
-        logs = {node.name: AnswerLog(node.name, self._truth) for node in nodes}
-        count = len(self._pairs)
-        blocks = [range(first, min(first + self.block, count))
-                  for first in range(0, count, self.block)]
+        self._executor = executor
+        logs = {node.name: self._new_log(node.name) for node in nodes}
+        rows = range(len(self._pairs))
+        blocks = [rows[first:first + self.block] for first in rows[::self.block]]
         for node in nodes:
             self._warm_up(node, blocks[0])
         order = np.random.default_rng(1)
-        for rows in blocks:
+        for block in blocks:
             for name in order.permutation(list(logs)):
                 if not self.stop.is_set():
-                    self._play(logs[name], rows)
+                    self._play(logs[name], block)
         return list(logs.values())
 
-    def _warm_up(self, node: MeasuredNode, rows: range) -> None:
+    def _new_log(self, name: str) -> AnswerLog:
+        return AnswerLog(name, self._truth)
+
+    def _warm_up(self, node: MeasuredNode, block: range) -> None:
         """Send a node the first pair until it has answered, then a block that nobody looks at."""
         deadline = time.monotonic() + START_LIMIT
         while not self.stop.is_set():
-            if node.fault:
-                raise ValueError(node.fault)
-            if time.monotonic() > deadline:
-                raise ValueError(f'no answer of the {node.name} node in {START_LIMIT:g} s')
-            log = AnswerLog(node.name, self._truth)
+            if node.fault or time.monotonic() > deadline:
+                raise ValueError(node.fault or
+                                 f'no answer of the {node.name} node in {START_LIMIT:g} s')
+            log = self._new_log(node.name)
             self._play(log, range(1))
             if log.stamps[0] and not log.lost[0]:
-                self._play(AnswerLog(node.name, self._truth), rows)
+                self._play(self._new_log(node.name), block)
                 return
 
-    def _play(self, log: AnswerLog, rows: range) -> None:
-        """Send some pairs to a node, and log its answers."""
-        sent: list[tuple[int, float]] = []
-        sender = threading.Thread(target=self._send, args=(log.node, rows, sent))
+    def _play(self, log: AnswerLog, block: range) -> None:
+        """Send a block of pairs to a node, and log its answers."""
+        sender = threading.Thread(target=self._send, args=(log, block))
         gc.collect()  # now, and not while answers come in: it takes milliseconds
         sender.start()
         while sender.is_alive():
-            spin_for(self.client, self.executor, SLICE)
-        row_of = {stamp: row for row, (stamp, _) in zip(rows, sent)}
-        for row, (stamp, lateness) in zip(rows, sent):
-            log.stamps[row], log.lateness[row] = stamp, lateness
+            spin_for(self, self._executor, SLICE)
         deadline = time.monotonic() + DRAIN_SECONDS
-        while log.lost[rows].any() and time.monotonic() < deadline:
-            spin_for(self.client, self.executor, SLICE)
-            if self._read(log, row_of):
+        while log.lost[block].any() and time.monotonic() < deadline:
+            spin_for(self, self._executor, SLICE)
+            if self._read(log, block):
                 deadline = time.monotonic() + DRAIN_SECONDS
-        spin_for(self.client, self.executor, SLICE)  # whatever is on its way behind the last answer
-        self._read(log, row_of)
+        spin_for(self, self._executor, SLICE)  # what is on its way behind the last answer
+        self._read(log, block)
 
-    def _send(self, name: str, rows: range, sent: list[tuple[int, float]]) -> None:
-        """Send pairs at the rate; note stamp [ns] and lateness [s] of each.
+    def _send(self, log: AnswerLog, block: range) -> None:
+        """Send pairs at the rate; log stamp [ns] and lateness [s] of each.
 
         The schedule is absolute, so that a pair that is late does not delay the next.
         """
         begin = time.perf_counter() + SLICE
-        for number, row in enumerate(rows):
+        for number, row in enumerate(block):
             due = begin + number / self.rate
             time.sleep(max(0.0, due - time.perf_counter()))
             if self.stop.is_set():
                 return
-            lateness = time.perf_counter() - due
+            log.lateness[row] = time.perf_counter() - due
             stamp = time.time_ns()  # it names the pair: no two are the same
-            for publish, message in zip(self.client.senders[name], self._pairs[row]):
+            for publish, message in zip(self._senders[log.node], self._pairs[row]):
                 publish(with_stamp(message, stamp))
-            sent.append((stamp, lateness))
+            log.stamps[row] = stamp
 
-    def _read(self, log: AnswerLog, row_of: dict[int, int]) -> bool:
-        """Log what has arrived by the rows of its stamps [ns]; return whether anything has.
+    def _read(self, log: AnswerLog, block: range) -> bool:
+        """Log what has arrived by the rows of its stamps; return whether anything has.
 
         What answers an earlier block came too late. Stale poses were not evaluated.
         """
-        arrivals, self.client.arrivals[:] = self.client.arrivals[:], []
+        row_of = dict(zip(log.stamps[block].tolist(), block))
+        arrivals, self._arrivals = self._arrivals, []
         known = [(row_of[stamp], kind, received, data) for received, kind, data in arrivals
                  if (stamp := raw_stamp(data)) in row_of]
         for row, kind, received, data in known:
