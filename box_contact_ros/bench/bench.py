@@ -9,6 +9,7 @@ one node after the other, in an order that is drawn for each block.
 
 The first line of the report says how many times as long a node takes as the one before it, with
 95 % intervals. A table has latencies, and answers that are lost or differ from the exact contacts.
+With --out, a picture of the latencies stands before them.
 
 The exit status is 0 only if contact and echo node lost nothing, no answer was wrong, and the run is
 not void. It is void if the bench itself was late by more than a period in over 1 % of the pairs.
@@ -30,6 +31,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from ..core import native
+from ..extras import require
 from ..node.contact_node import PARAMETERS
 from ..node.parameters import outside_ros_args
 from ..node.processes import add_domain, asked_to_end, on_this_host
@@ -37,7 +39,7 @@ from ..node.runtime import exit_on_refusal, running_node
 from ..solver.arguments import add_model, program_parser, within
 from .drive import NODES, BenchNode, MeasuredNode
 from .poses import swaying_containers
-from .report import comparison, figures, table, void_reason
+from .report import comparison, draw, figures, table, void_reason
 
 RATE, SECONDS, LONGEST = 200.0, 60.0, 3600.0  # [Hz], [s], [s]
 
@@ -74,7 +76,9 @@ def main(args: Sequence[str] | None = None) -> int:
     results = '\n\n'.join(filter(None, (void, compared, table(rows), *faults, stopped)))
     print(f'\n{results}', flush=True)
     if options.out:
-        (options.out / 'bench.md').write_text(f'# Bench\n\n{about}\n\n{results}\n', 'utf-8')
+        draw(options.out / 'bench.png', logs, block=bench.block)
+        (options.out / 'bench.md').write_text(
+            f'# Bench\n\n![Latencies of each node](bench.png)\n\n{about}\n\n{results}\n', 'utf-8')
     faulty = any(row['wrong'] or row['lost'] and row['node'] != 'soup' for row in rows)
     return stop.status or int(faulty or bool(faults) or bool(void))
 
@@ -88,10 +92,12 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
                              '%(default)g)')
     add_model(parser, PARAMETERS['model'].default)
     parser.add_argument('--out', type=Path, metavar='DIR',
-                        help='folder for bench.md (default: none)')
+                        help='folder for the report, bench.md, and its picture, bench.png, which '
+                             'needs the extra report (default: none)')
     add_domain(parser)
     options = parser.parse_args(list(args))
     if options.out:
+        require('report')
         try:
             options.out.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=options.out).close()

@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What came back from each node, and its figures as text. No ROS.
+"""What came back from each node, its figures as text, and a picture of them. No ROS.
 
 Stamps and times of receipt are nanoseconds of one clock. A pair is answered once all messages of
 its stamp have come: point, normal and contacts, from the echo node point and normal. Its latency
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ DEPTH_TOLERANCE = 1e-9
 separating-axis test. The depths of two ticks differ by a thousand times more."""
 RESAMPLES = 2000  # of the bootstrap
 LATE = 'bench late p99 [ms]'  # a column
+COLOURS = {'echo': '0.6', 'contact': '#e6146e', 'soup': '#4678aa'}  # of the picture
 
 
 class AnswerLog:
@@ -98,15 +100,15 @@ def figures(logs: Sequence[AnswerLog]) -> list[dict[str, Any]]:
     return [{
         'node': log.node, 'sent': np.count_nonzero(log.stamps), 'lost': int(log.lost.sum()),
         'wrong': int(log.wrong.sum()),
-        **{f'{name} [ms]': 1e3 * _percentile(log.latencies, percent)
+        **{f'{name} [ms]': 1e3 * percentile(log.latencies, percent)
            for name, percent in (('p50', 50), ('p99', 99), ('max', 100))},
-        'point error [mm]': 1e3 * _percentile(
+        'point error [mm]': 1e3 * percentile(
             np.linalg.norm(log.points - log.truth.point, axis=1), 100),
-        LATE: 1e3 * _percentile(log.lateness, 99)} for log in logs]
+        LATE: 1e3 * percentile(log.lateness, 99)} for log in logs]
 
 
-def _percentile(values: np.ndarray, percent: float) -> float:
-    """Return a percentile of those values that are no NaN; NaN of none."""
+def percentile(values: np.ndarray, percent: float) -> float:
+    """Return a percentile of those values that are not NaN; NaN of none."""
     values = values[~np.isnan(values)]
     return float(np.percentile(values, percent)) if len(values) else math.nan
 
@@ -135,3 +137,33 @@ def _cell(value: object) -> str:
     if not isinstance(value, float):
         return str(value)
     return '' if math.isnan(value) else f'{value:.3g}'
+
+
+def draw(path: Path, logs: Sequence[AnswerLog], *, block: int) -> None:
+    """Write a PNG, 700 pixels wide: how long each node took to answer. Needs matplotlib.
+
+    block: pairs per block, as of `ratio`.
+    """
+    from matplotlib.figure import Figure  # only here: an extra
+    from matplotlib.ticker import LogLocator
+
+    figure = Figure(figsize=(7.0, 1.2 + 0.8 * len(logs)), dpi=100, layout='constrained')
+    axes = figure.subplots(len(logs), sharex=True, squeeze=False)[:, 0]
+    answered = [1e3 * log.latencies[~np.isnan(log.latencies)] for log in logs]
+    every = np.concatenate([*answered, [0.1]])
+    bins = np.geomspace(0.9 * every.min(), 1.1 * every.max(), 80)
+    for axis, log, times in zip(axes, logs, answered):
+        axis.hist(times, bins, color=COLOURS[log.node])
+        axis.set(xscale='log', yticks=[])
+        axis.spines[['left', 'top', 'right']].set_visible(False)
+        words = 'no answer' if not len(times) else '\n'.join(
+            f'{name} {percentile(times, percent):.3g} ms'
+            for name, percent in (('median', 50), ('p99', 99)))
+        axis.set_ylabel(f'{log.node}\n{words}', rotation=0, horizontalalignment='right',
+                        verticalalignment='center')
+    axes[-1].xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes[-1].xaxis.set_major_formatter('{x:g}')
+    axes[-1].set_xlabel('time from the stamp of the poses to the answer [ms]')
+    times_as_long = ratio(logs[1], logs[0], block=block)[0]
+    figure.suptitle(f'The contact node takes {times_as_long:.2f} times as long as transport alone')
+    figure.savefig(path)

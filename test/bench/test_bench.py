@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 import re
 import signal
+import sys
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,9 @@ from rclpy.context import Context
 from rclpy.qos import QoSProfile
 
 from box_contact_msgs.msg import Contacts
+from box_contact_ros import extras
 from box_contact_ros.bench import drive
+from box_contact_ros.bench.bench import main as bench_main
 from box_contact_ros.node.runtime import GuardedNode, running_node, spin_for
 
 DEEP = QoSProfile(depth=1000)
@@ -38,12 +41,15 @@ def rows_of(text: str) -> list[dict[str, str]]:
 
 
 def test_a_short_run(program, tmp_path):
-    """All pairs are answered rightly; page and terminal tell the same."""
+    """All pairs are answered rightly; page and terminal tell the same; the picture comes first."""
     pytest.importorskip('fcl')
+    pytest.importorskip('matplotlib')
     running = bench(program, f'--rate 100 --duration 3 --model exact --out {tmp_path}')
     status = running.wait(PATIENCE)
     page = (tmp_path / 'bench.md').read_text()
     assert status == ('void' in page), running.output  # on a machine that is too busy
+    assert page.startswith('# Bench\n\n![Latencies of each node](bench.png)\n')
+    assert (tmp_path / 'bench.png').read_bytes().startswith(b'\x89PNG')
     rows = rows_of(page)
     assert [row['node'] for row in rows] == ['echo', 'contact', 'soup']
     for row in rows:
@@ -141,6 +147,14 @@ def test_a_node_that_does_not_start_is_reported(program, monkeypatch):
     fault = node.fault
     node.close()
     assert fault.startswith('the echo node ended with status 1: ') and 'no_node' in fault
+
+
+def test_a_report_without_matplotlib_names_the_extra(monkeypatch, tmp_path):
+    """Before anything is started; without --out nobody needs it."""
+    monkeypatch.setattr(sys, 'excepthook', sys.excepthook)
+    monkeypatch.setitem(extras.MODULES, 'report', 'no_such_module')
+    with pytest.raises(extras.MissingExtra, match=r'pip install .*\[report\]'):
+        bench_main(['--out', str(tmp_path)])
 
 
 @pytest.mark.parametrize('arguments, words', [

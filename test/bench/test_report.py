@@ -9,7 +9,15 @@ import math
 import numpy as np
 import pytest
 
-from box_contact_ros.bench.report import AnswerLog, comparison, figures, ratio, table, void_reason
+from box_contact_ros.bench.report import (
+    AnswerLog,
+    comparison,
+    draw,
+    figures,
+    ratio,
+    table,
+    void_reason,
+)
 from box_contact_ros.solver.contact import Contacts, without_patch
 
 MS = 1_000_000  # ns
@@ -136,3 +144,16 @@ def test_a_dead_node_has_a_report():
     lines = table(rows).splitlines()
     assert len({len(line) for line in lines}) == 1 and 'nan' not in lines[3]
     assert comparison(logs, block=BLOCK) == 'contact / echo nan [nan, nan]'
+
+
+def test_the_picture_is_as_wide_as_a_page(tmp_path):
+    """With a row for each node, also for one that never answered."""
+    image = pytest.importorskip('matplotlib.image')
+    dead = AnswerLog('soup', exact())
+    heights = []
+    for logs in ([played('echo'), played()], [played('echo'), played(delay=3 * MS), dead]):
+        draw(tmp_path / 'bench.png', logs, block=BLOCK)
+        height, width, _ = image.imread(tmp_path / 'bench.png').shape
+        assert width == 700
+        heights.append(height)
+    assert 200 < heights[0] < heights[1] < 500
