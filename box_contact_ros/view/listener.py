@@ -21,13 +21,14 @@ from geometry_msgs.msg import WrenchStamped
 from rclpy.context import Context
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
-from box_contact_msgs.msg import Contacts
+from box_contact_msgs.msg import Contacts as ContactsMessage
 
 from ..core import LENGTH_MAX
-from ..node.messages import Refused
+from ..node.messages import Refused, read_answer
 from ..node.ros_client import CRANE_WRENCH, PoseTopic, pose_topics, stamp_of
 from ..node.runtime import GuardedNode
-from ..scene.scene_solver import Scene
+from ..scene.scene_solver import Answer, Scene
+from ..solver.contact import Contacts
 
 KEPT = 1000  # poses kept per topic: a second at 1 kHz
 UNANSWERED = 0.5
@@ -35,48 +36,21 @@ UNANSWERED = 0.5
 QUIET = 1.0  # time [s] without a pose, after which nobody moves the boxes any more
 FORCE_AGE = 100_000_000  # [ns] between a force and a tick: the crane publishes every 33 ms
 MOST_FORCE = 1e12  # [N]: a chart of more shows nothing else
-LARGEST = np.array([*[LENGTH_MAX] * 3, *[1.0 + 1e-6] * 3, LENGTH_MAX, LENGTH_MAX**3,
-                    *[LENGTH_MAX**2] * 6])
-"""Largest numbers of a contact: point, normal (rounded unit vector), depth, volume, covariance."""
-PATCH = slice(7, None)  # those of LARGEST that are NaN from models that give the point alone
+LARGEST = LENGTH_MAX**3
+"""Largest number of a contact: of a volume [m³]. Others are smaller, and drawn as they come."""
 
 
 class SceneRows:
     """A scene as arrays: one row per box, in the scene's order."""
 
     def __init__(self, scene: Scene) -> None:
-        self.row_of = {name: row for row, name in enumerate(scene.boxes)}
+        self.scene = scene
         self.sizes = np.array([box.size for box in scene.boxes.values()], dtype=float)
         self.poses = np.array([box.pose or [np.nan] * 7 for box in scene.boxes.values()])
         """Poses (n, 7) of the fixed boxes, NaN for boxes that move."""
-        self.longest = self.sizes.max(axis=1)
-        """Longest edge (n,) [m] of each box."""
-        self.pair_count = scene.pair_count
-        self._has_patterns = bool(scene.patterns)
-        self._boxes_of = {pair.label: row for pair, row in zip(scene.pairs, scene.rows.tolist())}
         self.is_a = np.any([scene.matching(a) for a, _ in scene.patterns], axis=0) | np.isin(
             np.arange(len(self.sizes)), scene.rows[:, 0])
         """Which boxes (n,) may be box a of a pair: normals point away from them."""
-
-    def boxes_of(self, pair: str, *boxes: str) -> list[int] | None:
-        """Return the rows of the boxes of a pair, or of a stale box; None for an unknown one."""
-        rows = [self.row_of[box] for box in boxes or (pair,) if box in self.row_of]
-        is_asked = self._has_patterns and len(rows) == len(boxes or (pair,))
-        return self._boxes_of.get(pair) or (rows if is_asked else None)
-
-
-@dataclass(frozen=True, eq=False)
-class DrawnContacts:
-    """The contacts of one evaluation as arrays, the deepest first; SI units, common frame."""
-
-    pairs: list[str]
-    stale: list[str]  # names of the pairs that could not be evaluated
-    points: np.ndarray  # (k, 3)
-    normals: np.ndarray  # (k, 3), unit vectors from a to b
-    depths: np.ndarray  # (k,)
-    volumes: np.ndarray  # (k,), NaN from models that give the point alone
-    covariances: np.ndarray  # (k, 3, 3), NaN there too
-    edges: np.ndarray  # (k,) longest edge of each pair's smaller box [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,34 +61,25 @@ class Tick:
     stamp: int  # [ns]
     frame_id: str
     poses: np.ndarray  # (n, 7), NaN for a box that has none
-    contacts: DrawnContacts | None  # None if nobody answers
+    answer: Answer | None  # what touches, the deepest first; None if nobody answers
     latency: float  # time [s] from the stamp to the contacts, NaN if nobody answers
 
 
-def read_contacts(message: Any, rows: SceneRows) -> DrawnContacts:
-    """Return the contacts of a box_contact_msgs/Contacts; near pairs are left out.
+def read_touching(message: Any, scene: Scene) -> Answer:
+    """Return what touches by a box_contact_msgs/Contacts, the deepest first.
 
     Raises Refused for a pair that is not in the scene, and for numbers that no contact has.
     """
-    touching = sorted(message.contacts, key=lambda c: -c.depth)
-    pairs, stale = [c.pair for c in touching], list(message.stale)
-    boxes = [rows.boxes_of(c.pair, c.box_a, c.box_b) for c in touching]
-    unknown = [pair for pair, row in zip((*pairs, *stale), (*boxes, *map(rows.boxes_of, stale)))
-               if row is None]
-    if unknown:
-        raise Refused('other scene', f'the contacts have the pair {unknown[0][:100]!r}, which the '
-                                     'scene that is drawn has not')
-    numbers = np.array([(c.point.x, c.point.y, c.point.z, c.normal.x, c.normal.y, c.normal.z,
-                         c.depth, c.volume, *c.covariance) for c in touching])
-    numbers = numbers.reshape(-1, len(LARGEST))
-    good = np.abs(numbers) <= LARGEST
-    good[:, PATCH] |= np.isnan(numbers[:, PATCH])  # models that give the point alone
-    if not good.all():
-        raise Refused('bad contacts', f'{numbers[~good][0]:g} is among the numbers of a contact')
-    return DrawnContacts(pairs, stale, points=numbers[:, :3], normals=numbers[:, 3:6],
-                         depths=numbers[:, 6], volumes=numbers[:, 7],
-                         covariances=numbers[:, [[8, 9, 10], [9, 11, 12], [10, 12, 13]]],
-                         edges=np.array([rows.longest[row].min() for row in boxes]))
+    answer = read_answer(message, scene)
+    touching = np.flatnonzero(answer.contacts.colliding)
+    rows = touching[np.argsort(answer.contacts.separation[touching], kind='stable')]
+    contacts = Contacts(*(column[rows] for column in answer.contacts))
+    # Models that give the point alone have NaN for volume and covariance.
+    for numbers in (contacts.separation, contacts.normal, contacts.point,
+                    np.nan_to_num(contacts.volume), np.nan_to_num(contacts.covariance)):
+        if not (np.abs(numbers) <= LARGEST).all():
+            raise Refused('bad contacts', 'a contact with numbers that none has')
+    return answer._replace(pairs=answer.pairs[rows], contacts=contacts)
 
 
 class Track:
@@ -142,16 +107,16 @@ class Listener(GuardedNode):
         self._rows = SceneRows(scene)
         self._tracks: list[Track] = []
         self._frame_id = ''
-        self._answer: tuple[int, DrawnContacts, float] | None = None  # stamp, contacts, latency
+        self._answer: tuple[int, Answer, float] | None = None  # stamp, what touches, latency
         self._heard = -math.inf  # when a pose last came, by the steady clock [s]
         self._unanswered = math.inf  # since when poses come without contacts [s]
         self.topics = pose_topics(scene)
         for topic in self.topics:
-            self._tracks.append(Track([self._rows.row_of[box] for box in topic.boxes]))
+            self._tracks.append(Track([scene.index_of[box] for box in topic.boxes]))
             self.create_subscription(topic.kind, topic.name,
                                      partial(self._on_poses, topic, self._tracks[-1]), topic.qos,
                                      raw=True)
-        self.create_subscription(Contacts, 'contacts', self._on_contacts, contacts_qos)
+        self.create_subscription(ContactsMessage, 'contacts', self._on_contacts, contacts_qos)
 
     @property
     def quiet(self) -> bool:
@@ -167,7 +132,7 @@ class Listener(GuardedNode):
     def _on_contacts(self, message: Any) -> None:
         stamp = stamp_of(message.header)
         latency = 1e-9 * (self.get_clock().now().nanoseconds - stamp)
-        self._answer = stamp, read_contacts(message, self._rows), latency
+        self._answer = stamp, read_touching(message, self._rows.scene), latency
         self._unanswered = math.inf
 
     def tick(self) -> Tick | None:
@@ -178,13 +143,13 @@ class Listener(GuardedNode):
         tracks = [track for track in self._tracks if track.kept]
         if not tracks:
             return None
-        stamp, contacts, latency = max(track.kept[-1][0] for track in tracks), None, math.nan
+        stamp, answer, latency = max(track.kept[-1][0] for track in tracks), None, math.nan
         if self._answer is not None and time.monotonic() - self._unanswered <= UNANSWERED:
-            stamp, contacts, latency = self._answer
+            stamp, answer, latency = self._answer
         poses = self._rows.poses.copy()
         for track in tracks:
             poses[track.boxes] = track.at(stamp)
-        return Tick(self._rows, stamp, self._frame_id, poses, contacts, latency)
+        return Tick(self._rows, stamp, self._frame_id, poses, answer, latency)
 
 
 class ViewNode(Listener):

@@ -28,8 +28,9 @@ from ..node.runtime import run_node
 from ..node.topics import contact_qos
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import two_boxes
+from ..solver.contact import Contacts
 from . import style
-from .listener import DrawnContacts, Listener, Tick
+from .listener import Listener, Tick
 
 PARAMETERS = {name: CONTACT_PARAMETERS[name] for name in ('size_a', 'size_b', 'scene')}
 PERIOD = 1 / 30  # time [s] between marker arrays
@@ -44,8 +45,9 @@ def scene_markers(tick: Tick) -> list[Marker]:
     """Return what draws a tick: boxes by their row as id, contacts the deepest first."""
     header = make_header(tick.stamp, tick.frame_id)
     markers = list(_boxes(header, tick))
-    if tick.contacts is not None and tick.contacts.pairs:
-        markers += _contacts(header, tick.contacts)
+    if tick.answer is not None and len(tick.answer.pairs):
+        edges = tick.rows.sizes[tick.answer.pairs].max(axis=2).min(axis=1)
+        markers += _contacts(header, tick.answer.contacts, edges)
     return markers
 
 
@@ -61,15 +63,18 @@ def _boxes(header: Header, tick: Tick) -> Iterator[Marker]:
         yield marker
 
 
-def _contacts(header: Header, contacts: DrawnContacts) -> Iterator[Marker]:
-    """Yield points and patches of all contacts, a normal for each, depths of the deepest."""
-    radii = style.POINT_RADIUS * contacts.edges
-    arrows = style.NORMAL_LENGTH * contacts.edges[:, None] * contacts.normals
+def _contacts(header: Header, contacts: Contacts, edges: np.ndarray) -> Iterator[Marker]:
+    """Yield points and patches of all contacts, a normal for each, depths of the deepest.
+
+    edges: (k,) longest edge of each pair's smaller box [m].
+    """
+    radii = style.POINT_RADIUS * edges
+    arrows = style.NORMAL_LENGTH * edges[:, None] * contacts.normal
     spheres = make_marker(header, 'points', Marker.SPHERE_LIST, style.CONTACT)
-    spheres.points = [_set(Point(), point) for point in contacts.points]
+    spheres.points = [_set(Point(), point) for point in contacts.point]
     _set(spheres.scale, [2.0 * radii[0]] * 3)
     yield spheres
-    for row, (point, arrow) in enumerate(zip(contacts.points, arrows)):
+    for row, (point, arrow) in enumerate(zip(contacts.point, arrows)):
         normal = make_marker(header, 'normals', Marker.ARROW, style.CONTACT, number=row)
         normal.points = [_set(Point(), end) for end in (point, point + arrow)]
         # Of an arrow with two points: diameter of the shaft, diameter and length of the head.
@@ -79,10 +84,10 @@ def _contacts(header: Header, contacts: DrawnContacts) -> Iterator[Marker]:
             depth = make_marker(header, 'depths', Marker.TEXT_VIEW_FACING, WHITE, number=row)
             # At the arrow's tail, where neither point nor arrow is.
             _set(depth.pose.position, point - 0.5 * arrow)
-            depth.scale.z = TEXT_HEIGHT * float(contacts.edges[row])
-            depth.text = f'depth {1e3 * contacts.depths[row]:.2f} mm'
+            depth.scale.z = TEXT_HEIGHT * float(edges[row])
+            depth.text = f'depth {-1e3 * contacts.separation[row]:.2f} mm'
             yield depth
-    sides = style.patch_sides(contacts.points, contacts.normals, contacts.covariances)
+    sides = style.patch_sides(contacts.point, contacts.normal, contacts.covariance)
     if len(sides):
         yield line_marker(header, 'patches', sides, width=0.5 * radii[0], colour=style.CONTACT)
 

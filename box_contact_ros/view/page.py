@@ -22,8 +22,9 @@ import viser
 
 from ..node.messages import NANOSECONDS
 from ..scene.pose import rotation_matrix
+from ..scene.scene_solver import Answer
 from . import style
-from .listener import DrawnContacts, SceneRows, Tick
+from .listener import SceneRows, Tick
 
 HISTORY = 12.0  # length [s] of the charts
 ROOM = 0.1  # above the values of a chart, as a share of them
@@ -103,7 +104,7 @@ class Page:
             if known.sum() > self._seen:
                 self._look_at(tick, known)
             self._draw_boxes(tick, known)
-            self._draw_contacts(tick.contacts)
+            self._draw_contacts(tick.answer)
 
     def _add_drawing(self) -> None:
         scene, place = self._server.scene, np.zeros((1, 2, 3))
@@ -122,7 +123,7 @@ class Page:
     def _add_boxes(self, rows: SceneRows) -> None:
         """Add the boxes as instances of one cube: a tick moves all of them together."""
         self._rows = rows
-        edge = float(np.median(rows.longest))
+        edge = float(np.median(rows.sizes.max(axis=1)))
         radius = style.POINT_RADIUS * edge
         self._points.point_size = 2.0 * radius
         self._normals.shaft_radius = 0.45 * radius
@@ -155,12 +156,13 @@ class Page:
             mesh.batched_wxyzs = np.roll(poses[:, 3:], 1, axis=1)
             mesh.batched_scales = np.where(known[:, None], tick.rows.sizes, 0.0)
 
-    def _draw_contacts(self, contacts: DrawnContacts | None) -> None:
+    def _draw_contacts(self, answer: Answer | None) -> None:
         points = sides = np.zeros((0, 3))
-        if contacts is not None:
-            points = contacts.points - self._origin
-            tips = points + self._normal_length * contacts.normals
-            sides = style.patch_sides(points, contacts.normals, contacts.covariances)
+        if answer is not None:
+            contacts = answer.contacts
+            points = contacts.point - self._origin
+            tips = points + self._normal_length * contacts.normal
+            sides = style.patch_sides(points, contacts.normal, contacts.covariance)
         self._points.visible = self._normals.visible = len(points) > 0
         self._patches.visible = len(sides) > 0
         if len(points):
@@ -199,10 +201,10 @@ class Page:
         if tick is None:
             self._history.clear()
         else:
-            time, depths = tick.stamp / NANOSECONDS, tick.contacts.depths if tick.contacts else ()
+            time, depth = tick.stamp / NANOSECONDS, _depth(tick.answer)
             if self._history and time < self._history[-1][0]:
                 self._history.clear()
-            self._history.append((time, 1e3 * max(depths, default=0.0), 1e-3 * force))
+            self._history.append((time, 1e3 * depth, 1e-3 * force))
             while time - self._history[0][0] > HISTORY:
                 self._history.popleft()
         with self._server.atomic():
@@ -241,13 +243,12 @@ def figures(tick: Tick | None, force: float, *, model: str, awaited: str) -> str
     """Return a line in plain words and a table, as HTML; each value has its name as id."""
     words, rows = awaited, [('model', 'model', model[:LONGEST] or '–')]
     if tick is not None:
-        contacts = tick.contacts
-        words = in_words(contacts)
-        if contacts is not None and tick.rows.pair_count > 1:
-            rows.append(('pairs', 'pairs in contact',
-                         f'{len(contacts.pairs)} of {tick.rows.pair_count}'))
-            rows.append(('stale', 'pairs not evaluated', f'{len(contacts.stale)}'))
-        volume = contacts.volumes.sum() if contacts is not None else math.nan
+        answer, pair_count = tick.answer, tick.rows.scene.pair_count
+        words = in_words(answer)
+        if answer is not None and pair_count > 1:
+            rows.append(('pairs', 'pairs in contact', f'{len(answer.pairs)} of {pair_count}'))
+            rows.append(('stale', 'pairs not evaluated', f'{len(answer.stale)}'))
+        volume = answer.contacts.volume.sum() if answer is not None else math.nan
         rows += [('volume', 'volume of the overlap', _text(1e3 * volume, '.3g', 'L')),
                  ('force', 'force on the load', _text(1e-3 * force, '.1f', 'kN')),
                  ('latency', 'latency', _text(1e3 * tick.latency, '.2f', 'ms'))]
@@ -258,13 +259,19 @@ def figures(tick: Tick | None, force: float, *, model: str, awaited: str) -> str
             f'font-variant-numeric:tabular-nums">{lines}</table>')
 
 
-def in_words(contacts: DrawnContacts | None) -> str:
+def in_words(answer: Answer | None) -> str:
     """Return in words whether there is contact, and how deep; of several contacts the deepest."""
-    if contacts is None:
+    if answer is None:
         return 'poses come, but no contacts'
-    if contacts.pairs:
-        return f'contact, {1e3 * contacts.depths[0]:.2f} mm deep'
-    return 'not evaluated' if contacts.stale else 'no contact'
+    if len(answer.pairs):
+        return f'contact, {1e3 * _depth(answer):.2f} mm deep'
+    return 'not evaluated' if len(answer.stale) else 'no contact'
+
+
+def _depth(answer: Answer | None) -> float:
+    """Return the depth [m] of the deepest contact, 0 without one."""
+    touching = answer is not None and len(answer.pairs)
+    return -float(answer.contacts.separation[0]) if touching else 0.0
 
 
 def camera_position(radius: float, fov: float, aspect: float) -> np.ndarray:

@@ -109,11 +109,10 @@ def _entries(listed: Iterable[tuple[Pair, Contact]]) -> list[ContactMessage]:
         area=patch_area(c), covariance=c.covariance[UPPER]) for pair, c in listed]
 
 
-def named_contacts(touching: Mapping[str, Contact], stale: Sequence[str] = (), *, stamp: int,
-                   frame_id: str = 'yard') -> Contacts:
-    """Return `contacts` of contacts by the names of their pairs; stamp [ns]."""
-    return make_contacts(make_header(stamp, frame_id), [
-        (Pair(name, 'a', 'b'), contact) for name, contact in touching.items()], stale)
+def contacts_at(stamp: int, touching: Mapping[Pair, Contact], stale: Sequence[str] = (),
+                ) -> Contacts:
+    """Return `contacts` of what touches at a stamp [ns], in the frame `yard`."""
+    return make_contacts(make_header(stamp, 'yard'), touching.items(), stale)
 
 
 def _point(numbers: np.ndarray) -> Point:

@@ -15,7 +15,7 @@ import yaml
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from ros_client import PATIENCE, Client, serving
-from typed_messages import named_contacts
+from typed_messages import contacts_at
 from visualization_msgs.msg import Marker, MarkerArray
 
 from box_contact_ros import ContactSolver
@@ -25,7 +25,7 @@ from box_contact_ros.node.ros_client import CRANE_MARKERS
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene
 from box_contact_ros.solver.contact import Contact
-from box_contact_ros.view.listener import SceneRows, Tick, read_contacts
+from box_contact_ros.view.listener import SceneRows, Tick, read_touching
 from box_contact_ros.view.markers import LABELLED, NAMESPACES, MarkersNode, scene_markers
 
 SLAB, CUBE = (2.0, 4.0, 1.0), (2.0, 2.0, 2.0)
@@ -49,8 +49,8 @@ def drawing(touching, scene=YARD):
     """Return the markers of a scene, and those of each namespace."""
     rows = SceneRows(scene)
     poses = np.where(np.isnan(rows.poses), [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0], rows.poses)
-    contacts = read_contacts(named_contacts(touching, stamp=STAMP), rows)
-    markers = scene_markers(Tick(rows, STAMP, 'yard', poses, contacts, 0.0))
+    answer = read_touching(contacts_at(STAMP, touching), scene)
+    markers = scene_markers(Tick(rows, STAMP, 'yard', poses, answer, 0.0))
     return markers, {name: [m for m in markers if m.ns == name] for name in NAMESPACES}
 
 
@@ -72,7 +72,7 @@ def test_a_contact_is_point_normal_depth_and_patch():
 
     The patch is a closed line in the contact plane: of a square of 1 m the circle in it.
     """
-    _, found = drawing({'slab_s1': CONTACT})
+    _, found = drawing({Pair.between('slab', 's1'): CONTACT})
     (point,), (normal,), (depth,), (patch,) = (found[name] for name in (
         'points', 'normals', 'depths', 'patches'))
     assert [m.type for m in (point, normal, depth, patch)] == [
@@ -98,8 +98,8 @@ def test_all_contacts_are_drawn_and_the_deepest_labelled():
     boxes = {f's{n}': Box(f's{n}', CUBE, (n, 0, 0, 0, 0, 0, 1)) for n in range(30)}
     boxes['load'] = Box('load', CUBE, pose_topic='load/pose')
     pairs = tuple(Pair(f'p{n}', 'load', f's{n}') for n in range(30))
-    touching = {f'p{n}': CONTACT._replace(separation=-1e-3 * n, point=np.full(3, n))
-                for n in range(30)}
+    touching = {pair: CONTACT._replace(separation=-1e-3 * n, point=np.full(3, n))
+                for n, pair in enumerate(pairs)}
     _, found = drawing(touching, Scene(boxes, pairs))
     assert [xyz(place)[0] for place in found['points'][0].points] == list(range(29, -1, -1))
     assert [m.id for m in found['normals']] == list(range(30))

@@ -31,7 +31,7 @@ import viser
 from browser import chromium, open_page
 from children import children
 from PIL import Image
-from typed_messages import named_contacts, pose_array, pose_stamped
+from typed_messages import contacts_at, pose_array, pose_stamped
 from websockets.sync.client import connect
 
 from box_contact_ros import ContactSolver
@@ -40,7 +40,7 @@ from box_contact_ros.node.messages import NANOSECONDS, Refused, make_header
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene, two_boxes
 from box_contact_ros.view import listener, view
-from box_contact_ros.view.listener import SceneRows, Tick, ViewNode, read_contacts
+from box_contact_ros.view.listener import SceneRows, Tick, ViewNode, read_touching
 from box_contact_ros.view.page import CUBE as CUBE_CORNERS
 from box_contact_ros.view.page import Page, camera_position, figures
 from box_contact_ros.view.style import BOX_A, BOX_B, CONTACT, patch_axes, patch_sides
@@ -52,7 +52,7 @@ CUBE = (2.0, 2.0, 2.0)
 EXACT = ContactSolver(CUBE, CUBE, model='exact')(ORIGIN, TOUCHING)
 BOTH = two_boxes(CUBE, CUBE)
 ROWS = SceneRows(BOTH)
-PAIR = 'box_a_box_b'
+PAIR, = BOTH.pairs
 START = 1_000 * NANOSECONDS
 MS = 1_000_000
 
@@ -90,16 +90,14 @@ def test_contacts_are_drawn_with_the_poses_that_they_answer(make_node, answer_at
     send(node, START - MS, None, TOUCHING)
     news = [lambda: send(node, START, ORIGIN, None), lambda: send(node, START + MS, APART, APART)]
     news.insert(answer_at, lambda: node._on_contacts(
-        named_contacts({PAIR: EXACT}, stamp=START)))
+        contacts_at(START, {PAIR: EXACT})))
     for deliver in news:
         deliver()
     tick = node.tick()
     assert (tick.stamp, tick.frame_id) == (START, 'yard')
     assert np.array_equal(tick.poses, (ORIGIN, TOUCHING))
-    assert np.array_equal(tick.contacts.points, [EXACT.point])
-    assert np.array_equal(tick.contacts.normals, [EXACT.normal])
-    assert np.array_equal(tick.contacts.covariances, [EXACT.covariance])
-    assert tick.contacts.depths == -EXACT.separation and tick.contacts.volumes == EXACT.volume
+    for name in ('separation', 'normal', 'point', 'volume', 'covariance'):
+        assert np.array_equal(getattr(tick.answer.contacts, name), [getattr(EXACT, name)])
     assert tick.latency > 0.0
 
 
@@ -107,7 +105,7 @@ def test_latency_is_the_time_from_the_stamp_to_the_contacts(make_node):
     node = make_node()
     stamp = node.get_clock().now().nanoseconds - 3 * MS
     send(node, stamp, ORIGIN, TOUCHING)
-    node._on_contacts(named_contacts({PAIR: EXACT}, stamp=stamp))
+    node._on_contacts(contacts_at(stamp, {PAIR: EXACT}))
     assert 3e-3 <= node.tick().latency < 1.0
 
 
@@ -116,12 +114,12 @@ def test_no_contact_stays_where_nobody_answers(make_node, monkeypatch):
     node = make_node()
     assert node.tick() is None and node.quiet
     send(node, START, ORIGIN, TOUCHING)
-    node._on_contacts(named_contacts({PAIR: EXACT}, stamp=START))
+    node._on_contacts(contacts_at(START, {PAIR: EXACT}))
     monkeypatch.setattr(listener, 'UNANSWERED', 0.01)
     send(node, START + MS, ORIGIN, APART)
     time.sleep(0.02)
     tick = node.tick()
-    assert tick.contacts is None and math.isnan(tick.latency)
+    assert tick.answer is None and math.isnan(tick.latency)
     assert tick.stamp == START + MS and np.array_equal(tick.poses, (ORIGIN, APART))
     assert not node.quiet
     monkeypatch.setattr(listener, 'QUIET', 0.01)
@@ -133,7 +131,7 @@ def test_time_that_goes_back(make_node):
     node = make_node()
     for stamp, pose in ((START, APART), (START - 10 * NANOSECONDS, TOUCHING)):
         send(node, stamp, ORIGIN, pose)
-        node._on_contacts(named_contacts({}, stamp=stamp))
+        node._on_contacts(contacts_at(stamp, {}))
         assert np.array_equal(node.tick().poses, (ORIGIN, pose))
 
 
@@ -151,46 +149,36 @@ def test_boxes_that_an_array_lacks_stay_where_they_were(make_node):
 @pytest.mark.parametrize('numbers', [
     {'separation': -math.inf}, {'separation': math.nan}, {'volume': 1e300}, {'volume': -math.inf},
     {'point': np.array([0.0, math.inf, 0.0])}, {'point': np.array([0.0, math.nan, 0.0])},
-    {'normal': np.array([0.0, 0.0, 2.0])}, {'normal': np.full(3, math.nan)},
+    {'normal': np.full(3, math.nan)},
     {'covariance': np.full((3, 3), math.inf)}])
 def test_contacts_that_none_can_be_are_refused(make_node, numbers):
     """And what came before stays."""
     node = make_node()
     send(node, START, ORIGIN, TOUCHING)
-    node._on_contacts(named_contacts({PAIR: EXACT}, stamp=START))
-    with pytest.raises(Refused, match='among the numbers of a contact'):
-        node._on_contacts(named_contacts({PAIR: EXACT._replace(**numbers)}, stamp=START + MS))
+    node._on_contacts(contacts_at(START, {PAIR: EXACT}))
+    with pytest.raises(Refused, match='numbers that none has'):
+        node._on_contacts(contacts_at(START + MS, {PAIR: EXACT._replace(**numbers)}))
     assert node.tick().stamp == START
 
 
 def test_contacts_of_another_scene_are_refused():
-    for message in (named_contacts({'a_c': EXACT}, stamp=1),
-                    named_contacts({}, ['a_c'], stamp=1)):
-        with pytest.raises(Refused, match="'a_c', which the scene that is drawn has not"):
-            read_contacts(message, ROWS)
-
-
-def test_contacts_of_a_scene_with_patterns():
-    """Its pairs are known by their boxes, and a stale box by its name."""
-    rows = SceneRows(Scene({name: Box(name, CUBE) for name in 'ab'}, patterns=(('*', '*'),)))
-    found = read_contacts(named_contacts({'a_b': EXACT}, ['a'], stamp=1), rows)
-    assert found.pairs == ['a_b'] and found.stale == ['a'] and found.edges.tolist() == [2.0]
-    assert rows.pair_count == 1 and rows.is_a.all()
-    with pytest.raises(Refused, match="'c', which the scene that is drawn has not"):
-        read_contacts(named_contacts({}, ['c'], stamp=1), rows)
+    for message in (contacts_at(1, {Pair.between('a', 'c'): EXACT}), contacts_at(1, {}, ['a_c'])):
+        with pytest.raises(Refused, match="'a_c' is no pair of the scene"):
+            read_touching(message, BOTH)
 
 
 def test_the_deepest_contact_comes_first():
     """Near pairs are left out; a model without a patch gives NaN."""
-    scene = Scene({name: Box(name, CUBE, pose_topic=name) for name in 'abcd'},
-                  tuple(Pair.between('a', b) for b in 'bcd'))
+    pairs = tuple(Pair.between('a', b) for b in 'bcd')
+    scene = Scene({name: Box(name, CUBE, pose_topic=name) for name in 'abcd'}, pairs)
     nothing = EXACT._replace(volume=math.nan, covariance=np.full((3, 3), math.nan))
     apart = EXACT._replace(point=np.full(3, math.nan), separation=0.1)
-    message = named_contacts({'a_b': EXACT, 'a_c': nothing._replace(separation=-1.0)}, stamp=1)
-    message.near = named_contacts({'a_d': apart}, stamp=1).contacts
-    found = read_contacts(message, SceneRows(scene))
-    assert found.pairs == ['a_c', 'a_b'] and found.depths.tolist() == [1.0, 0.125]
-    assert np.isnan(found.volumes).tolist() == [True, False]
+    message = contacts_at(1, {pairs[0]: EXACT, pairs[1]: nothing._replace(separation=-1.0)})
+    message.near = contacts_at(1, {pairs[2]: apart}).contacts
+    answer = read_touching(message, scene)
+    assert answer.pairs.tolist() == [[0, 2], [0, 1]]
+    assert answer.contacts.separation.tolist() == [-1.0, -0.125]
+    assert np.isnan(answer.contacts.volume).tolist() == [True, False]
 
 
 def test_the_force_is_that_of_the_tick(make_node):
@@ -225,10 +213,11 @@ def test_it_hears_a_contact_node():
         try:
             client.offer_until_answered(ORIGIN, TOUCHING)
             deadline = time.monotonic() + PATIENCE  # the view has to have matched too
-            while not ((tick := node.tick()) and tick.contacts and node.model):
+            while not ((tick := node.tick()) and tick.answer and node.model):
                 assert time.monotonic() < deadline, 'nothing heard'
                 client.ask(ORIGIN, TOUCHING)
-            assert np.array_equal(tick.contacts.points, [EXACT.point]) and node.model == 'exact'
+            assert np.array_equal(tick.answer.contacts.point, [EXACT.point])
+            assert node.model == 'exact'
         finally:
             client.close()
 
@@ -282,7 +271,7 @@ def test_all_corners_are_in_view_whatever_its_shape(aspect, extents):
 def tick_of(stamp, pose_b, contacts):
     """Return a tick of two boxes with contacts by pair, box a at the origin."""
     return Tick(ROWS, stamp, 'yard', np.array([ORIGIN, pose_b], dtype=float),
-                read_contacts(named_contacts(contacts, stamp=stamp), ROWS), 2e-3)
+                read_touching(contacts_at(stamp, contacts), BOTH), 2e-3)
 
 
 def shown(text):
@@ -302,7 +291,7 @@ def test_no_figure_is_made_up():
     apart = tick_of(START, APART, {})
     found = shown(figures(apart, math.nan, model='exact', awaited=''))
     assert (found['verdict'], found['volume'], found['force']) == ('no contact', '0 L', '–')
-    alone = replace(apart, contacts=None, latency=math.nan)
+    alone = replace(apart, answer=None, latency=math.nan)
     found = shown(figures(alone, math.nan, model='', awaited=''))
     assert found['verdict'] == 'poses come, but no contacts'
     assert {found[name] for name in ('model', 'volume', 'latency')} == {'–'}
@@ -519,15 +508,16 @@ def test_two_hundred_boxes_in_a_browser(page):
     boxes = {f'load_{n}': Box(f'load_{n}', CUBE, pose_topic=f'load_{n}/pose') for n in range(100)}
     boxes |= {f's{n}': Box(f's{n}', CUBE, (*place, 0, 0, 0, 0, 1))
               for n, place in enumerate(places)}
-    scene = Scene(boxes, tuple(Pair.between(f'load_{n}', f's{n}') for n in range(100)))
+    pairs = tuple(Pair.between(f'load_{n}', f's{n}') for n in range(100))
+    scene = Scene(boxes, pairs)
     placed = np.array([(*place, 1.9, 0, 0, 0, 1) for place in places])
     solver = ContactSolver(CUBE, CUBE, model='exact')
     rows = SceneRows(scene)
-    contacts = {f'load_{n}_s{n}': solver(placed[n], boxes[f's{n}'].pose) for n in range(99)}
-    message = named_contacts(contacts, ['load_99_s99'], stamp=START)
+    contacts = {pair: solver(pose, boxes[pair.b].pose) for pair, pose in zip(pairs[:99], placed)}
+    message = contacts_at(START, contacts, [pairs[99].label])
     bring(page, Tick(rows, START, 'yard', np.where(np.isnan(rows.poses), np.r_[placed, placed],
                                                    rows.poses),
-                     read_contacts(message, rows), 1e-3))
+                     read_touching(message, scene), 1e-3))
     with open_page(page.url) as tab:
         tab.wait_for('document.getElementById("pairs")?.innerText == "99 of 100"')
         assert tab.text('stale') == '1'
