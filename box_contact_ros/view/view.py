@@ -46,7 +46,7 @@ class Landings:
 
     def __init__(self, **parameters: object) -> None:
         self.awaited = 'the contact node and the crane are starting'
-        self._output = tempfile.TemporaryFile()
+        self._output = tempfile.TemporaryFile()  # of the node and one landing
         self._node = processes.start(program('node.contact_node', **parameters), self._output)
         self._crane: subprocess.Popen[bytes] | None = None
         self._next_at = 0.0
@@ -61,6 +61,8 @@ class Landings:
             if self._crane.returncode:
                 print(f'view: the landing failed; what contact node and crane printed:\n'
                       f'{printed(self._output)}', file=sys.stderr, flush=True)
+            self._output.seek(0)  # for those who write to it, too
+            self._output.truncate()
             self.awaited = (f'the landing {"failed" if self._crane.returncode else "passed"}; '
                             'the next begins in a few seconds')
             self._crane, self._next_at = None, now + PAUSE

@@ -394,6 +394,19 @@ def test_a_landing_that_fails_says_why(monkeypatch, capfd):
     assert 'FAIL: 3 lost answers' in capfd.readouterr().err
 
 
+def test_what_landings_print_is_not_kept(monkeypatch):
+    """The output of a landing goes when the next begins; what the node prints later is there."""
+    programs = {'node.contact_node': 'import time; time.sleep(100)',
+                'demo.crane_node': 'print("PASS: the load is at rest")'}
+    monkeypatch.setattr(view, 'program', lambda name, **_: ['-c', programs[name]])
+    monkeypatch.setattr(view, 'PAUSE', 0.0)
+    with closing(view.Landings()) as landings:
+        for _ in range(3):
+            landings.step()
+            landings._crane.wait()
+        assert view.printed(landings._output) == 'PASS: the load is at rest'
+
+
 @pytest.mark.parametrize('arguments', [
     ('--model', 'crystal-ball'), ('--port', '0'), ('--domain', '500'), ('--spin',),
     ('--model', 'exact', '--scene', 'config/scenes/yard_bay.yaml')])
