@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from box_contact_ros.core import FORCE
-from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
+from box_contact_ros.solver.pose import rotation_matrix
 
 from .pose_sets import Pairs
 

@@ -30,10 +30,10 @@ from functools import cache
 import numpy as np
 
 from box_contact_ros.core import native
-from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
 from box_contact_ros.solver.arguments import within
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
+from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 
 from . import judge, output
 from .arguments import add_models, report_parser

@@ -27,7 +27,7 @@ from tqdm import tqdm
 from box_contact_ros.core import native
 from box_contact_ros.demo.crane import CraneScenario
 from box_contact_ros.demo.landing import CORNER_SPEED_LIMIT, WATCHED, LandingRecord
-from box_contact_ros.scene.pose import rotation_matrix
+from box_contact_ros.solver.pose import rotation_matrix
 
 from . import output
 from .arguments import report_parser

@@ -32,8 +32,8 @@ from typing import Self
 import numpy as np
 
 from box_contact_ros.scene.laws import FRICTION, GRAVITY, Body
-from box_contact_ros.scene.pose import cross, rotation_matrix
 from box_contact_ros.solver.contact import Contact
+from box_contact_ros.solver.pose import cross, rotation_matrix
 
 STATIC_PENETRATION = 5e-3
 """Depth at which k carries the weight [m]: k = m·g / 5 mm, 3.9e7 N/m for 20 t; 0.2 % of a

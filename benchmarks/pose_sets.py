@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
 from box_contact_ros.scene.scene_solver import CONTAINER as CONTAINER
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
+from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 
 CUBE = (2.0, 2.0, 2.0)
 TWENTY, HIGH_CUBE = (6.058, 2.438, 2.591), (12.192, 2.438, 2.896)

@@ -27,9 +27,9 @@ import numpy as np
 
 from box_contact_ros.core import native
 from box_contact_ros.scene.laws import FRICTION, GRAVITY, Body, PatchForces
-from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.arguments import add_model
 from box_contact_ros.solver.contact_solver import ContactSolver
+from box_contact_ros.solver.pose import rotation_matrix
 
 from . import output
 from .arguments import report_parser

@@ -31,7 +31,7 @@ import numpy as np
 from box_contact_ros import Body, ContactSolver, PatchForces
 from box_contact_ros.core import native
 from box_contact_ros.scene.laws import GRAVITY
-from box_contact_ros.scene.pose import rotation_matrix
+from box_contact_ros.solver.pose import rotation_matrix
 
 from . import output
 from .arguments import report_parser

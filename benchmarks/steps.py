@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from box_contact_ros.scene.pose import quaternion_multiply
 from box_contact_ros.solver.contact_solver import ContactSolver
+from box_contact_ros.solver.pose import quaternion_multiply
 
 from .errors import departures, lengths
 from .pose_sets import Pairs, turns

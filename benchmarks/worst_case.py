@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from box_contact_ros.scene.pose import quaternion_multiply
+from box_contact_ros.solver.pose import quaternion_multiply
 
 from .pose_sets import Pairs, log_uniform, turns
 

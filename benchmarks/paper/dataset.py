@@ -40,9 +40,9 @@ from typing import Any
 import numpy as np
 
 from box_contact_ros.core import Stages, stages
-from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.paper import TouchingPairs, euler_angles
+from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 
 from ..pose_sets import CUBE, turns
 from .features import to_features, to_octant

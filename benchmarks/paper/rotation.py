@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 from box_contact_ros.soup import soup
 
 from .. import output

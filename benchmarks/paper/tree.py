@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from box_contact_ros.core import stages
-from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 from box_contact_ros.soup import soup
 
 from ..pose_sets import CUBE, Pairs

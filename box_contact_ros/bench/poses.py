@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..scene.pose import rotation_matrix
+from ..solver.pose import rotation_matrix
 
 SIZE = (12.192, 2.438, 2.591)  # full extents of both boxes, 40 ft containers [m]
 DEPTHS = (0.005, 0.02)

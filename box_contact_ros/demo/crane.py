@@ -25,8 +25,8 @@ import mujoco
 import numpy as np
 
 from ..scene.laws import FRICTION, GRAVITY, Body
-from ..scene.pose import cross, rotation_matrix
 from ..scene.scene_solver import CONTAINER
+from ..solver.pose import cross, rotation_matrix
 
 # MuJoCo would write warnings to a file MUJOCO_LOG.TXT in the working directory.
 mujoco.set_mju_user_warning(logging.getLogger(__name__).warning)

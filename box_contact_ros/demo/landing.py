@@ -23,9 +23,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ..scene.laws import FRICTION, GRAVITY, Body, PatchForces
-from ..scene.pose import rotation_matrix
 from ..solver.contact import Contact, Contacts
 from ..solver.contact_solver import ContactSolver
+from ..solver.pose import rotation_matrix
 from .crane import Crane, CraneScenario
 
 DURATION = 25.0  # longest landing [s]; the first touch comes after 5 to 8 s

@@ -21,8 +21,8 @@ import numpy as np
 import viser
 
 from ..node.messages import NANOSECONDS
-from ..scene.pose import rotation_matrix
 from ..scene.scene_solver import Answer
+from ..solver.pose import rotation_matrix
 from . import style
 from .listener import SceneRows, Tick
 

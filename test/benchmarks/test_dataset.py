@@ -21,8 +21,8 @@ from benchmarks.paper.features import to_features, to_octant
 from benchmarks.paper.models import EXPERTS, SUBSETS
 from benchmarks.pose_sets import CONTAINER, CUBE
 from box_contact_ros import ContactSolver
-from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.paper import TouchingPairs
+from box_contact_ros.solver.pose import rotation_matrix
 
 COUNT = 4000
 SMALL = (300, 200, 400)

@@ -19,7 +19,7 @@ from benchmarks.contestant import Contestant, Manifold, chosen, ours
 from benchmarks.engines import installed
 from benchmarks.pose_sets import CONTAINER, SETS, Pairs, apart
 from benchmarks.timing import take_turns
-from box_contact_ros.scene.pose import rotation_matrix
+from box_contact_ros.solver.pose import rotation_matrix
 
 ROOT = Path(__file__).resolve().parents[2]
 ALL = [ours('exact'), *installed()[0]]

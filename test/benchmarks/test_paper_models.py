@@ -15,8 +15,8 @@ from benchmarks.paper.models import Committee, committee, continuous, weights_pa
 from benchmarks.weights import save_weights
 from box_contact_ros import ContactSolver
 from box_contact_ros.resources import resource_path
-from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.paper import Paper
+from box_contact_ros.solver.pose import rotation_matrix
 from box_contact_ros.solver.weights_file import WeightsError, load_weights
 
 EXACT = ContactSolver(poses.CUBE, poses.CUBE, model='exact')

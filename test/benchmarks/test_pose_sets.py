@@ -10,7 +10,7 @@ import pytest
 from benchmarks import pose_sets
 from benchmarks.errors import degrees_between
 from benchmarks.pose_sets import CUBE, SETS, Pairs
-from box_contact_ros.scene.pose import rotation_matrix
+from box_contact_ros.solver.pose import rotation_matrix
 
 N = 200
 DEPTHS = {'random cubes': (2e-3, 0.2), 'touching': (0.0, 0.0), 'stacks': (1e-3, 1e-3),

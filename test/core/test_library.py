@@ -27,8 +27,8 @@ from poses import Pairs
 
 from box_contact_ros import Body, ContactSolver, PatchForces
 from box_contact_ros.core import FORCE, instruction_sets, native
-from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.contact import Contacts
+from box_contact_ros.solver.pose import rotation_matrix
 
 ROOT = Path(__file__).resolve().parents[2]
 CORE = Path(native.__file__).resolve().parent

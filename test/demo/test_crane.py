@@ -15,8 +15,8 @@ pytest.importorskip('mujoco')
 from box_contact_ros.demo.crane import MAX_HOIST_SPEED, Crane, CraneScenario
 from box_contact_ros.demo.landing import DURATION
 from box_contact_ros.scene.laws import GRAVITY
-from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.scene.scene_solver import CONTAINER
+from box_contact_ros.solver.pose import rotation_matrix
 
 LENGTH, WIDTH, HEIGHT = CONTAINER
 

@@ -22,7 +22,7 @@ from benchmarks.pose_sets import (
     right_angles,
     turned,
 )
-from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 
 X, Y, Z = np.eye(3)
 UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])

@@ -13,7 +13,7 @@ import pytest
 
 from box_contact_ros import Body, Contacts, ContactSolver, PatchForces
 from box_contact_ros.scene.laws import GRAVITY
-from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 
 STEP = 0.001  # [s]
 FIXED = Body(mass=0.0, inertia=np.zeros(3))

@@ -33,9 +33,9 @@ from box_contact_ros.core import (
     native,
     stages,
 )
-from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.mlp import ACTIVATION, NETWORK, core_numbers, load_mlp
+from box_contact_ros.solver.pose import rotation_matrix
 from box_contact_ros.solver.weights_file import Network, WeightsError
 
 N = 4000

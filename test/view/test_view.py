@@ -37,8 +37,8 @@ from websockets.sync.client import connect
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import NANOSECONDS, Refused, make_header
-from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene, two_boxes
+from box_contact_ros.solver.pose import rotation_matrix
 from box_contact_ros.view import listener, view
 from box_contact_ros.view.listener import SceneRows, Tick, ViewNode, read_touching
 from box_contact_ros.view.page import CUBE as CUBE_CORNERS

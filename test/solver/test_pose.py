@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 
 quaternions = st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(
     lambda q: np.hypot(*q[:2]) > 0.1).map(np.array)
