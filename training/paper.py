@@ -21,10 +21,8 @@ from benchmarks.paper.fit import PaperSettings, fit
 from benchmarks.pose_sets import LOADS, Generator, Pairs, drawn
 from benchmarks.pose_sets import SETS as POSE_SETS
 from benchmarks.weights import save_weights
-from box_contact_ros.core import stages
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.paper import (
-    STAGES,
     in_file_name,
     is_cube,
     network_inputs,
@@ -32,6 +30,7 @@ from box_contact_ros.solver.paper import (
     touching_pairs,
     turned,
 )
+from box_contact_ros.solver.pose import rotation_matrix
 
 SCENES: dict[str, Generator] = {**POSE_SETS, **LOADS}
 ANGLES, PLACE = 'angles', 'place'
@@ -44,12 +43,12 @@ METRIC_PAIRS = 20_000
 
 def scene_patterns(pairs: Pairs, output: str) -> Patterns:
     """Return the patterns of pairs of two equal boxes, as model `paper` asks for them."""
-    found = stages(*pairs, names=(*STAGES, 'centroid'))
-    touch = touching_pairs({name: getattr(found, name) for name in STAGES})
+    exact = pairs.contacts()
+    first, touch = touching_pairs(pairs.pose_a, pairs.pose_b, exact)
     # The exact centroid in the first box's frame, half the depth farther: boxes are moved apart.
-    in_b = turned(found.rotation.swapaxes(1, 2), found.centroid - found.offset_a)
-    middle = np.where(touch.first_is_b[:, None], in_b, found.centroid)
-    point = middle - 0.5 * found.separation[:, None] * touch.normal
+    to_first = rotation_matrix(first[:, 3:]).swapaxes(1, 2)
+    point = (turned(to_first, exact.point - first[:, :3])
+             - 0.5 * exact.separation[:, None] * touch.normal)
     unit = 0.5 * pairs.size_a[:, :1] if is_cube(pairs.size_a[0]) else 1.0
     m, n = octant_signs(touch.offset, touch.rotation)
     inputs = network_inputs(m * touch.offset / unit,

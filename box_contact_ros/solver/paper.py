@@ -28,7 +28,8 @@ import numpy as np
 from ..core import native
 from ..resources import resource_path
 from .checks import as_size, short_repr
-from .contact import Contacts, without_patch
+from .contact import Contacts
+from .pose import rotation_matrix
 from .weights_file import Network, Weights, WeightsError, load_weights
 
 INPUTS, OUTPUTS, PLACE = 6, 4, 3
@@ -37,8 +38,6 @@ x y z of the point, from the first box's centre [half of the longest edge]; the 
 SAT's."""
 SAME_SIZE = 1e-6
 """Relative difference of extents up to which two sizes are one, and a size that of the weights."""
-STAGES = ('colliding', 'separation', 'axis', 'normal', 'axes_a', 'rotation', 'offset_a',
-          'offset_b')
 
 
 class TouchingPairs(NamedTuple):
@@ -131,6 +130,7 @@ class Paper:
             raise WeightsError(f'weights file {short_repr(str(weights.path))}: the sizes in its '
                                'card are no list of three extents') from error
         self._cubes = is_cube(self._size)
+        self._exact = native.PairSolver('exact', (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
 
     def answer(self, pairs: TouchingPairs) -> tuple[np.ndarray, np.ndarray]:
         """Return directions (n, 3) to the impact point and of the normal, first box's frame.
@@ -149,45 +149,39 @@ class Paper:
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
               threads: int = 1) -> tuple[Contacts, int]:
         """Return contacts for poses (n, 7), sizes (n or 1, 3), and the first refused row or −1."""
-        stages, refused = native.stages(a, b, size_a, size_b, STAGES)
+        columns, refused = self._exact.solve(a, b, size_a, size_b, threads, False)
+        exact = Contacts(*columns)
         sizes_a, sizes_b = (np.broadcast_to(size, (len(a), 3)) for size in (size_a, size_b))
         misfits = np.flatnonzero(~self._fits(sizes_a, sizes_b))
         if len(misfits) and (refused < 0 or misfits[0] < refused):
             refused = int(misfits[0])
-        touching = stages['colliding']
-        nowhere = np.full((2, len(a), 3), np.nan)
-        answers = without_patch(touching, stages['separation'], *nowhere)._replace(
-            axis=stages['axis'].astype(np.int32))
+        touching = exact.colliding
         if refused < 0 and touching.any():
-            rows = {name: values[touching] for name, values in stages.items()}
-            answers.point[touching], answers.normal[touching] = self._contacts(
-                a[touching, :3], 0.5 * sizes_a[touching], rows)
-        return answers, refused
+            rows = Contacts(*(column[touching] for column in columns))
+            exact.point[touching], exact.normal[touching] = self._contacts(
+                a[touching], b[touching], 0.5 * sizes_a[touching], rows)
+        return exact, refused
 
-    def _contacts(self, place_a: np.ndarray, half: np.ndarray, stages: dict[str, np.ndarray],
+    def _contacts(self, a: np.ndarray, b: np.ndarray, half: np.ndarray, exact: Contacts,
                   ) -> tuple[np.ndarray, np.ndarray]:
         """Return points and normals (n, 3) in the common frame of n pairs that collide.
 
-        place_a: centres (n, 3) of A [m]; half: half extents (n, 3) of either box [m].
+        a, b: poses (n, 7) [m]; half: half extents (n, 3) of either box [m].
         """
-        depth, normal = -stages['separation'][:, None], stages['normal']
-        pairs = touching_pairs(stages)
+        first, pairs = touching_pairs(a, b, exact)
         if self._cubes:
             pairs = pairs._replace(offset=pairs.offset / half[:, :1])
-        way, answer = self.answer(pairs)
+        way, normal = self.answer(pairs)
         # The ray leaves the first box at the impact point. Its surface lies half the depth beyond
         # the middle of the overlap.
         if self._places:
             point = way * half.max(axis=1, keepdims=True)
         else:
             point = way / np.max(np.abs(way) / half, axis=1, keepdims=True)
-        in_b = pairs.first_is_b[:, None]
-        rotation = stages['rotation']
-        point = np.where(in_b, stages['offset_a'] + 0.5 * depth * normal + turned(rotation, point),
-                         point - 0.5 * depth * normal)
-        answer = np.where(in_b, -turned(rotation, answer), answer)
-        axes = stages['axes_a']
-        return place_a + turned(axes, point), turned(axes, answer)
+        point += 0.5 * exact.separation[:, None] * pairs.normal
+        axes = rotation_matrix(first[:, 3:])
+        from_a = np.where(pairs.first_is_b[:, None], -normal, normal)
+        return first[:, :3] + turned(axes, point), turned(axes, from_a)
 
     def _fits(self, size_a: np.ndarray, size_b: np.ndarray) -> np.ndarray:
         """Return which rows of full extents (n, 3) the weights are for, (n,)."""
@@ -205,18 +199,22 @@ class Paper:
                 "'exact'")
 
 
-def touching_pairs(stages: dict[str, np.ndarray]) -> TouchingPairs:
-    """Return n pairs that collide as seen from their first boxes, from `STAGES`."""
-    axis, rotation, normal = stages['axis'], stages['rotation'], stages['normal']
-    depth = -stages['separation'][:, None]
-    of_b = (3 <= axis) & (axis < 6)
-    back = rotation.swapaxes(1, 2)
-    normal_b = -turned(back, normal)
-    wide = of_b[:, None]
-    return TouchingPairs(
-        of_b, np.where(of_b, axis - 3, axis), np.where(wide, normal_b, normal),
-        np.where(wide, -stages['offset_b'] + depth * normal_b, stages['offset_a'] + depth * normal),
-        np.where(wide[..., None], back, rotation))
+def touching_pairs(a: np.ndarray, b: np.ndarray, exact: Contacts,
+                   ) -> tuple[np.ndarray, TouchingPairs]:
+    """Return the poses (n, 7) of the first boxes of n pairs that collide, and the pairs from there.
+
+    a, b: poses (n, 7); exact: their contacts by `exact`.
+    """
+    first_is_b = (3 <= exact.axis) & (exact.axis < 6)
+    swap = first_is_b[:, None]
+    first, second = np.where(swap, b, a), np.where(swap, a, b)
+    to_first = rotation_matrix(first[:, 3:]).swapaxes(1, 2)
+    normal = turned(to_first, np.where(swap, -exact.normal, exact.normal))
+    apart = second[:, :3] - first[:, :3]
+    return first, TouchingPairs(
+        first_is_b, np.where(first_is_b, exact.axis - 3, exact.axis), normal,
+        turned(to_first, apart) - exact.separation[:, None] * normal,
+        to_first @ rotation_matrix(second[:, 3:]))
 
 
 def is_cube(size: np.ndarray) -> bool:
