@@ -24,9 +24,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from box_contact_ros.core import DEPTH_FLOOR, Stages, native, stages
+from box_contact_ros.core import DEPTH_FLOOR, native
 from box_contact_ros.solver.arguments import model_name, within
 from box_contact_ros.solver.contact import Contacts
+from box_contact_ros.solver.paper import turned
+from box_contact_ros.solver.pose import rotation_matrix
 from box_contact_ros.solver.weights_file import WeightsError
 
 from . import output
@@ -42,36 +44,48 @@ WINNERS = ('face axis', 'edge axis')
 SHOWN = (1e-6, 1.0)  # errors that are drawn [%]
 MARKS = {'o': 'half of the pairs', '|': '99 %', 'D': 'worst pair'}
 """What is drawn of a set."""
+CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
+"""(8, 3) corners of a box of edge 1."""
 FACE_LIKE = math.cos(math.radians(6.0))
 """Cosine of the angle to a face's normal up to which an edge pair's axis stands for the face."""
 
 
 def classify(pairs: Pairs) -> tuple[np.ndarray, np.ndarray]:
     """Return indices (n,) into CLASSES and into WINNERS of pairs that touch: see the module."""
-    found = stages(*pairs, names=('axis', 'face', 'normal', 'rotation', 'pressed_offset_a',
-                                  'pressed_offset_b'))
+    found = pairs.contacts()
     winners = (found.axis >= 6).astype(np.int64)
-    normal_in_b = np.einsum('nij,ni->nj', found.rotation, found.normal)
-    steepest = np.abs(np.hstack([found.normal, normal_in_b])).max(axis=1)
+    face_normals = np.concatenate([rotation_matrix(pose[:, 3:]) for pose in pairs[:2]], axis=2)
+    steepest = np.abs(np.einsum('nik,ni->nk', face_normals, found.normal)).max(axis=1)
     through = _corners_through(pairs, found)
     classes = np.where(through <= 1, 0, np.where(through == 2, 2, 3))
     classes[(winners == 1) & (steepest < FACE_LIKE)] = 1
     return classes, winners
 
 
-def _corners_through(pairs: Pairs, found: Stages) -> np.ndarray:
-    """Return how many corners (n,) of the incident box are below the plane of the best face."""
-    rows, of_a, k = np.arange(len(found.face)), found.face < 3, found.face % 3
-    rotation = np.where(of_a[:, None, None], found.rotation, found.rotation.swapaxes(1, 2))
-    offset = np.where(of_a[:, None], found.pressed_offset_a, found.pressed_offset_b)
-    reference, incident = (0.5 * np.where(of_a[:, None], mine, theirs) for mine, theirs in (
-        (pairs.size_a, pairs.size_b), (pairs.size_b, pairs.size_a)))
-    top = np.abs(offset[rows, k]) - reference[rows, k]
-    reach = rotation[rows, k] * incident
-    through = np.zeros(len(rows), dtype=np.int64)
-    for x, y, z in product((-1.0, 1.0), repeat=3):
-        through += ((top + x * reach[:, 0]) + y * reach[:, 1]) + z * reach[:, 2] < 0.0
-    return through
+def _corners_through(pairs: Pairs, found: Contacts) -> np.ndarray:
+    """Return how many corners (n,) of one box are below the best face of the other.
+
+    Shallow pairs are pressed in to the minimum depth.
+    """
+    pressed = np.maximum(0.0, DEPTH_FLOOR * pairs.size + found.separation)
+    offset = pairs.pose_b[:, :3] - pairs.pose_a[:, :3] - pressed[:, None] * found.normal
+    a, b, size_a, size_b = pairs
+    heights = np.concatenate([_heights(a, size_a, b, size_b, offset),
+                              _heights(b, size_b, a, size_a, offset)], axis=1)
+    best = np.where(found.axis < 6, found.axis, heights.min(axis=2).argmax(axis=1))
+    return np.count_nonzero(heights[np.arange(len(best)), best] < 0.0, axis=1)
+
+
+def _heights(pose: np.ndarray, size: np.ndarray, other: np.ndarray, other_size: np.ndarray,
+             offset: np.ndarray) -> np.ndarray:
+    """Return heights (n, 3, 8) of another box's corners above the three faces nearer to it [m].
+
+    offset: (n, 3) from one centre to the other, either way.
+    """
+    back = rotation_matrix(pose[:, 3:]).swapaxes(1, 2)
+    middle = np.abs(turned(back, offset)) - 0.5 * size
+    reach = back @ rotation_matrix(other[:, 3:]) * other_size[:, None]
+    return middle[:, :, None] + reach @ CORNERS.T
 
 
 def outside(pairs: Pairs, contacts: Contacts) -> float:
