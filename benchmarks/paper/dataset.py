@@ -39,7 +39,7 @@ from typing import Any
 
 import numpy as np
 
-from box_contact_ros.core import Stages, stages
+from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.paper import TouchingPairs, euler_angles
 from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
@@ -91,6 +91,11 @@ class Placements:
     def pose(self) -> np.ndarray:
         """Return the poses (n, 7) of the second box, x y z qx qy qz qw."""
         return as_poses(self.inputs)[1]
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """Return the axes (n, 3, 3) of the second box as columns."""
+        return rotation_matrix(self.pose[:, 3:])
 
     def __len__(self) -> int:
         return len(self.inputs)
@@ -243,12 +248,10 @@ def mixed(rng: np.random.Generator, count: int, size: Sequence[float], kept: flo
     return _joined(parts)[rng.permutation(count)]
 
 
-def query(placements: Placements) -> Stages:
-    """Return separation, axis, normal, offset_a and rotation of every placement, by SAT."""
-    first = np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(placements), 1))
-    size = [placements.size]
-    return stages(first, placements.pose, size, size,
-                  names=('separation', 'axis', 'normal', 'offset_a', 'rotation'))
+def query(placements: Placements) -> Contacts:
+    """Return the contacts of every placement, with a normal of those apart too."""
+    solver = ContactSolver(placements.size, placements.size, margin=math.inf)
+    return solver.batch(*as_poses(placements.inputs), patch=False)
 
 
 @dataclass(frozen=True)
@@ -273,12 +276,13 @@ def fold(placements: Placements, how: str) -> Folded:
     if how == NO_FOLD:  # inputs are as drawn, zeros keep the signs that tell azimuths ±π apart
         subset = (placements.inputs[:, 3:] < 0.0) @ (4, 2, 1)
         return Folded(placements.inputs, placements.point, placements.normal, subset)
-    sat = query(placements)
+    offset, rotation = placements.inputs[:, :3], placements.rotation
     if how == OCTANT:
-        folds = to_octant(sat.offset_a, sat.rotation)
+        folds = to_octant(offset, rotation)
     elif len(set(placements.size)) == 1:
+        sat = query(placements)
         folds, subset = to_features(TouchingPairs(
-            np.zeros(len(placements), bool), sat.axis, sat.normal, sat.offset_a, sat.rotation))
+            np.zeros(len(placements), bool), sat.axis, sat.normal, offset, rotation))
     else:
         raise ValueError(f'features are folded for cubes, not for {placements.size}')
     return Folded(folds.inputs, folds.folded(placements.point), folds.folded(placements.normal),

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from box_contact_ros.core import stages
+from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 from box_contact_ros.soup import soup
 
@@ -95,6 +95,7 @@ def count_tests(boxes: Tree, pairs: Pairs) -> np.ndarray:
 
 
 def _count(boxes: Tree, pose_b: np.ndarray) -> np.ndarray:
+    solver = ContactSolver(CUBE, CUBE)
     turn = rotation_matrix(pose_b[:, 3:])
     tests = np.zeros(len(pose_b), np.int64)
     query = np.arange(len(pose_b))  # of each pair of boxes to be tested
@@ -105,8 +106,8 @@ def _count(boxes: Tree, pose_b: np.ndarray) -> np.ndarray:
         placed = np.concatenate([
             pose_b[query, :3] + np.einsum('nij,nj->ni', turn[query], local[:, :3]),
             quaternion_multiply(pose_b[query, 3:], local[:, 3:])], axis=1)
-        met = stages(boxes.pose[a], placed, boxes.size[a], boxes.size[b],
-                     names=('colliding',)).colliding
+        met = solver.batch(boxes.pose[a], placed, size_a=boxes.size[a], size_b=boxes.size[b],
+                           patch=False).colliding
         query, a, b = query[met], a[met], b[met]
         leaf_a, leaf_b = (boxes.children[box, 0] < 0 for box in (a, b))
         inner = ~(leaf_a & leaf_b)

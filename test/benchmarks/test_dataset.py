@@ -197,7 +197,8 @@ def test_labels_unfold(cubes: Placements) -> None:
     sat = dataset.query(cubes)
     results = {how: dataset.fold(cubes, how) for how in (OCTANT, FEATURES)}
     for how, result in results.items():
-        pairs = TouchingPairs(sat.axis < 0, sat.axis, sat.normal, sat.offset_a, sat.rotation)
+        pairs = TouchingPairs(sat.axis < 0, sat.axis, sat.normal, cubes.inputs[:, :3],
+                              cubes.rotation)
         folds = to_octant(*pairs[3:]) if how == OCTANT else to_features(pairs)[0]
         for found, label in ((result.point, cubes.point), (result.normal, cubes.normal)):
             np.testing.assert_allclose(folds.unfolded(found), label, rtol=0, atol=1e-15)

@@ -20,7 +20,7 @@ from benchmarks.paper import committee, dataset, rotation, soup_tables, tables, 
 from benchmarks.paper.jobs import JOBS
 from benchmarks.paper.models import weights_path
 from benchmarks.pose_sets import at_depth, on_cube
-from box_contact_ros.core import stages
+from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.weights_file import load_weights
 from box_contact_ros.soup import soup
 
@@ -170,8 +170,7 @@ def test_tests_are_those_of_a_slow_walk() -> None:
         placed = np.concatenate([
             pair.pose_b[0, :3] + rotation.rotation_matrix(turn) @ boxes.pose[b, :3],
             rotation.quaternion_multiply(turn[None], boxes.pose[None, b, 3:])[0]])
-        if not stages(boxes.pose[None, a], placed[None], boxes.size[None, a], boxes.size[None, b],
-                      names=('colliding',)).colliding[0]:
+        if not ContactSolver(boxes.size[a], boxes.size[b])(boxes.pose[a], placed).colliding:
             return 1
         in_a, in_b = boxes.children[a], boxes.children[b]
         if in_a[0] < 0 and in_b[0] < 0:
