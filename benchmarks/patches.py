@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from box_contact_ros.core import DEPTH_FLOOR, stages
+from box_contact_ros.core import DEPTH_FLOOR, native
 from box_contact_ros.solver.contact import Contacts
 
 from .judge import NEGATIVE, NOT_FINITE, OUT_OF_BOUNDS
@@ -43,11 +43,11 @@ def patch_faults(pairs: Pairs, found: Contacts) -> np.ndarray:
 def mlp_faults(pairs: Pairs, found: Contacts) -> np.ndarray:
     """Return sums (n,) of the faults of the patches of `mlp`."""
     rows = np.flatnonzero(found.colliding)
-    box = stages(*pairs.rows(rows), names=('patch_axes', 'patch_middle', 'patch_half'))
-    off = np.abs(np.einsum('nji,nj->ni', box.patch_axes, found.point[rows] - box.patch_middle))
+    axes, middle, half, *_ = native.mlp_inputs(*pairs.rows(rows))
+    off = np.abs(np.einsum('nji,nj->ni', axes, found.point[rows] - middle))
     reach = pairs.size[rows] + np.abs(found.point[rows]).max(axis=1)
-    within = np.all(off <= box.patch_half + OUTSIDE * reach[:, None], axis=1)
-    within &= found.volume[rows] <= (1.0 + OUTSIDE) * np.prod(2.0 * box.patch_half, axis=1)
+    within = np.all(off <= half + OUTSIDE * reach[:, None], axis=1)
+    within &= found.volume[rows] <= (1.0 + OUTSIDE) * np.prod(2.0 * half, axis=1)
     faults = np.zeros(len(found.colliding), dtype=np.int64)
     faults[rows] = (np.where(within, 0, OUT_OF_BOUNDS)
                     | np.where(_least(found, rows) >= -SMOOTH, 0, NEGATIVE))

@@ -22,13 +22,10 @@ from benchmarks.pose_sets import (
     random_sizes,
     stacked,
 )
-from box_contact_ros.core import stages
+from box_contact_ros.core import native
 
 PIECE = 100_000
 """Pairs that are made at a time."""
-STAGES = ('colliding', 'volume', 'centroid', 'covariance', 'axes_a', 'patch_axes', 'patch_middle',
-          'patch_half', 'features', 'body_volume', 'body_mean', 'body_variance', 'body_beside',
-          'flip')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,24 +66,17 @@ class MlpSamples:
 
 def describe(pairs: Pairs) -> tuple[MlpSamples, np.ndarray]:
     """Return the samples of the pairs that touch, and which these are (n,)."""
-    found = stages(*pairs, names=STAGES)
-    rows = found.colliding & (found.volume > 0.0)
-    found = found._replace(**{name: getattr(found, name)[rows].astype(float) for name in STAGES})
-    half = found.patch_half
-    # From A's frame and the common frame to the patch box, mirrored.
-    to_box = found.patch_axes.swapaxes(1, 2) * found.flip[:, :, None]
-    point = pairs.pose_a[rows, :3] + np.einsum('nij,nj->ni', found.axes_a, found.centroid)
-    covariance = to_box @ found.covariance @ to_box.swapaxes(1, 2)
-    body = np.zeros((len(half), 3, 3))
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        body[:, i, i] = found.body_variance[:, i]
-        body[:, j, k] = body[:, k, j] = found.body_beside[:, i]
+    exact = pairs.contacts()
+    rows = exact.colliding & (exact.volume > 0.0)
+    axes, middle, half, features, volume, mean, covariance = native.mlp_inputs(*pairs.rows(rows))
+    to_box = axes.swapaxes(1, 2)
+    true_covariance = to_box @ exact.covariance[rows] @ axes
     return MlpSamples(
-        features=found.features, volume=found.body_volume, mean=found.body_mean, covariance=body,
-        half=half / pairs.edge[rows, None], true_volume=found.volume / (8.0 * half.prod(axis=1)),
-        true_mean=np.einsum('nij,nj->ni', to_box, point - found.patch_middle) / half,
-        true_covariance=covariance / (half[:, :, None] * half[:, None, :])), rows
+        features=features, volume=volume, mean=mean, covariance=covariance,
+        half=half / pairs.edge[rows, None],
+        true_volume=exact.volume[rows] / (8.0 * half.prod(axis=1)),
+        true_mean=np.einsum('nij,nj->ni', to_box, exact.point[rows] - middle) / half,
+        true_covariance=true_covariance / (half[:, :, None] * half[:, None, :])), rows
 
 
 def draw_samples(make: Generator, seed: Sequence[int], n: int, progress: bool = False,

@@ -33,9 +33,6 @@ if not native.kernel:
     raise ImportError(f'{FORCE} is {os.environ.get(FORCE)!r}, which is not one of: '
                       + ', '.join(instruction_sets()))
 
-from .stages import Stages as Stages  # noqa: E402, F401  (needs `native`)
-from .stages import stages as stages  # noqa: E402, F401
-
 LENGTH_MIN, LENGTH_MAX = native.LENGTH_MIN, native.LENGTH_MAX
 """Least extent, and largest extent or coordinate, that are accepted [m]."""
 QUATERNION_MIN, QUATERNION_MAX = native.QUATERNION_MIN, native.QUATERNION_MAX

@@ -25,7 +25,7 @@ from poses import Pairs
 
 import box_contact_ros
 from box_contact_ros import Contact, ContactSolver
-from box_contact_ros.core import FORCE, instruction_sets, native, stages
+from box_contact_ros.core import FORCE, instruction_sets, native
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.mlp import NETWORK, core_numbers, load_mlp
 
@@ -183,8 +183,10 @@ def test_threads_change_no_bit_and_no_count(model: str, count: int) -> None:
     for threads, found in zip((2, 3, 7), answers[1:]):
         assert_same_bits(answers[0], found, threads)
     assert len(set(counts)) == 1
-    alone = stages(*pairs, names=('colliding', 'certain'))
-    assert counts[0] == ((alone.colliding & ~alone.certain).sum() if model == 'exact' else 0)
+    alone = a_solver(model)
+    for row in range(count):
+        solve(alone, Pairs(*(part[row:row + 1] for part in pairs)))
+    assert counts[0] == alone.clipped
     if count == 5000 and model == 'exact':
         assert counts[0] > 100
 
@@ -366,19 +368,22 @@ def everything_once(solver: ContactSolver, pairs: Pairs) -> None:
     solver(poses.IDENTITY, ABOVE)
     solver(poses.IDENTITY, ABOVE + (0, 0, 99, 0, 0, 0, 0))
     solver(list(poses.IDENTITY), ABOVE)
-    solve(solver, pairs, 2)
-    stages(*pairs, names=('normal', 'certain', 'features'))
+    colliding = solve(solver, pairs, 2).colliding
+    touching = [part[colliding] for part in pairs]
+    native.mlp_inputs(*touching)
+    native.clipped(*touching)
     for bad in (np.zeros(7), np.zeros(6), None):
         with pytest.raises(ValueError):
             solver(poses.IDENTITY, bad)
     with pytest.raises(ValueError):
         solve(solver, pairs._replace(pose_b=0.0 * pairs.pose_b), 2)
-    with pytest.raises(ValueError):
-        stages(pairs.pose_a, 0.0 * pairs.pose_b, pairs.size_a, pairs.size_b, names=('normal',))
-    with pytest.raises(ValueError):
-        native.stages(*pairs[:3], pairs.size_b[:2], ('normal',))
-    with pytest.raises(TypeError):
-        native.stages(*pairs)
+    for probe in (native.mlp_inputs, native.clipped):
+        with pytest.raises(ValueError):
+            probe(pairs.pose_a, 0.0 * pairs.pose_b, pairs.size_a, pairs.size_b)
+        with pytest.raises(ValueError):
+            probe(*pairs[:3], pairs.size_b[:2])
+        with pytest.raises(TypeError):
+            probe(*pairs, 1)
     native.PairSolver(None, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
 
 
@@ -440,9 +445,10 @@ def test_networks_are_freed() -> None:
 
 
 def share_certain(pairs: Pairs) -> float:
-    found = stages(*pairs, names=('colliding', 'certain'))
+    solver = a_solver('exact')
+    found = solve(solver, pairs)
     assert found.colliding.mean() > 0.4
-    return found.certain[found.colliding].mean()
+    return 1.0 - solver.clipped / found.colliding.sum()
 
 
 def flush_stacks(kind: str, n: int = 4000) -> Pairs:

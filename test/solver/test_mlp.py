@@ -31,7 +31,6 @@ from box_contact_ros.core import (
     UNITS_MAX,
     instruction_sets,
     native,
-    stages,
 )
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.mlp import ACTIVATION, NETWORK, core_numbers, load_mlp
@@ -103,8 +102,7 @@ def trace(covariance: np.ndarray) -> np.ndarray:
 def assert_sound(pairs: Pairs, found: Contacts) -> None:
     """Points and volumes are within the patch box, covariances symmetric and positive definite."""
     rows = found.colliding
-    box = stages(*pairs, names=('patch_axes', 'patch_middle', 'patch_half'))
-    axes, middle, half = box.patch_axes[rows], box.patch_middle[rows], box.patch_half[rows]
+    axes, middle, half, *_ = native.mlp_inputs(*pairs.rows(rows))
     assert rows.any() and np.isfinite(found.point[rows]).all()
     reach = np.abs(found.point[rows]).max(axis=1) + pairs.size[rows]
     off = np.abs(np.einsum('nji,nj->ni', axes, found.point[rows] - middle))
@@ -171,9 +169,8 @@ def test_the_bounds_hold_the_overlap(pairs: Pairs) -> None:
     """The exact centroid is between them, and the exact volume below theirs."""
     truth = pairs.contacts()
     rows = truth.colliding & (truth.separation < -1e-8 * pairs.size)
-    box = stages(*pairs, names=('patch_axes', 'patch_middle', 'patch_half'))
-    half = box.patch_half[rows]
-    off = np.einsum('nji,nj->ni', box.patch_axes, truth.point - box.patch_middle)[rows]
+    axes, middle, half, *_ = native.mlp_inputs(*pairs.rows(rows))
+    off = np.einsum('nji,nj->ni', axes, truth.point[rows] - middle)
     assert np.all(np.abs(off) <= half + 1e-9 * pairs.size[rows, None])
     assert np.all(truth.volume[rows] <= (1.0 + 1e-6) * np.prod(2.0 * half, axis=1))
 
@@ -379,10 +376,10 @@ def test_a_network_of_zeros_is_the_body_of_the_chords(tmp_path: Path) -> None:
     found = pairs.contacts(ContactSolver(UNIT, UNIT, model='mlp',
                                          weights=written(tmp_path / 'zeros')))
     rows = found.colliding
-    body = stages(*pairs, names=('body_volume', 'patch_half'))
+    axes, middle, half, _, volume, mean, _ = native.mlp_inputs(*pairs.rows(rows))
+    np.testing.assert_allclose(found.volume[rows], volume * np.prod(2.0 * half, axis=1), rtol=1e-6)
     np.testing.assert_allclose(
-        found.volume[rows], (body.body_volume * np.prod(2.0 * body.patch_half, axis=1))[rows],
-        rtol=1e-6)
+        found.point[rows], middle + np.einsum('nij,nj->ni', axes, half * mean), atol=1e-6)
 
 
 @pytest.mark.parametrize('hidden', [(), (8,), (8, 8, 8), (UNITS_MAX + 1, 8)])

@@ -16,7 +16,9 @@
 #include <memory>
 #include <new>
 #include <type_traits>
+#include <utility>
 
+#include "../include/box_contact/box_contact.h"
 #include "../src/lanes/vectors.hpp"
 
 namespace box_contact::binding {
@@ -32,81 +34,89 @@ constexpr int numpy_type = std::is_same_v<Number, double>    ? NPY_DOUBLE
                            : std::is_same_v<Number, float>   ? NPY_FLOAT
                            : std::is_same_v<Number, int64_t> ? NPY_INT64
                            : std::is_same_v<Number, int32_t> ? NPY_INT32
+                           : std::is_same_v<Number, uint8_t> ? NPY_UINT8
                                                              : NPY_BOOL;
 
-// An array of numbers in C order.
+// Thrown once a Python error is set.
+struct PythonError {};
+
+[[noreturn]] inline void fail(PyObject* kind, const char* message) {
+  PyErr_SetString(kind, message);
+  throw PythonError{};
+}
+// What a function of Python's has made; nullptr is its error.
+inline PyObject* made(PyObject* object) {
+  return object ? object : throw PythonError{};
+}
+inline long whole_of(PyObject* number) {
+  long value = PyLong_AsLong(number);
+  return value == -1 && PyErr_Occurred() ? throw PythonError{} : value;
+}
+inline bool truth_of(PyObject* object) {
+  int truth = PyObject_IsTrue(object);
+  return truth < 0 ? throw PythonError{} : truth > 0;
+}
+
+// An array of numbers in C order, or none.
 template <class Number>
 struct Array {
   Owned object;
   Number* numbers = nullptr;
 
-  void take(PyObject* array) {
-    object.reset(array);
-    if (array)
-      numbers = static_cast<Number*>(PyArray_DATA(reinterpret_cast<PyArrayObject*>(array)));
-  }
-  npy_intp length(int axis) const {
-    return PyArray_DIM(reinterpret_cast<PyArrayObject*>(object.get()), axis);
-  }
+  Array() = default;
+  explicit Array(PyObject* new_array)
+      : object(made(new_array)), numbers(static_cast<Number*>(PyArray_DATA(array()))) {}
+
+  PyArrayObject* array() const { return reinterpret_cast<PyArrayObject*>(object.get()); }
+  npy_intp length(int axis) const { return PyArray_DIM(array(), axis); }
 };
 
 using Shape = std::initializer_list<npy_intp>;
 constexpr npy_intp any_length = -1;
 
-// Returns false with a Python error where the shape differs.
-inline bool has_shape(PyArrayObject* given, const char* name, Shape shape) {
-  bool fits = PyArray_NDIM(given) == int(shape.size());
+template <class Number>
+void check_shape(const Array<Number>& given, const char* name, Shape shape) {
+  bool fits = PyArray_NDIM(given.array()) == int(shape.size());
   for (size_t axis = 0; fits && axis < shape.size(); ++axis) {
     npy_intp wanted = shape.begin()[axis];
-    fits = wanted == any_length || wanted == PyArray_DIM(given, int(axis));
+    fits = wanted == any_length || wanted == given.length(int(axis));
   }
-  if (!fits) PyErr_Format(PyExc_ValueError, "%s has the wrong shape", name);
-  return fits;
+  if (fits) return;
+  PyErr_Format(PyExc_ValueError, "%s has the wrong shape", name);
+  throw PythonError{};
 }
 
-// Take an argument. Returns false with a Python error if its kind or shape differs. Booleans are read
-// as `npy_bool`: NumPy's may be any byte, and C++ knows two.
+// Take an argument. Booleans are read as `uint8_t`: NumPy's may be any byte, and C++ knows two.
 template <class Number>
-bool read(PyObject* argument, const char* name, Shape shape, Array<Number>& array) {
+Array<Number> read(PyObject* argument, const char* name, Shape shape) {
   static_assert(!std::is_same_v<Number, bool>);
-  array.take(PyArray_FROM_OTF(argument, numpy_type<Number>, NPY_ARRAY_CARRAY_RO));
-  return array.object &&
-         has_shape(reinterpret_cast<PyArrayObject*>(array.object.get()), name, shape);
+  Array<Number> array(PyArray_FROM_OTF(argument, numpy_type<Number>, NPY_ARRAY_CARRAY_RO));
+  check_shape(array, name, shape);
+  return array;
 }
-
-// Take a writable array in C order as it is. Returns false with a Python error for all others.
+// The same, or None.
 template <class Number>
-bool read_in_place(PyObject* argument, const char* name, Shape shape, Array<Number>& array) {
-  auto* given = reinterpret_cast<PyArrayObject*>(argument);
-  if (!PyArray_Check(argument) || PyArray_TYPE(given) != numpy_type<Number> ||
-      !PyArray_ISCARRAY(given)) {
-    PyErr_Format(PyExc_TypeError, "%s is no array of the type that is written in place", name);
-    return false;
-  }
-  array.take(Py_NewRef(argument));
-  return has_shape(given, name, shape);
+Array<Number> read_given(PyObject* argument, const char* name, Shape shape) {
+  return argument == Py_None ? Array<Number>() : read<Number>(argument, name, shape);
 }
 
 template <class Number>
-bool make(Shape shape, Array<Number>& array) {
-  array.take(PyArray_SimpleNew(int(shape.size()), const_cast<npy_intp*>(shape.begin()),
-                               numpy_type<Number>));
-  return bool(array.object);
+Array<Number> make(Shape shape) {
+  return Array<Number>(PyArray_SimpleNew(
+      int(shape.size()), const_cast<npy_intp*>(shape.begin()), numpy_type<Number>));
 }
 
-inline Vec<double> vector_at(const double* numbers) { return {numbers[0], numbers[1], numbers[2]}; }
-inline Mat<double> matrix_at(const double* numbers) {
-  Mat<double> m;
-  std::memcpy(m.m, numbers, sizeof(m.m));
-  return m;
+// A tuple of arrays.
+template <class... Arrays>
+PyObject* pack(Arrays&&... arrays) {
+  Owned tuple(made(PyTuple_New(sizeof...(arrays))));
+  Py_ssize_t at = 0;
+  (PyTuple_SET_ITEM(tuple.get(), at++, arrays.object.release()), ...);
+  return tuple.release();
 }
+
 inline void write(const Vec<double>& v, double* numbers) { std::memcpy(numbers, v.v, sizeof(v.v)); }
 inline void write(const Mat<double>& m, double* numbers) { std::memcpy(numbers, m.m, sizeof(m.m)); }
-
-inline PyObject* fail(PyObject* kind, const char* message) {
-  PyErr_SetString(kind, message);
-  return nullptr;
-}
 
 // A function as Python calls it: what it throws becomes a Python error.
 template <auto function>
@@ -116,6 +126,7 @@ struct Guarded<function> {
   static Result call(Arguments... arguments) noexcept {
     try {
       return function(arguments...);
+    } catch (PythonError) {
     } catch (const std::bad_alloc&) {
       PyErr_NoMemory();
     } catch (const std::exception& error) {
@@ -137,6 +148,31 @@ PyCFunction method() {
 template <auto function>
 void* slot() {
   return reinterpret_cast<void*>(Guarded<function>::call);
+}
+
+// A Python object that holds a T.
+template <class T>
+struct Holder {
+  PyObject_HEAD T held;
+
+  static T& of(PyObject* object) { return reinterpret_cast<Holder*>(object)->held; }
+  static PyObject* make(PyTypeObject* type, T&& value) {
+    PyObject* self = made(type->tp_alloc(type, 0));
+    new (&of(self)) T(std::move(value));
+    return self;
+  }
+  static void dealloc(PyObject* self) {
+    PyTypeObject* type = Py_TYPE(self);
+    of(self).~T();
+    type->tp_free(self);
+    Py_DECREF(type);  // an object of a heap type keeps its type alive
+  }
+};
+
+// An error of the library as Python's.
+inline void check(bc_status status) {
+  if (status != BC_OK)
+    fail(status == BC_NO_MEMORY ? PyExc_MemoryError : PyExc_ValueError, bc_error_text());
 }
 
 // Call `work` without Python's lock. What it throws is thrown on, with the lock.

@@ -23,11 +23,11 @@ inline double patch_area(const double* n, const double* c) {
 }
 
 inline PyObject* patch_areas(PyObject*, PyObject* const* args, Py_ssize_t count) {
-  if (count != 2) return fail(PyExc_TypeError, "patch_areas(normal, covariance)");
-  Array<double> normal, covariance, area;
-  if (!read(args[0], "normal", {any_length, 3}, normal)) return nullptr;
+  if (count != 2) fail(PyExc_TypeError, "patch_areas(normal, covariance)");
+  auto normal = read<double>(args[0], "normal", {any_length, 3});
   npy_intp rows = normal.length(0);
-  if (!read(args[1], "covariance", {rows, 3, 3}, covariance) || !make({rows}, area)) return nullptr;
+  auto covariance = read<double>(args[1], "covariance", {rows, 3, 3});
+  auto area = make<double>({rows});
   for (npy_intp row = 0; row < rows; ++row)
     area.numbers[row] = patch_area(normal.numbers + 3 * row, covariance.numbers + 9 * row);
   return area.object.release();
@@ -38,16 +38,14 @@ constexpr npy_intp message_numbers_count = 15;
 
 inline PyObject* message_numbers(PyObject*, PyObject* const* args, Py_ssize_t count) {
   if (count != 5)
-    return fail(PyExc_TypeError, "message_numbers(point, normal, separation, volume, covariance)");
-  Array<double> point, normal, separation, volume, covariance, numbers;
-  if (!read(args[0], "point", {any_length, 3}, point)) return nullptr;
+    fail(PyExc_TypeError, "message_numbers(point, normal, separation, volume, covariance)");
+  auto point = read<double>(args[0], "point", {any_length, 3});
   npy_intp rows = point.length(0);
-  if (!read(args[1], "normal", {rows, 3}, normal) ||
-      !read(args[2], "separation", {rows}, separation) ||
-      !read(args[3], "volume", {rows}, volume) ||
-      !read(args[4], "covariance", {rows, 3, 3}, covariance) ||
-      !make({rows, message_numbers_count}, numbers))
-    return nullptr;
+  auto normal = read<double>(args[1], "normal", {rows, 3});
+  auto separation = read<double>(args[2], "separation", {rows});
+  auto volume = read<double>(args[3], "volume", {rows});
+  auto covariance = read<double>(args[4], "covariance", {rows, 3, 3});
+  auto numbers = make<double>({rows, message_numbers_count});
   double* to = numbers.numbers;
   for (npy_intp row = 0; row < rows; ++row) {
     const double *n = normal.numbers + 3 * row, *c = covariance.numbers + 9 * row;

@@ -7,7 +7,6 @@
 #include "mlp/mlp_model.hpp"
 #include "pair.hpp"
 #include "queue.hpp"
-#include "stages.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
 namespace {
@@ -63,7 +62,6 @@ const Kernel KERNEL(BOX_CONTACT_SET) = {
     title,
     lanes,
     {{pair_by<ExactPointModel>, pair_by<ExactModel>}, {pair_by<MlpPointModel>, pair_by<MlpModel>}},
-    {{rows_by<ExactPointModel>, rows_by<ExactModel>}, {rows_by<MlpPointModel>, rows_by<MlpModel>}},
-    fill_stages};
+    {{rows_by<ExactPointModel>, rows_by<ExactModel>}, {rows_by<MlpPointModel>, rows_by<MlpModel>}}};
 
 }  // namespace box_contact::detail

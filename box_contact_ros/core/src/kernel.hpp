@@ -8,13 +8,12 @@
 #include <cstdint>
 
 #include "../include/box_contact/box_contact.h"
-#include "stage_arrays.hpp"
 
 namespace box_contact::detail {
 
-// The network of model `mlp`: its outputs, and the most units of a hidden layer. `network_format` counts
-// changes of what features and outputs mean.
-constexpr int network_format = 4, network_outputs = 7, network_units_max = 64;
+// The network of model `mlp`: the features of the overlap that it reads, its outputs, and the most units
+// of a hidden layer. `network_format` counts changes of what features and outputs mean.
+constexpr int network_format = 4, network_features = 21, network_outputs = 7, network_units_max = 64;
 
 // A step of 0 gives all rows the same sizes, one of 3 each row its own.
 struct Rows {
@@ -68,8 +67,6 @@ struct Kernel {
   // Solve rows `begin` to `end`. Returns the first row that is refused, or −1.
   long (*solve_rows[model_count][2])(const float* network, const Rows&, long begin, long end,
                                      const Results&, Counts&);
-  // Fill one row; see stages.hpp.
-  bool (*fill_stages)(const Rows&, long row, const StageArrays&);
 };
 
 extern const Kernel kernel_baseline, kernel_avx2, kernel_avx512;

@@ -160,13 +160,6 @@ struct ExactModelOf {
 using ExactModel = ExactModelOf<Moments>;
 using ExactPointModel = ExactModelOf<PointAndVolume>;
 
-// The exact overlap of a single pair.
-inline Moments<double> exact_overlap(const Query<double>& q, Counts& counts) {
-  Moments<double> found;
-  ExactModel{}.solve(q, found, counts);
-  return found;
-}
-
 // All moments. What a model does not find is NaN.
 template <class T>
 BC_INLINE const Moments<T>& all_moments(const Moments<T>& found) {

@@ -1,0 +1,78 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// Probes: what lies behind the answers. Training reads what model `mlp` reads of a pair, and tests
+// compare planes with clipping, which answers few pairs.
+#pragma once
+
+#include "../src/mlp/mlp_model.hpp"
+#include "../src/overlap/exact.hpp"
+#include "../src/rows.hpp"
+#include "pair_arrays.hpp"
+
+namespace box_contact::binding {
+
+// Call probe(query, row) for each row of (poses_a, poses_b, sizes_a, sizes_b).
+template <class Probe>
+void each_query(const PairArrays& pairs, Probe probe) {
+  for (long row = 0; row < pairs.count; ++row) {
+    Query<double> q;
+    query_rows(pairs.rows, row, row + 1, q);
+    if (!q.pair.valid) {
+      PyErr_Format(PyExc_ValueError, "row %ld is refused: its poses or sizes are not valid", row);
+      throw PythonError{};
+    }
+    probe(q, row);
+  }
+}
+
+// What model `mlp` makes of pairs that touch: the patch box, and the body that the chords sum to.
+inline PyObject* mlp_inputs(PyObject*, PyObject* const* args, Py_ssize_t count) {
+  if (count != 4) fail(PyExc_TypeError, "mlp_inputs(poses_a, poses_b, sizes_a, sizes_b)");
+  PairArrays pairs(args, Py_None);
+  npy_intp n = pairs.count;
+  constexpr npy_intp features_count = detail::network_features;
+  auto axes = make<double>({n, 3, 3}), middle = make<double>({n, 3}), half = make<double>({n, 3});
+  auto features = make<double>({n, features_count}), volume = make<double>({n});
+  auto mean = make<double>({n, 3}), covariance = make<double>({n, 3, 3});
+  each_query(pairs, [&](const Query<double>& q, long row) {
+    mlp::PatchBox<double> box(q);
+    mlp::Chords<float> chords(box);
+    mlp::PlacedBox<double> placed(q.pair, box);
+    float told[features_count];
+    chords.tell(told);
+    std::copy_n(told, features_count, features.numbers + features_count * row);
+    volume.numbers[row] = chords.volume;
+    Sym<double> body;
+    for (int k = 0; k < 3; ++k) {
+      placed.axes[k] = double(chords.flip[k]) * placed.axes[k];
+      middle.numbers[3 * row + k] = placed.middle[k];
+      half.numbers[3 * row + k] = box.half[k];
+      mean.numbers[3 * row + k] = chords.mean[k];
+      body(k, k) = chords.variance[k];
+      body((k + 1) % 3, (k + 2) % 3) = chords.beside[k];
+    }
+    write(matrix(placed.axes), axes.numbers + 9 * row);
+    write(matrix(body), covariance.numbers + 9 * row);
+  });
+  return pack(axes, middle, half, features, volume, mean, covariance);
+}
+
+// The moments of pairs that touch, all by clipping.
+inline PyObject* clipped(PyObject*, PyObject* const* args, Py_ssize_t count) {
+  if (count != 4) fail(PyExc_TypeError, "clipped(poses_a, poses_b, sizes_a, sizes_b)");
+  PairArrays pairs(args, Py_None);
+  npy_intp n = pairs.count;
+  auto point = make<double>({n, 3}), volume = make<double>({n}), covariance = make<double>({n, 3, 3});
+  each_query(pairs, [&](Query<double> q, long row) {
+    bool pressed = enforce_minimum_depth(q.pair, q.axis);
+    Moments<double> found = clipped_overlap(q.pair, int(q.axis.face), pressed);
+    Triple<double> centroid = point_in_common_frame(q.pair, triple(found.centroid));
+    write(components<double>(centroid), point.numbers + 3 * row);
+    volume.numbers[row] = found.volume;
+    write(matrix(found.covariance), covariance.numbers + 9 * row);
+  });
+  return pack(point, volume, covariance);
+}
+
+}  // namespace box_contact::binding
