@@ -6,7 +6,8 @@
 It runs a grid of 36 landings by every way (some by a sample), rate and latency. It also lands other
 loads and stacks, with an outcome that is stated beforehand (`landing_ways`). It writes landing.csv
 (a row per landing), landing.md (tables) and landing.png (one landing, four ways). The exit status
-is 1 if patches of `exact` or `mlp` do not do all that is expected.
+is 1 if patches of `exact`, the default, do not do all that is expected. Misses of `mlp` are printed
+and counted on the page.
 """
 from __future__ import annotations
 
@@ -51,8 +52,10 @@ QUICK = 10
 SHOWN = 17
 """The landing that is drawn: sway of 1.25°, tilt of 3°, 0.6 m of overhang."""
 PACKAGES = ('numpy', 'mujoco')  # whose versions are named
-GATED = ('exact', 'mlp')
-"""Ways that have to do all that is expected."""
+PATCHES = ('exact', 'mlp')
+"""Ways that have the limits of patches on the grid."""
+GATED = 'exact'
+"""The way that has to do all that is expected: the default model."""
 
 
 class Outcome(NamedTuple):
@@ -66,7 +69,7 @@ class Outcome(NamedTuple):
     @property
     def as_expected(self) -> bool:
         """Return whether the load did what it was expected to do; patches have own limits."""
-        held = self.way in GATED and self.planned.of_grid
+        held = self.way in PATCHES and self.planned.of_grid
         return self.planned.as_expected(self.result) and (
             not held or HeldLimits.at(self.timing.rate_hz).are_met(self.result))
 
@@ -140,7 +143,7 @@ def grid_table(outcomes: Sequence[Outcome]) -> str:
         figures = []
         for figure, factor in SHOWN_WORST.values():
             text = worst(results, figure, factor)
-            is_worse = name in GATED and manifold and max(
+            is_worse = name in PATCHES and manifold and max(
                 getattr(result, figure) for result in results) > max(
                 getattr(result, figure) for result in manifold)
             figures.append(f'**{text}**' if is_worse else text)
@@ -150,7 +153,7 @@ def grid_table(outcomes: Sequence[Outcome]) -> str:
                        else ('–', '–')), f'{settled} of {len(results)}',
                      f'{sum(result.at_rest for result in results)} of {len(results)}',
                      f'{sum(outcome.as_expected for outcome in landed)} of {len(results)}'
-                     if name in GATED else '–', *figures])
+                     if name in PATCHES else '–', *figures])
     return output.markdown_table(['law', 'contacts', 'rate [Hz]', 'latency [ms]', 'settle',
                                   'at rest', 'within limits', *SHOWN_WORST], rows, words=2)
 
@@ -180,10 +183,10 @@ def added_table(outcomes: Sequence[Outcome]) -> str:
 
 def page(outcomes: Sequence[Outcome], command: str) -> str:
     """Return the Markdown page."""
-    gated = [outcome for outcome in outcomes if outcome.way in GATED]
+    patches = [outcome for outcome in outcomes if outcome.way in PATCHES]
     return output.page(
         'benchmarks/pages/landing', command=command, machine=output.machine(native, PACKAGES),
-        all=len(gated), good=sum(outcome.as_expected for outcome in gated),
+        all=len(patches), good=sum(outcome.as_expected for outcome in patches),
         grid=grid_table(outcomes), added=added_table(outcomes))
 
 
@@ -268,7 +271,7 @@ def left_when_asked() -> Iterator[None]:
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run the sweep and write its files; 1 if a gated way fails an expectation."""
+    """Run the sweep and write its files; 1 if `GATED` fails an expectation."""
     parser = report_parser(
         'landing', __doc__, out='page, table and picture',
         quick=f'every {QUICK}th landing of the grid, every third of the others, at 200 Hz and 2 ms')
@@ -290,11 +293,11 @@ def main(args: Sequence[str] | None = None) -> int:
     command = output.command_line('benchmarks.landing', args)
     (folder / 'landing.md').write_text(page(outcomes, command), encoding='utf-8')
     print(f'{grid_table(outcomes)}\n\n{added_table(outcomes)}')
-    broken = [outcome for outcome in outcomes if outcome.way in GATED and not outcome.as_expected]
-    for way, timing, landing, _ in broken:
+    missed = [outcome for outcome in outcomes if outcome.way in PATCHES and not outcome.as_expected]
+    for way, timing, landing, _ in missed:
         print(f'landing: {way} at {timing.rate_hz:g} Hz and {1e3 * timing.latency:g} ms, '
               f'{landing.name}: not as expected', file=sys.stderr)
-    return 1 if broken else 0
+    return int(any(outcome.way == GATED for outcome in missed))
 
 
 if __name__ == '__main__':

@@ -177,14 +177,15 @@ def test_each_way_has_its_timings():
     assert WAYS['soup'].timings(timings) == timings[::2]
 
 
-def test_what_is_not_as_expected_ends_with_status_1(tmp_path, monkeypatch, capsys):
-    """A load that must rest falls."""
+@pytest.mark.parametrize(('way', 'status'), [('exact', 1), ('mlp', 0)])
+def test_what_is_not_as_expected_is_named(tmp_path, monkeypatch, capsys, way, status):
+    """A load that must rest falls: status 1 with the default model, a line with either."""
     falls = dataclasses.replace(ADDED[-1], falls=False, name=f'grid {landing.SHOWN}')
     monkeypatch.setattr(landing, 'grid', lambda: [*[None] * (landing.SHOWN % landing.QUICK), falls])
     monkeypatch.setattr(landing, 'ADDED', [])
     monkeypatch.setattr(landing, 'draw', lambda path, scenario: path.touch())
-    assert landing.main(['--quick', '--ways', 'exact', '--out', str(tmp_path)]) == 1
-    assert 'exact at 200 Hz and 2 ms, grid 17: not as expected' in capsys.readouterr().err
+    assert landing.main(['--quick', '--ways', way, '--out', str(tmp_path)]) == status
+    assert f'{way} at 200 Hz and 2 ms, grid 17: not as expected' in capsys.readouterr().err
     assert '**0 of 1** landings by patches' in (tmp_path / 'landing.md').read_text()
 
 
