@@ -8,7 +8,7 @@ collision tests. Each model answers all of them. Every gate is zero: contacts mi
 wrong depths, axes that are not the shallowest, points outside the boxes (`mlp`: outside the bounds
 of the overlap), NaN, negative eigenvalues, bits that swapping the boxes changes, rows that differ
 from their single calls, and exceptions. What is too near exact touch for float64 is judged in 60
-digits.
+digits. With `--random-weights`, `mlp` has random weights: its gates hold whatever the weights are.
 
 A broken gate prints the pose, ready to be pasted into a test; the exit status is then 1. fuzz.csv
 has a digest of all verdicts and separations. Runs of equal seed and number have equal digests for
@@ -21,19 +21,22 @@ import hashlib
 import os
 import sys
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 
-from box_contact_ros.core import native
+from box_contact_ros.core import FEATURES, OUTPUTS, UNITS_MAX, native
 from box_contact_ros.solver.arguments import within
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
+from box_contact_ros.solver.mlp import core_numbers
 from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.solver.weights_file import Network
 
 from . import judge, output
 from .arguments import add_models, report_parser
@@ -54,6 +57,8 @@ PIECE = 50_000  # pairs that are drawn and judged at a time
 SHOWN = 3  # faults of a class and model that are printed
 MODELS = ('mlp', 'exact')
 ALONE = 50  # one row of so many is asked once more, alone
+UNIT = (1.0, 1.0, 1.0)
+SCALES = (1e-2, 1e4)  # of random weights
 
 SWAP, SINGLE = 1 << 20, 1 << 21
 GATES = judge.GATES | {SWAP: 'changed by a swap', SINGLE: 'not its single call'}
@@ -186,6 +191,27 @@ def _axes(rng: np.random.Generator, n: int) -> np.ndarray:
     return axes / np.linalg.norm(axes, axis=1, keepdims=True)
 
 
+class RandomMlp:
+    """Model `mlp` with hidden layers of random widths, and weights of a random scale."""
+
+    def __init__(self, *seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        scale = float(log_uniform(rng, *SCALES, 1)[0])
+        widths = (FEATURES, *rng.integers(1, UNITS_MAX, 2, endpoint=True), OUTPUTS)
+        network = Network([(rng.uniform(-scale, scale, (units, inputs)),
+                            rng.uniform(-scale, scale, units))
+                           for inputs, units in pairwise(widths)])
+        self._solver = native.PairSolver('mlp', UNIT, UNIT, core_numbers(network))
+
+    def batch(self, pose_a: np.ndarray, pose_b: np.ndarray, *, size_a: np.ndarray,
+              size_b: np.ndarray) -> Contacts:
+        """Return the contacts of poses (n, 7) and full extents (n, 3), as `ContactSolver` does."""
+        return Contacts(*self._solver.solve(pose_a, pose_b, size_a, size_b, 1)[0])
+
+
+Solver = ContactSolver | RandomMlp
+
+
 @dataclass
 class Tally:
     """What was found for one class and model."""
@@ -217,7 +243,7 @@ class Tally:
                 f'{self.worst_depth:.2g} of its tolerance  {wrong or "no fault"}')
 
 
-def examine(pairs: Pairs, name: str, solvers: dict[str, ContactSolver]) -> list[Tally]:
+def examine(pairs: Pairs, name: str, solvers: Mapping[str, Solver]) -> list[Tally]:
     """Ask each model for the pairs of a class, and judge the answers."""
     gap = cache(lambda row: judge.exact_gap(*(part[row] for part in pairs)))  # for all models
     tallies = []
@@ -249,7 +275,7 @@ def examine(pairs: Pairs, name: str, solvers: dict[str, ContactSolver]) -> list[
     return tallies
 
 
-def changed_bits(pairs: Pairs, found: Contacts, solver: ContactSolver) -> np.ndarray:
+def changed_bits(pairs: Pairs, found: Contacts, solver: Solver) -> np.ndarray:
     """Return SWAP and SINGLE (n,) where B against A, or a row alone, has other bits."""
     swapped = Pairs(pairs.pose_b, pairs.pose_a, pairs.size_b, pairs.size_a).contacts(solver)
     changed = np.where((swapped.colliding != found.colliding)
@@ -269,22 +295,32 @@ def _pasted(words: str, model: str, pair: Sequence[np.ndarray]) -> str:
             f'    ({values[0]}),\n    ({values[1]}))')
 
 
-def _piece(job: tuple[str, int, int, int, tuple[str, ...]]) -> list[Tally]:
+def _piece(job: tuple[str, int, int, int, tuple[str, ...], bool]) -> list[Tally]:
     """Draw and judge one piece of a class, for all models; the seed is the piece's own."""
-    name, seed, number, count, models = job
-    rng = np.random.default_rng([seed, list(CLASSES).index(name), number])
-    return examine(draw(name, rng, count), name, {
-        model: ContactSolver((1, 1, 1), (1, 1, 1), model=model) for model in models})
+    name, seed, number, count, models, random_weights = job
+    own = seed, list(CLASSES).index(name), number
+    solvers: dict[str, Solver] = {model: ContactSolver(UNIT, UNIT, model=model) for model in models}
+    if random_weights and 'mlp' in solvers:
+        solvers['mlp'] = RandomMlp(*own)
+    found = examine(draw(name, np.random.default_rng(own), count), name, solvers)
+    if random_weights:
+        for tally in found:
+            tally.poses = [f'# mlp is RandomMlp{own}\n{pose}' for pose in tally.poses]
+    return found
 
 
 def fuzz(total: int, *, seed: int = 1, classes: Sequence[str] = tuple(CLASSES),
-         models: Sequence[str] = MODELS, workers: int = 1) -> dict[tuple[str, str], Tally]:
-    """Return tallies by class and model, of `total` pairs spread evenly over the classes."""
+         models: Sequence[str] = MODELS, random_weights: bool = False, workers: int = 1,
+         ) -> dict[tuple[str, str], Tally]:
+    """Return tallies by class and model, of `total` pairs spread evenly over the classes.
+
+    random_weights: each piece has a `RandomMlp` of its own as `mlp`.
+    """
     from tqdm import tqdm
 
     each = -(-total // len(classes))
     counts = [min(PIECE, each - drawn) for drawn in range(0, each, PIECE)]
-    jobs = [(name, seed, number, count, tuple(models))
+    jobs = [(name, seed, number, count, tuple(models), random_weights)
             for name in classes for number, count in enumerate(counts)]
     tallies = {(name, model): Tally(name, model) for name in classes for model in models}
     with (tqdm(total=sum(job[3] for job in jobs), desc='fuzz', unit='pair', unit_scale=True,
@@ -299,21 +335,25 @@ def fuzz(total: int, *, seed: int = 1, classes: Sequence[str] = tuple(CLASSES),
 
 def main(args: Sequence[str] | None = None) -> int:
     """Fuzz, print a line per class and model; 1 if a gate is broken."""
-    parser = report_parser('fuzz', __doc__, quick=f'{QUICK_PAIRS:,} pairs', seed=1,
-                           out='fuzz.csv')
+    parser = report_parser('fuzz', __doc__, quick=f'{QUICK_PAIRS:,} pairs', seed=1, out='the table')
     parser.add_argument('--pairs', type=within(1), default=PAIRS,
                         help='pairs in all (default: %(default)s)')
     add_models(parser, MODELS)
+    parser.add_argument('--random-weights', action='store_true',
+                        help=f'mlp has other random weights in each piece of {PIECE:,} pairs; the '
+                        'table is fuzz_random_weights.csv')
     parser.add_argument('--workers', type=within(1), default=os.cpu_count() or 1,
                         help='processes at once')
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
     tallies = fuzz(QUICK_PAIRS if options.quick else options.pairs, seed=options.seed,
-                   models=options.models, workers=options.workers).values()
+                   models=options.models, random_weights=options.random_weights,
+                   workers=options.workers).values()
     print(*tallies, sep='\n')
     for pose in (pose for tally in tallies for pose in tally.poses):
         print(f'\n{pose}')
-    output.write_csv(folder / 'fuzz.csv', [
+    file = 'fuzz_random_weights.csv' if options.random_weights else 'fuzz.csv'
+    output.write_csv(folder / file, [
         {'class': t.name, 'model': t.model, 'pairs': t.pairs, 'contacts': t.contacts,
          'near_touch': t.near_touch,
          'worst_depth_by_tolerance': t.worst_depth, 'digest': t.digest, **t.faults}

@@ -14,8 +14,6 @@ from gmpy2 import mpfr
 from benchmarks import fuzz, judge, patches
 from benchmarks.pose_sets import Pairs
 from box_contact_ros import ContactSolver
-from box_contact_ros.core import FEATURES, native
-from box_contact_ros.solver.contact import Contacts
 
 SEED = 20260
 
@@ -166,27 +164,27 @@ def answered_by_mlp():
     return pairs, found
 
 
-class Garbage:
-    """Model `mlp` with random weights of up to `scale`."""
-
-    def __init__(self, scale):
-        count = 8 * (1 + FEATURES) + 8 * (1 + 8) + 8 * (1 + 8)
-        numbers = np.random.default_rng(1).uniform(-scale, scale, count)
-        network = np.concatenate([[1.0, 1.0], numbers]).astype(np.float32)
-        self._solver = native.PairSolver('mlp', (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), network)
-
-    def batch(self, pose_a, pose_b, size_a, size_b):
-        return Contacts(*self._solver.solve(pose_a, pose_b, size_a, size_b, 1)[0])
+def test_random_weights_break_no_gate(tmp_path, monkeypatch, capsys):
+    """What model `mlp` guarantees holds for 24 networks, 1,250 pairs each."""
+    monkeypatch.setattr(fuzz, 'PIECE', 1_250)
+    assert fuzz.main(['--pairs', '30000', '--models', 'mlp', '--random-weights', '--workers', '1',
+                      '--seed', str(SEED), '--out', str(tmp_path)]) == 0, capsys.readouterr().out
+    with (tmp_path / 'fuzz_random_weights.csv').open() as file:
+        assert [row['model'] for row in csv.DictReader(file)] == ['mlp'] * len(fuzz.CLASSES)
 
 
-@pytest.mark.parametrize('scale', [1.0, 1e4])
-def test_garbage_weights_break_no_gate(scale):
-    """What model `mlp` guarantees, it does whatever its weights are."""
-    garbage = Garbage(scale)
-    for number, name in enumerate(fuzz.CLASSES):
-        pairs = fuzz.draw(name, np.random.default_rng([SEED, number]), 5_000)
-        tally, = fuzz.examine(pairs, name, {'mlp': garbage})
-        assert tally.faults.total() == 0, tally.poses
+def test_a_fault_of_random_weights_names_them(monkeypatch):
+    """Another network answers each piece; the one that is named gives the judged answer."""
+    monkeypatch.setattr(fuzz, 'mlp_faults', lambda pairs, found: np.where(
+        found.colliding, judge.NEGATIVE, 0))
+    first, second = (fuzz._piece(('cube', 5, number, 50, ('mlp',), True))[0] for number in (0, 1))
+    words, _, code = first.poses[0].split('\n', 2)
+    assert words == '# mlp is RandomMlp(5, 0, 0)' and 'ContactSolver' in code
+    assert second.poses[0].startswith('# mlp is RandomMlp(5, 0, 1)')
+    pairs = fuzz.draw('cube', np.random.default_rng((5, 0, 0)), 50)
+    points = [pairs.contacts(fuzz.RandomMlp(5, 0, number)).point for number in (0, 0, 1)]
+    np.testing.assert_array_equal(points[0], points[1])
+    assert not np.array_equal(points[0], points[2], equal_nan=True)
 
 
 def test_a_fault_is_printed_so_that_it_can_be_pasted(monkeypatch):
