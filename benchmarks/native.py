@@ -34,6 +34,11 @@ from .timing import by_round, pinned, usable_cores
 
 PAIRS, ROUNDS, CALLS = 20_000, 24, 2_000
 QUICK_PAIRS, QUICK_ROUNDS, QUICK_CALLS = 1_000, 2, 200
+CONTACTS, PASSES = 100_000, 30
+"""Contacts of all sets, each timed alone in every pass; its time is the least of the passes."""
+QUICK_CONTACTS, QUICK_PASSES = 2_000, 3
+EACH = ('exact', 'mlp')
+PERCENTS = {'p50': 50, 'p99.9': 99.9, 'slowest': 100}
 MIXED = 'containers, 20 % touching'
 UNIT = 'mjc_BoxBox, single'
 CALLS_FOLDER = Path(__file__).with_name('native_calls')
@@ -130,16 +135,39 @@ def sets(count: int) -> dict[str, Pairs]:
     return {**by_name, MIXED: mixed._replace(pose_b=pose_b)}
 
 
-def timed(program: Path, pairs: Pairs, instruction_set: str, *, rounds: int, calls: int) -> OnSet:
-    """Return times and errors of all contestants on one set, with one instruction set."""
-    poses, answers = program.parent / 'poses', program.parent / 'answers'
+def run(program: Path, pairs: Pairs, instruction_set: str, *arguments: object) -> list[str]:
+    """Return the lines that the program prints for some pairs, with one instruction set."""
+    poses = program.parent / 'poses'
     poses.write_bytes(np.int64(len(pairs.pose_a)).tobytes()
                       + b''.join(np.ascontiguousarray(part).tobytes() for part in pairs))
-    done = subprocess.run([program, poses, str(rounds), str(calls), answers], capture_output=True,
-                          text=True, env={**os.environ, FORCE: instruction_set})
+    done = subprocess.run([program, poses, *map(str, arguments)], capture_output=True, text=True,
+                          env={**os.environ, FORCE: instruction_set})
     if done.returncode:
         raise RuntimeError(f'the program ended with status {done.returncode}: {done.stderr}')
-    first, names, *lines = done.stdout.splitlines()
+    return done.stdout.splitlines()
+
+
+def each_contact(program: Path, by_set: Mapping[str, Pairs], instruction_set: str, count: int,
+                 passes: int) -> dict[str, np.ndarray]:
+    """Return the times (2, n) of `exact` and `mlp` for n contacts of each set, one by one [ns].
+
+    There are at most `count` contacts in all. A time is the least of all passes, so what disturbs
+    one pass does not count, and an empty reading of the clock is subtracted.
+    """
+    share = count // len(by_set)
+    touching = {name: pairs.rows(np.flatnonzero(pairs.contacts().colliding)[:share])
+                for name, pairs in by_set.items()}
+    asked = Pairs(*(np.concatenate(columns) for columns in zip(*touching.values())))
+    lines = run(program, asked, instruction_set, passes)
+    times = np.array([line.split('\t') for line in lines], dtype=float).T
+    ends = np.cumsum([len(pairs.size) for pairs in touching.values()])[:-1]
+    return dict(zip(touching, np.split(times, ends, axis=1)))
+
+
+def timed(program: Path, pairs: Pairs, instruction_set: str, *, rounds: int, calls: int) -> OnSet:
+    """Return times and errors of all contestants on one set, with one instruction set."""
+    answers = program.parent / 'answers'
+    first, names, *lines = run(program, pairs, instruction_set, rounds, calls, answers)
     if first != instruction_set:
         raise RuntimeError(f'{instruction_set} was asked for, and the library answered {first!r}')
     times: dict[str, list[float]] = {name: [] for name in names.split('\t')}
@@ -210,6 +238,32 @@ def answers_table(by_set: Mapping[str, OnSet]) -> str:
          'on stacks [%]', 'worst of all sets [%]'], lines)
 
 
+def slowest_table(times: Mapping[str, np.ndarray]) -> str:
+    """Return a row per set: the times of single contacts, and the slowest by the median of all."""
+    of_all = np.concatenate(list(times.values()), axis=1)
+    lines = []
+    for name, both in {**times, 'all': of_all}.items():
+        line = [name, f'{both.shape[1]:,}']
+        for mine, others in zip(both, of_all):
+            values = percentiles(mine, *PERCENTS.values())
+            line += [*(f'{value:.0f}' for value in values),
+                     f'{values[-1] / np.median(others):.2f}']
+        lines.append(line)
+    return markdown_table(['', 'contacts', *(f'`{model}`: {name}' for model in EACH for name in (
+        *PERCENTS, 'slowest / p50 of all'))], lines)
+
+
+def contact_rows(found: Mapping[str, Mapping[str, np.ndarray]]) -> Iterator[dict[str, object]]:
+    """Yield a row per instruction set, set and model: the times of single contacts."""
+    for instruction_set, by_set in found.items():
+        for name, both in by_set.items():
+            for model, times in zip(EACH, both):
+                yield {'instruction_set': instruction_set, 'set': name,
+                       'contestant': f'{model} covariance, each contact', 'judged': len(times),
+                       **{f'{column}_ns': value for column, value in zip(
+                           PERCENTS, percentiles(times, *PERCENTS.values()))}}
+
+
 def csv_rows(found: Mapping[str, Mapping[str, OnSet]]) -> Iterator[dict[str, object]]:
     """Yield a row per instruction set, set and contestant."""
     for instruction_set, by_set in found.items():
@@ -232,6 +286,7 @@ def main(args: Sequence[str] | None = None) -> int:
     folder = output.results_folder(parser, options)
     pairs, rounds, calls = ((QUICK_PAIRS, QUICK_ROUNDS, QUICK_CALLS) if options.quick
                             else (PAIRS, ROUNDS, CALLS))
+    count, passes = (QUICK_CONTACTS, QUICK_PASSES) if options.quick else (CONTACTS, PASSES)
     names = [name for name in instruction_sets() if name != 'baseline']
     found: dict[str, dict[str, OnSet]] = {name: {} for name in names}
     with tempfile.TemporaryDirectory() as made:
@@ -242,9 +297,12 @@ def main(args: Sequence[str] | None = None) -> int:
             return 2
         with pinned({usable_cores()[-1]}):
             # Sets outside, so that instruction sets take turns.
-            for of_set, chosen in tqdm(sets(pairs).items(), desc='native', unit='set'):
+            by_set = sets(pairs)
+            for of_set, chosen in tqdm(by_set.items(), desc='native', unit='set'):
                 for name in names:
                     found[name][of_set] = timed(program, chosen, name, rounds=rounds, calls=calls)
+            del by_set[MIXED]  # its contacts are those of containers
+            contacts = {name: each_contact(program, by_set, name, count, passes) for name in names}
     tables = '\n\n'.join(
         f'## {name}\n\nContainers:\n\n{contestants_table(by_set["containers"])}\n\n'
         f'Relative to `mjc_BoxBox`, by set:\n\n{sets_table(by_set)}'
@@ -255,12 +313,14 @@ def main(args: Sequence[str] | None = None) -> int:
     text = output.page(
         'benchmarks/pages/native', command=output.command_line('benchmarks.native', args),
         machine=output.machine(native), rounds=rounds, calls=calls, pairs=pairs, tables=tables,
+        slowest=slowest_table(contacts[names[-1]]), slowest_set=names[-1], passes=passes,
         answers=answers_table(found[names[-1]]), code=calls_shown(missing), clear=CLEAR,
         engines=', '.join(versions), missing=''.join(
             f'\n\nLeft out: {name.capitalize()} is not installed with its headers '
             f'(`{OPTIONAL[name]}`).' for name in missing))
     (folder / 'native.md').write_text(text, encoding='utf-8')
-    output.write_csv(folder / 'native.csv', csv_rows(found), about=output.machine(native))
+    output.write_csv(folder / 'native.csv', [*csv_rows(found), *contact_rows(contacts)],
+                     about=output.machine(native))
     print(tables)
     return 0
 

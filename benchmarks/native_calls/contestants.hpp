@@ -62,6 +62,8 @@ Contestant single(const std::string& name, size_t calls, Call call, Read read) {
 
 // Each adds its contestants, with `calls` single calls a round. What they use is never freed.
 void add_ours(const Poses& poses, size_t calls, Contestants& all);
+// Prints for each contact the time of a call of `exact` and of `mlp` [ns], the least of all passes.
+void time_each_contact(const Poses& poses, size_t passes);
 void add_mujoco(const Poses& poses, size_t calls, Contestants& all);
 #ifdef WITH_COAL
 void add_coal(const Poses& poses, size_t calls, Contestants& all);

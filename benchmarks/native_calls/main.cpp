@@ -3,6 +3,7 @@
 
 // Times of libbox_contact and of other engines, C++ against C++, in turn, in one process.
 //
+// native POSES PASSES: prints the time of each contact: see `time_each_contact`.
 // native POSES ROUNDS CALLS ANSWERS: prints the instruction set, the names of all contestants, and a
 // line for each contestant and round: nanoseconds a pair. ANSWERS gets what each contestant answers
 // for the first CALLS pairs: float64, signed separations, a row for each contestant.
@@ -67,8 +68,12 @@ Poses::Poses(const char* path) {
 }
 
 int main(int count, char** arguments) {
-  if (count != 5) fail("usage: native POSES ROUNDS CALLS ANSWERS");
+  if (count != 3 && count != 5) fail("usage: native POSES PASSES | POSES ROUNDS CALLS ANSWERS");
   Poses poses(arguments[1]);
+  if (count == 3) {
+    time_each_contact(poses, std::strtoul(arguments[2], nullptr, 10));
+    return 0;
+  }
   size_t rounds = std::strtoul(arguments[2], nullptr, 10), n = poses.count();
   size_t calls = std::min<size_t>(std::strtoul(arguments[3], nullptr, 10), n);
   Contestants all;

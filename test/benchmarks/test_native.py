@@ -49,6 +49,23 @@ def test_all_answer_as_exact(program: tuple[Path, list[str]], containers: Pairs)
     assert max(found['exact covariance, batch'].depth_errors) == 0.0
 
 
+@needs_compiler
+def test_each_contact_has_its_time(program: tuple[Path, list[str]], containers: Pairs) -> None:
+    """Contacts alone, equally many of each set; the table compares with the median of all."""
+    pose_b = containers.pose_b.copy()
+    pose_b[::2, :3] *= 1.5  # these are apart
+    by_set = {'half apart': containers._replace(pose_b=pose_b), 'containers': containers}
+    found = native.each_contact(program[0], by_set, instruction_sets()[-1], 60, passes=2)
+    assert [(name, times.shape) for name, times in found.items()] == [
+        ('half apart', (2, 30)), ('containers', (2, 30))]
+    assert all((times > 0.0).all() for times in found.values())
+    planted = {'fast': np.full((2, 3), 100.0), 'slow': np.array([[100.0], [250.0]])}
+    *_, fast, slow, of_all = native.slowest_table(planted).splitlines()
+    assert fast == '| fast | 3 | 100 | 100 | 100 | 1.00 | 100 | 100 | 100 | 1.00 |'
+    assert slow == '| slow | 1 | 100 | 100 | 100 | 1.00 | 250 | 250 | 250 | 2.50 |'
+    assert of_all.startswith('| all | 4 | 100 | ')
+
+
 @pytest.mark.parametrize('planted', ['sign', 'size'])
 def test_a_wrong_call_ends_the_run(containers: Pairs, planted: str) -> None:
     truth = containers.contacts().separation
