@@ -13,264 +13,45 @@ Lengths in m, masses in kg, times in s.
 from __future__ import annotations
 
 import csv
-import logging
 import math
 import sys
-import time
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import NamedTuple
 
-import mujoco
 import numpy as np
 
-from box_contact_ros import Body, ContactSolver, PatchForces
+from box_contact_ros import ContactSolver
 from box_contact_ros.core import native
 from box_contact_ros.scene.laws import GRAVITY
 from box_contact_ros.solver.pose import rotation_matrix
 
 from . import output
 from .arguments import report_parser
-from .pose_sets import CONTAINER
+from .loops import (
+    FLOOR,
+    MUJOCO,
+    TIMINGS,
+    Boxes,
+    Scene,
+    Timing,
+    corner_speeds,
+    near_pairs,
+    steps,
+)
+from .pose_sets import CONTAINER, turned
 
-# MuJoCo would write warnings to a file MUJOCO_LOG.TXT in the working directory.
-mujoco.set_mju_user_warning(logging.getLogger(__name__).warning)
-
-STEP = 0.001  # of MuJoCo's physics
 PALLETS = Path(__file__).with_name('pallets.csv')
 LOST_SPEED = 100.0  # a run with a faster corner is over [m/s]
-CORNERS = 0.5 * np.array(list(product((-1, 1), repeat=3)))
 REST_SPEED = 1e-3  # of the fastest corner of a scene at rest [m/s]
-SEARCHED = 10  # steps from one search of neighbours to the next
 JUDGED = 10  # steps from one judgement to the next
 PUSHES = (0.15, 0.3)  # on every box of a real pallet [weight]
 PUSHED = 2.0  # how long [s]
 NEAR_MM, NEAR_DEG = 5.0, 0.5  # a box stays that moves and turns less
 
-Wrenches = Callable[[float, 'Boxes', np.ndarray, np.ndarray], np.ndarray]
-
-
-@dataclass
-class Boxes:
-    """Boxes of a scene, a row each: full extents, mass (0: fixed, or moved by its velocity)."""
-
-    size: np.ndarray  # (n, 3) [m]
-    mass: np.ndarray  # (n,) [kg]
-    pose: np.ndarray  # (n, 7) of the boxes' centres
-    centre: np.ndarray  # (n, 3) of mass, in the box's own frame [m]
-    velocity: np.ndarray  # (n, 6) of the centre of mass
-
-    @classmethod
-    def of(cls, rows: Sequence[tuple]) -> Boxes:
-        """Return boxes of rows (size, mass, position[, quaternion[, centre]])."""
-        n = len(rows)
-        pose = np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
-        centre = np.zeros((n, 3))
-        for k, (_, _, position, *more) in enumerate(rows):
-            pose[k, :3] = position
-            if more:
-                pose[k, 3:] = more[0]
-            if len(more) > 1:
-                centre[k] = more[1]
-        return cls(np.array([row[0] for row in rows], dtype=float),
-                   np.array([row[1] for row in rows], dtype=float), pose, centre, np.zeros((n, 6)))
-
-    @property
-    def inertia(self) -> np.ndarray:
-        """Return principal moments (n, 3) of boxes of one density."""
-        squares = self.size**2
-        return self.mass[:, None] / 12.0 * (squares.sum(axis=1, keepdims=True) - squares)
-
-
-@dataclass
-class Scene:
-    """Boxes, and the wrenches (n, 6) that act on them beside weight and contacts."""
-
-    name: str
-    boxes: Boxes
-    seconds: float = 5.0
-    friction: float = 0.5
-    act: Wrenches | None = None
-
-
-# --- our loop -------------------------------------------------------------------------------------
-
-
-def multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Return products (n, 4) of quaternions x y z w."""
-    pv, qv, pw, qw = p[:, :3], q[:, :3], p[:, 3:], q[:, 3:]
-    return np.hstack([pw * qv + qw * pv + np.cross(pv, qv),
-                      pw * qw - (pv * qv).sum(axis=1, keepdims=True)])
-
-
-def move(boxes: Boxes, h: float) -> None:
-    """Advance the poses by their velocities."""
-    arm = np.einsum('nij,nj->ni', rotation_matrix(boxes.pose[:, 3:]), boxes.centre)
-    place = boxes.pose[:, :3] + arm + h * boxes.velocity[:, :3]
-    spin = boxes.velocity[:, 3:]
-    angle = np.linalg.norm(spin, axis=1, keepdims=True) * h
-    turn = np.hstack([0.5 * h * np.sinc(angle / (2 * np.pi)) * spin, np.cos(angle / 2)])
-    q = multiply(turn, boxes.pose[:, 3:])
-    boxes.pose[:, 3:] = q / np.linalg.norm(q, axis=1, keepdims=True)
-    boxes.pose[:, :3] = place - np.einsum('nij,nj->ni', rotation_matrix(boxes.pose[:, 3:]),
-                                          boxes.centre)
-
-
-def near_pairs(boxes: Boxes, margin: float) -> np.ndarray:
-    """Return the pairs (k, 2) whose bounding boxes come within a margin; one of them moves."""
-    half = 0.5 * np.einsum('nij,nj->ni', np.abs(rotation_matrix(boxes.pose[:, 3:])), boxes.size)
-    low, high = boxes.pose[:, :3] - half - margin, boxes.pose[:, :3] + half
-    near = np.triu((low[:, None] <= high).all(axis=2) & (low <= high[:, None]).all(axis=2), 1)
-    moves = boxes.mass > 0
-    return np.argwhere(near & (moves[:, None] | moves))
-
-
-class Ours:
-    """Contacts by the solver, forces by `PatchForces`."""
-
-    def __init__(self, scene: Scene, timing: Timing) -> None:
-        """Make solver and forces."""
-        boxes = self.boxes = scene.boxes
-        self.scene, self.step_size, self.latency = scene, timing.step, timing.latency
-        self.every = max(1, round(1.0 / (timing.rate_hz * timing.step)))
-        self.late = round(timing.latency / timing.step)
-        self.solver = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
-        self.forces = PatchForces(
-            [Body(mass=m, inertia=i, centre=c)
-             for m, i, c in zip(boxes.mass, boxes.inertia, boxes.centre)],
-            friction=scene.friction)
-        self.tick, self.spent = 0, 0.0
-        self.answers: deque = deque()
-        self.pairs = np.empty((0, 2), dtype=np.int64)
-        self.weight = np.zeros((len(boxes.mass), 6))
-        self.weight[:, 2] = -GRAVITY * boxes.mass
-
-    def step(self) -> None:
-        """Advance all boxes by a step."""
-        boxes, h = self.boxes, self.step_size
-        outside = self.weight
-        if self.scene.act:
-            outside = outside + self.scene.act(self.tick * h, boxes, boxes.pose, boxes.velocity)
-        start = time.perf_counter()
-        if self.tick % SEARCHED == 0:
-            fast = np.abs(boxes.velocity[:, :3]).max() + 0.5 * np.linalg.norm(
-                boxes.size, axis=1)[boxes.mass > 0].max() * np.abs(boxes.velocity[:, 3:]).max()
-            self.pairs = near_pairs(boxes, 2 * SEARCHED * h * (2 * fast + 0.1))
-        if self.tick % self.every == 0:
-            contacts = self.solver.batch(boxes.pose, sizes=boxes.size, pairs=self.pairs)
-            self.answers.append((self.tick + self.late, self.pairs, contacts, boxes.pose.copy()))
-        while self.answers and self.answers[0][0] <= self.tick:
-            self.forces.hold(*self.answers.popleft()[1:], age=self.latency)
-        boxes.velocity = self.forces.step(h, boxes.pose, boxes.velocity, outside)
-        self.spent += time.perf_counter() - start
-        move(boxes, h)
-        self.tick += 1
-
-
-class Theirs:
-    """The same scene by MuJoCo with contacts of its own."""
-
-    def __init__(self, scene: Scene, step: float) -> None:
-        boxes = self.boxes = scene.boxes
-        self.scene, self.step_size = scene, step
-        spec = mujoco.MjSpec()
-        spec.option.gravity = 0.0, 0.0, -GRAVITY
-        spec.option.timestep = step
-        spec.memory = 2**28
-        self.free = boxes.mass > 0
-        self.moves = self.free | boxes.velocity.any(axis=1)
-        for k in range(len(boxes.mass)):
-            x, y, z, qx, qy, qz, qw = boxes.pose[k]
-            body = spec.worldbody.add_body(pos=(x, y, z), quat=(qw, qx, qy, qz))
-            if self.moves[k]:
-                body.add_freejoint()
-                body.explicitinertial = True
-                body.mass = boxes.mass[k] or 1e3 * boxes.mass.max()
-                body.inertia = boxes.inertia[k] if self.free[k] else np.full(3, body.mass)
-                body.ipos = boxes.centre[k]
-                body.gravcomp = float(not self.free[k])
-            body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=0.5 * boxes.size[k],
-                          friction=(scene.friction, 0.005, 0.0001))
-        self.model = spec.compile()
-        self.data = mujoco.MjData(self.model)
-        self.tick, self.spent = 0, 0.0
-        self.bodies = 1 + np.flatnonzero(self.moves)
-        self._put_velocity(self.moves)
-
-    def _put_velocity(self, rows: np.ndarray) -> None:
-        boxes = self.boxes
-        arm = np.einsum('nij,nj->ni', rotation_matrix(boxes.pose[:, 3:]), boxes.centre)
-        linear = boxes.velocity[:, :3] - np.cross(boxes.velocity[:, 3:], arm)
-        local = np.einsum('nji,nj->ni', rotation_matrix(boxes.pose[:, 3:]), boxes.velocity[:, 3:])
-        both = np.hstack([linear, local])
-        which = rows[self.moves]
-        self.data.qvel.reshape(-1, 6)[which] = both[self.moves][which]
-
-    def step(self) -> None:
-        """Advance all boxes by a step."""
-        boxes, h = self.boxes, self.step_size
-        if self.scene.act:
-            push = self.scene.act(self.tick * h, boxes, boxes.pose, boxes.velocity)
-            self.data.xfrc_applied[self.bodies] = np.where(
-                self.free[self.moves, None], push[self.moves], 0.0)
-        driven = self.moves & ~self.free
-        if driven.any():
-            self._put_velocity(driven)
-        start = time.perf_counter()
-        mujoco.mj_step(self.model, self.data)
-        self.spent += time.perf_counter() - start
-        q = self.data.qpos.reshape(-1, 7)
-        boxes.pose[self.moves] = q[:, [0, 1, 2, 4, 5, 6, 3]]
-        v = self.data.qvel.reshape(-1, 6)
-        rotation = rotation_matrix(boxes.pose[self.moves, 3:])
-        spin = np.einsum('nij,nj->ni', rotation, v[:, 3:])
-        arm = np.einsum('nij,nj->ni', rotation, boxes.centre[self.moves])
-        new = np.hstack([v[:, :3] + np.cross(spin, arm), spin])
-        boxes.velocity[self.free] = new[self.free[self.moves]]
-        self.tick += 1
-
-
 # --- judgement ------------------------------------------------------------------------------------
-
-
-class Judge:
-    """What becomes of a run."""
-
-    def __init__(self, boxes: Boxes) -> None:
-        self.solver = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
-        self.start = boxes.pose.copy()
-        self.rest = math.nan  # since when all corners are slow [s]
-        self.fastest, self.deepest, self.end_depth, self.end_speed = 0.0, 0.0, 0.0, 0.0
-
-    def see(self, boxes: Boxes, at: float) -> None:
-        """Judge the boxes at a time [s]."""
-        free = boxes.mass > 0
-        arm = np.einsum('nij,nkj->nki', rotation_matrix(boxes.pose[:, 3:]),
-                        CORNERS * boxes.size[:, None] - boxes.centre[:, None])
-        speed = np.linalg.norm(boxes.velocity[:, None, :3]
-                               + np.cross(boxes.velocity[:, None, 3:], arm), axis=2)[free].max()
-        self.end_speed = speed
-        self.fastest = max(self.fastest, speed)
-        if not speed <= REST_SPEED:
-            self.rest = math.nan
-        elif math.isnan(self.rest):
-            self.rest = at
-        pairs = near_pairs(boxes, 0.0)
-        self.end_depth = float(-self.solver.batch(
-            boxes.pose, sizes=boxes.size, pairs=pairs, patch=False).separation.min(
-                initial=0.0)) if len(pairs) else 0.0
-        self.deepest = max(self.deepest, self.end_depth)
-
-    def moved(self, boxes: Boxes) -> tuple[float, float]:
-        """Return how far [m] and by what angle [°] the farthest boxes have gone."""
-        free = boxes.mass > 0
-        way = np.linalg.norm(boxes.pose[free, :3] - self.start[free, :3], axis=1).max()
-        dots = np.abs((boxes.pose[free, 3:] * self.start[free, 3:]).sum(axis=1))
-        return float(way), float(np.degrees(2 * np.arccos(np.clip(dots, 0, 1))).max())
 
 
 @dataclass(frozen=True)
@@ -289,29 +70,51 @@ class Outcome:
 def run(make: Callable[[], Scene], timing: Timing | None) -> Outcome:
     """Run a scene by ours at a timing, or by MuJoCo with a step of 1 ms."""
     scene = make()
-    loop = Ours(scene, timing) if timing else Theirs(scene, STEP)
-    judge, steps = Judge(scene.boxes), round(scene.seconds / loop.step_size)
-    for tick in range(steps + 1):
-        if tick % JUDGED == 0:
-            judge.see(scene.boxes, tick * loop.step_size)
-            if not judge.end_speed < LOST_SPEED:
-                break
-        loop.step()
-    moved, turned = judge.moved(scene.boxes)
-    return Outcome(judge.rest, judge.end_speed, 1e3 * judge.deepest, 1e3 * judge.end_depth,
-                   1e3 * moved, turned, 1e6 * loop.spent / max(1, loop.tick))
+    boxes, start = scene.boxes, scene.boxes.pose.copy()
+    solver = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
+    rest, deepest = math.nan, 0.0
+    for loop in steps(scene, timing):
+        if loop.tick % JUDGED:
+            continue
+        speed = corner_speeds(boxes).max()
+        if not speed <= REST_SPEED:
+            rest = math.nan
+        elif math.isnan(rest):
+            rest = loop.tick * loop.step_size
+        pairs = near_pairs(boxes, 0.0)
+        depth = -solver.batch(boxes.pose, sizes=boxes.size, pairs=pairs, patch=False
+                              ).separation.min(initial=0.0)
+        deepest = max(deepest, depth)
+        if not speed < LOST_SPEED:
+            break
+    way, angle = moved(boxes, start)
+    return Outcome(rest, speed, 1e3 * deepest, 1e3 * depth, way.max(), angle.max(),
+                   1e6 * loop.spent / max(1, loop.tick))
+
+
+def moved(boxes: Boxes, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return how far [mm] and by what angle [°] the free boxes (n,) are from poses (m, 7)."""
+    free = boxes.mass > 0
+    pose, start = boxes.pose[free], start[free]
+    dots = np.abs((pose[:, 3:] * start[:, 3:]).sum(axis=1))
+    return (1e3 * np.linalg.norm(pose[:, :3] - start[:, :3], axis=1),
+            np.degrees(2.0 * np.arccos(np.clip(dots, 0.0, 1.0))))
+
+
+def stays(make: Callable[[], Scene], timing: Timing | None) -> np.ndarray:
+    """Return which free boxes (n,) of a scene end within `NEAR_MM` and `NEAR_DEG` of the start.
+
+    A timing of None is MuJoCo with a step of 1 ms.
+    """
+    scene = make()
+    start = scene.boxes.pose.copy()
+    for _ in steps(scene, timing):
+        pass
+    way, angle = moved(scene.boxes, start)
+    return (way < NEAR_MM) & (angle < NEAR_DEG)
 
 
 # --- scenes ---------------------------------------------------------------------------------------
-
-FLOOR = ((60.0, 60.0, 1.0), 0.0, (0.0, 0.0, -0.5))
-
-
-def about(axis: Sequence[float], degrees: float) -> np.ndarray:
-    """Return x y z w (4,) of a turn about an axis (3,)."""
-    half = 0.5 * math.radians(degrees)
-    return np.append(math.sin(half) * np.array(axis) / np.linalg.norm(axis), math.cos(half))
-
 
 def tower(count: int, edge: float = 0.5, jitter: float = 0.0, mass: float = 50.0) -> Scene:
     """Return cubes on each other, shifted by a share of the edge and turned about the vertical."""
@@ -321,7 +124,7 @@ def tower(count: int, edge: float = 0.5, jitter: float = 0.0, mass: float = 50.0
         x, y = jitter * edge * rng.uniform(-1, 1, 2)
         gap = 1e-4 * (k + 1) if jitter else 0.0
         rows.append(((edge,) * 3, mass, (x, y, edge * (k + 0.5) + gap),
-                     about((0, 0, 1), 100 * jitter * rng.uniform(-1, 1))))
+                     turned((0, 0, 1), math.radians(100 * jitter * rng.uniform(-1, 1)))))
     return Scene(f'tower of {count}' + (', jittered' if jitter else ''), Boxes.of(rows), 8.0)
 
 
@@ -367,7 +170,7 @@ def bars(layers: int = 15) -> Scene:
             at = (0.0, place) if layer % 2 else (place, 0.0)
             size = (1.0, 0.1, 0.1) if layer % 2 else (0.1, 1.0, 0.1)
             rows.append((size, 6.0, (*(at + 0.01 * rng.uniform(-1, 1, 2)), 0.1 * (layer + 0.5)),
-                         about((0, 0, 1), rng.uniform(-1, 1))))
+                         turned((0, 0, 1), math.radians(rng.uniform(-1, 1)))))
     return Scene('30 crossed bars', Boxes.of(rows), 5.0)
 
 
@@ -378,7 +181,7 @@ def mixed() -> Scene:
         size = rng.uniform(0.2, 1.0, 3)
         rows.append((size, 400 * float(np.prod(size)),
                      (*(0.02 * rng.uniform(-1, 1, 2)), height + 0.5 * size[2]),
-                     about((0, 0, 1), rng.uniform(-20, 20))))
+                     turned((0, 0, 1), math.radians(rng.uniform(-20, 20)))))
         height += size[2]
     return Scene('mixed sizes, 8', Boxes.of(rows), 5.0)
 
@@ -428,7 +231,7 @@ def ratio(heavy: float) -> Scene:
 def slope(kind: str) -> Scene:
     """Return boxes on a slope below the angle of friction and of tipping."""
     degrees = {'plate': 25.0, 'tall': 15.0, 'five': 8.0}[kind]
-    q = about((0, 1, 0), degrees)
+    q = turned((0, 1, 0), math.radians(degrees))
     up = rotation_matrix(q)[:, 2]
     sizes = {'plate': [(1.0, 1.0, 0.1)], 'tall': [(0.5, 0.5, 1.5)], 'five': [(0.5,) * 3] * 5}[kind]
     rows, height = [((20.0, 20.0, 1.0), 0.0, -0.5 * up, q)], 0.0
@@ -502,23 +305,6 @@ def sideways(order: str, share: float) -> Scene:
     return replace(scene, seconds=PUSHED, act=lambda *_: push)
 
 
-def stays(make: Callable[[], Scene], timing: Timing | None) -> np.ndarray:
-    """Return which free boxes (n,) of a scene end within `NEAR_MM` and `NEAR_DEG` of the start.
-
-    A timing of None is MuJoCo with a step of 1 ms.
-    """
-    scene = make()
-    loop = Ours(scene, timing) if timing else Theirs(scene, STEP)
-    start = scene.boxes.pose.copy()
-    for _ in range(round(scene.seconds / loop.step_size)):
-        loop.step()
-    free, pose = scene.boxes.mass > 0, scene.boxes.pose
-    way = 1e3 * np.linalg.norm(pose[:, :3] - start[:, :3], axis=1)
-    dots = np.abs((pose[:, 3:] * start[:, 3:]).sum(axis=1))
-    turned = np.degrees(2 * np.arccos(np.clip(dots, 0, 1)))
-    return ((way < NEAR_MM) & (turned < NEAR_DEG))[free]
-
-
 ORDERS = ('00100408', '00100001', '00100002', '00100003', '00100004')
 SCENES: tuple[Callable[[], Scene], ...] = (
     partial(tower, 20), partial(tower, 20, jitter=0.03), wall, pyramid, pile, bars, mixed, pallet,
@@ -530,23 +316,7 @@ SCENES: tuple[Callable[[], Scene], ...] = (
 QUICK = 5  # `--quick` runs every so-many-th scene
 
 
-class Timing(NamedTuple):
-    """The loop of a client: step of physics [s], rate of questions, and latency [s]."""
-
-    step: float
-    rate_hz: float
-    latency: float
-
-    def __str__(self) -> str:
-        return (f'{1e3 * self.step:g} ms, ' + ('each step' if self.rate_hz * self.step == 1.0 else
-                                               f'{self.rate_hz:g} Hz')
-                + (f', {1e3 * self.latency:g} ms late' if self.latency else ''))
-
-
-TIMINGS = (Timing(0.001, 1000.0, 0.0), Timing(0.004, 250.0, 0.0), Timing(0.001, 200.0, 0.0),
-           Timing(0.001, 200.0, 0.002), Timing(0.001, 50.0, 0.005))
 CONVERGED = Timing(0.0001, 10_000.0, 0.0)
-MUJOCO = 'MuJoCo, 1 ms'
 
 # --- the report -----------------------------------------------------------------------------------
 

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.stacks import ORDERS, TIMINGS, sideways, stays
+from benchmarks.loops import TIMINGS
+from benchmarks.stacks import ORDERS, sideways, stays
 
 
 @pytest.mark.parametrize('order', ORDERS)

@@ -1,0 +1,246 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Boxes that rest, slide and fall, a step at a time: by `PatchForces`, and by MuJoCo's own contact.
+
+`Ours` asks for contacts at a rate, gets the answers late, and asks for the forces at every step.
+`Theirs` runs the same boxes by MuJoCo. Both get the same outside forces.
+
+Lengths in m, masses in kg, times in s.
+"""
+from __future__ import annotations
+
+import logging
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from box_contact_ros import Body, ContactSolver, PatchForces
+from box_contact_ros.scene.laws import GRAVITY
+from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
+
+# MuJoCo would write warnings to a file MUJOCO_LOG.TXT in the working directory.
+mujoco.set_mju_user_warning(logging.getLogger(__name__).warning)
+
+STEP = 0.001  # of MuJoCo's physics
+SEARCHED = 10  # steps from one search of neighbours to the next
+CORNERS = 0.5 * np.array(list(product((-1, 1), repeat=3)))
+FLOOR = ((60.0, 60.0, 1.0), 0.0, (0.0, 0.0, -0.5))
+"""A row of `Boxes.of`, whose top is at z = 0."""
+
+Wrenches = Callable[[float, 'Boxes', np.ndarray, np.ndarray], np.ndarray]
+
+
+@dataclass
+class Boxes:
+    """Boxes of a scene, a row each: full extents, mass (0: fixed, or moved by its velocity)."""
+
+    size: np.ndarray  # (n, 3) [m]
+    mass: np.ndarray  # (n,) [kg]
+    pose: np.ndarray  # (n, 7) of the boxes' centres
+    centre: np.ndarray  # (n, 3) of mass, in the box's own frame [m]
+    velocity: np.ndarray  # (n, 6) of the centre of mass
+
+    @classmethod
+    def of(cls, rows: Sequence[tuple]) -> Boxes:
+        """Return boxes of rows (size, mass, position[, quaternion[, centre]])."""
+        n = len(rows)
+        pose = np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
+        centre = np.zeros((n, 3))
+        for k, (_, _, position, *more) in enumerate(rows):
+            pose[k, :3] = position
+            if more:
+                pose[k, 3:] = more[0]
+            if len(more) > 1:
+                centre[k] = more[1]
+        return cls(np.array([row[0] for row in rows], dtype=float),
+                   np.array([row[1] for row in rows], dtype=float), pose, centre, np.zeros((n, 6)))
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """Return principal moments (n, 3) of boxes of one density."""
+        squares = self.size**2
+        return self.mass[:, None] / 12.0 * (squares.sum(axis=1, keepdims=True) - squares)
+
+
+@dataclass
+class Scene:
+    """Boxes, and the wrenches (n, 6) that act on them beside weight and contacts."""
+
+    name: str
+    boxes: Boxes
+    seconds: float = 5.0
+    friction: float = 0.5
+    act: Wrenches | None = None
+
+
+class Timing(NamedTuple):
+    """The loop of a client: step of physics [s], rate of questions, and latency [s]."""
+
+    step: float
+    rate_hz: float
+    latency: float
+
+    def __str__(self) -> str:
+        return (f'{1e3 * self.step:g} ms, ' + ('each step' if self.rate_hz * self.step == 1.0 else
+                                               f'{self.rate_hz:g} Hz')
+                + (f', {1e3 * self.latency:g} ms late' if self.latency else ''))
+
+
+TIMINGS = (Timing(0.001, 1000.0, 0.0), Timing(0.004, 250.0, 0.0), Timing(0.001, 200.0, 0.0),
+           Timing(0.001, 200.0, 0.002), Timing(0.001, 50.0, 0.005))
+MUJOCO = 'MuJoCo, 1 ms'
+
+
+def move(boxes: Boxes, h: float) -> None:
+    """Advance the poses by their velocities."""
+    arm = np.einsum('nij,nj->ni', rotation_matrix(boxes.pose[:, 3:]), boxes.centre)
+    place = boxes.pose[:, :3] + arm + h * boxes.velocity[:, :3]
+    spin = boxes.velocity[:, 3:]
+    angle = np.linalg.norm(spin, axis=1, keepdims=True) * h
+    turn = np.hstack([0.5 * h * np.sinc(angle / (2 * np.pi)) * spin, np.cos(angle / 2)])
+    q = quaternion_multiply(turn, boxes.pose[:, 3:])
+    boxes.pose[:, 3:] = q / np.linalg.norm(q, axis=1, keepdims=True)
+    boxes.pose[:, :3] = place - np.einsum('nij,nj->ni', rotation_matrix(boxes.pose[:, 3:]),
+                                          boxes.centre)
+
+
+def near_pairs(boxes: Boxes, margin: float) -> np.ndarray:
+    """Return the pairs (k, 2) whose bounding boxes come within a margin; one of them moves."""
+    half = 0.5 * np.einsum('nij,nj->ni', np.abs(rotation_matrix(boxes.pose[:, 3:])), boxes.size)
+    low, high = boxes.pose[:, :3] - half - margin, boxes.pose[:, :3] + half
+    near = np.triu((low[:, None] <= high).all(axis=2) & (low <= high[:, None]).all(axis=2), 1)
+    moves = boxes.mass > 0
+    return np.argwhere(near & (moves[:, None] | moves))
+
+
+def corner_speeds(boxes: Boxes) -> np.ndarray:
+    """Return the speeds (n, 8) of the corners of the free boxes [m/s]."""
+    arm = np.einsum('nij,nkj->nki', rotation_matrix(boxes.pose[:, 3:]),
+                    CORNERS * boxes.size[:, None] - boxes.centre[:, None])
+    velocity = boxes.velocity[:, None]
+    return np.linalg.norm(velocity[:, :, :3] + np.cross(velocity[:, :, 3:], arm),
+                          axis=2)[boxes.mass > 0]
+
+
+class Ours:
+    """Contacts by the solver, forces by `PatchForces`."""
+
+    def __init__(self, scene: Scene, timing: Timing) -> None:
+        """Make solver and forces."""
+        boxes = self.boxes = scene.boxes
+        self.scene, self.step_size, self.latency = scene, timing.step, timing.latency
+        self.every = max(1, round(1.0 / (timing.rate_hz * timing.step)))
+        self.late = round(timing.latency / timing.step)
+        self.solver = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
+        self.forces = PatchForces(
+            [Body(mass=m, inertia=i, centre=c)
+             for m, i, c in zip(boxes.mass, boxes.inertia, boxes.centre)],
+            friction=scene.friction)
+        self.tick, self.spent = 0, 0.0
+        self.answers: deque = deque()
+        self.pairs = np.empty((0, 2), dtype=np.int64)
+        self.weight = np.zeros((len(boxes.mass), 6))
+        self.weight[:, 2] = -GRAVITY * boxes.mass
+
+    def step(self) -> None:
+        """Advance all boxes by a step."""
+        boxes, h = self.boxes, self.step_size
+        outside = self.weight
+        if self.scene.act:
+            outside = outside + self.scene.act(self.tick * h, boxes, boxes.pose, boxes.velocity)
+        start = time.perf_counter()
+        if self.tick % SEARCHED == 0:
+            fast = np.abs(boxes.velocity[:, :3]).max() + 0.5 * np.linalg.norm(
+                boxes.size, axis=1)[boxes.mass > 0].max() * np.abs(boxes.velocity[:, 3:]).max()
+            self.pairs = near_pairs(boxes, 2 * SEARCHED * h * (2 * fast + 0.1))
+        if self.tick % self.every == 0:
+            contacts = self.solver.batch(boxes.pose, sizes=boxes.size, pairs=self.pairs)
+            self.answers.append((self.tick + self.late, self.pairs, contacts, boxes.pose.copy()))
+        while self.answers and self.answers[0][0] <= self.tick:
+            self.forces.hold(*self.answers.popleft()[1:], age=self.latency)
+        boxes.velocity = self.forces.step(h, boxes.pose, boxes.velocity, outside)
+        self.spent += time.perf_counter() - start
+        move(boxes, h)
+        self.tick += 1
+
+
+class Theirs:
+    """The same scene by MuJoCo with contacts of its own."""
+
+    def __init__(self, scene: Scene, step: float) -> None:
+        boxes = self.boxes = scene.boxes
+        self.scene, self.step_size = scene, step
+        spec = mujoco.MjSpec()
+        spec.option.gravity = 0.0, 0.0, -GRAVITY
+        spec.option.timestep = step
+        spec.memory = 2**28
+        self.free = boxes.mass > 0
+        self.moves = self.free | boxes.velocity.any(axis=1)
+        for k in range(len(boxes.mass)):
+            x, y, z, qx, qy, qz, qw = boxes.pose[k]
+            body = spec.worldbody.add_body(pos=(x, y, z), quat=(qw, qx, qy, qz))
+            if self.moves[k]:
+                body.add_freejoint()
+                body.explicitinertial = True
+                body.mass = boxes.mass[k] or 1e3 * boxes.mass.max()
+                body.inertia = boxes.inertia[k] if self.free[k] else np.full(3, body.mass)
+                body.ipos = boxes.centre[k]
+                body.gravcomp = float(not self.free[k])
+            body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=0.5 * boxes.size[k],
+                          friction=(scene.friction, 0.005, 0.0001))
+        self.model = spec.compile()
+        self.data = mujoco.MjData(self.model)
+        self.tick, self.spent = 0, 0.0
+        self.bodies = 1 + np.flatnonzero(self.moves)
+        self._put_velocity(self.moves)
+
+    def _put_velocity(self, rows: np.ndarray) -> None:
+        boxes = self.boxes
+        arm = np.einsum('nij,nj->ni', rotation_matrix(boxes.pose[:, 3:]), boxes.centre)
+        linear = boxes.velocity[:, :3] - np.cross(boxes.velocity[:, 3:], arm)
+        local = np.einsum('nji,nj->ni', rotation_matrix(boxes.pose[:, 3:]), boxes.velocity[:, 3:])
+        both = np.hstack([linear, local])
+        which = rows[self.moves]
+        self.data.qvel.reshape(-1, 6)[which] = both[self.moves][which]
+
+    def step(self) -> None:
+        """Advance all boxes by a step."""
+        boxes, h = self.boxes, self.step_size
+        if self.scene.act:
+            push = self.scene.act(self.tick * h, boxes, boxes.pose, boxes.velocity)
+            self.data.xfrc_applied[self.bodies] = np.where(
+                self.free[self.moves, None], push[self.moves], 0.0)
+        driven = self.moves & ~self.free
+        if driven.any():
+            self._put_velocity(driven)
+        start = time.perf_counter()
+        mujoco.mj_step(self.model, self.data)
+        self.spent += time.perf_counter() - start
+        q = self.data.qpos.reshape(-1, 7)
+        boxes.pose[self.moves] = q[:, [0, 1, 2, 4, 5, 6, 3]]
+        v = self.data.qvel.reshape(-1, 6)
+        rotation = rotation_matrix(boxes.pose[self.moves, 3:])
+        spin = np.einsum('nij,nj->ni', rotation, v[:, 3:])
+        arm = np.einsum('nij,nj->ni', rotation, boxes.centre[self.moves])
+        new = np.hstack([v[:, :3] + np.cross(spin, arm), spin])
+        boxes.velocity[self.free] = new[self.free[self.moves]]
+        self.tick += 1
+
+
+def steps(scene: Scene, timing: Timing | None) -> Iterator[Ours | Theirs]:
+    """Run a scene by ours at a timing, or by MuJoCo; yield the loop before each step and last.
+
+    The scene's boxes are those of the loop.
+    """
+    loop = Ours(scene, timing) if timing else Theirs(scene, STEP)
+    for _ in range(round(scene.seconds / loop.step_size)):
+        yield loop
+        loop.step()
+    yield loop
