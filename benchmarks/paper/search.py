@@ -3,22 +3,27 @@
 
 """The paper's search for its two networks, by training thousands at once.
 
-It searches learning rate, momentum, hidden units and range of the initial weights, by successive
-halving, and ranks the settings in use, too. It writes a page of Markdown, a CSV of all candidates
-and a plot.
+Learning rate, momentum, hidden units and range of the initial weights are searched by successive
+halving (Jamieson and Talwalkar 2016), with the settings in use among them. All candidates are in
+the first rung. The better part goes on to a rung of more epochs. In each rung a network starts anew
+and its learning rate falls to zero, so finished trainings are compared.
+
+`python -m benchmarks.paper.search` takes 8 minutes on one core. It writes a page, a CSV of all
+candidates and a plot.
 """
 from __future__ import annotations
 
-import argparse
+import math
 import sys
 import time
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
+from tqdm import tqdm
 
 from box_contact_ros.core import native
 from box_contact_ros.solver.arguments import within
@@ -35,38 +40,58 @@ from ..output import (
 )
 from ..pose_sets import log_uniform
 from . import dataset
-from .fit import PaperSettings
-from .fit import fit as fit_paper
-from .halving import Candidate, CheckpointError, Rung, Rungs, Scores, Search, ranking
+from .fit import PaperSettings, fit
 from .jobs import JOBS, MIXTURE, PaperJob
 
 PACKAGES = ('numpy', 'torch')  # whose versions are named
+NAME = 'search_paper'  # of the files
 
 _CANDIDATES = 1001  # stream of random numbers
 QUICK_COUNTS = (400, 200, 200)  # patterns per set
+GROUP = 64  # candidates that are trained at once
 SHOWN = 1.5  # errors up to which networks are drawn [rad]: some diverge
 
+Scores = dict[str, float]
+"""What is known of a network after a rung; 'error' is what candidates are ranked by."""
 
-class PaperSearch(Search):
-    """The paper's search, for one of its networks."""
+
+@dataclass(frozen=True)
+class Candidate:
+    """Settings of one training."""
+
+    number: int
+    hidden: tuple[int, ...]
+    rate: float
+    momentum: float
+    initial: float
+    shipped: bool = False  # the settings in use: they go on to the end, to be compared with
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A stage: how many candidates are in it, and for how many epochs each is trained."""
+
+    candidates: int
+    epochs: int
+
+
+class Search:
+    """The search for one of the paper's networks."""
 
     def __init__(self, name: str, job: PaperJob, sets: dict[str, dataset.Patterns], *, seed: int,
                  count: int, quick: bool) -> None:
-        self.name, self.sets = name, sets
+        self.name, self.sets, self.settings = name, sets, job.settings
         # Other candidates for every network.
         self.seed = int(np.random.SeedSequence([seed, *name.encode()]).generate_state(1)[0])
-        self.settings = job.settings
-        plan = ([(count, 1), (max(count // 4, 4), 2)] if quick else
-                [(count, 8), (max(count // 4, 16), 32), (max(count // 16, 8), 120)])
-        self.rungs = [Rung(*entry, job.settings.batch, group=64) for entry in plan]
+        self.rungs = ([Rung(count, 1), Rung(max(count // 4, 4), 2)] if quick else
+                      [Rung(count, 8), Rung(max(count // 4, 16), 32),
+                       Rung(max(count // 16, 8), 120)])
+        self.candidates = self._drawn()
+        self.done: list[dict[int, Scores]] = []
+        """For each rung, the scores by the candidates' numbers."""
 
-    def cost(self, candidate: Candidate) -> int:
-        """Return the multiply-adds of its network."""
-        widths = (self.settings.widths[0], *candidate.hidden, self.settings.widths[-1])
-        return sum(a * b for a, b in zip(widths, widths[1:]))
-
-    def candidates(self) -> list[Candidate]:
-        """Return settings over the ranges in which trainings of this kind are made."""
+    def _drawn(self) -> list[Candidate]:
+        """Draw settings over the ranges in which trainings of this kind are made."""
         s = self.settings
         found = [Candidate(0, s.widths[1:3], s.rate, s.momentum, s.initial, shipped=True)]
         for number in range(1, self.rungs[0].candidates):
@@ -77,70 +102,109 @@ class PaperSearch(Search):
             found.append(Candidate(number, hidden, rate, 1.0 - friction, initial))
         return found
 
-    def train(self, rung: Rung, group: Sequence[Candidate], seed: int) -> list[Scores]:
+    def cost(self, candidate: Candidate) -> int:
+        """Return the multiply-adds of a candidate's network."""
+        widths = (self.settings.widths[0], *candidate.hidden, self.settings.widths[-1])
+        return sum(a * b for a, b in pairwise(widths))
+
+    def run(self) -> None:
+        """Go through all rungs. Every group of candidates of like cost has a seed of its own."""
+        alive = self.candidates
+        for number, rung in enumerate(self.rungs):
+            if number:
+                alive = survivors(alive, self.done[-1], rung.candidates)
+            ordered = sorted(alive, key=lambda one: (self.cost(one), one.number))
+            groups = [ordered[k:k + GROUP] for k in range(0, len(ordered), GROUP)]
+            scores: dict[int, Scores] = {}
+            for place, group in enumerate(tqdm(
+                    groups, mininterval=1.0, unit='group',
+                    desc=f'{self.name}, rung {number + 1} of {len(self.rungs)}')):
+                seed = np.random.SeedSequence([self.seed, number, place]).generate_state(1)[0]
+                scores |= self._train(rung, group, int(seed))
+            self.done.append(scores)
+
+    def _train(self, rung: Rung, group: Sequence[Candidate], seed: int) -> dict[int, Scores]:
         """Train by backpropagation with momentum; the error is the cross-validation RMSE [rad].
 
         Finalists also get their error on the external set.
         """
-        inputs, outputs = self.settings.widths[0], self.settings.widths[-1]
-        fitted = fit_paper(self.sets['training'], self.sets['cross-validation'], PaperSettings(
-            (inputs, *map(max, zip(*(one.hidden for one in group))), outputs),
-            networks=len(group), epochs=rung.effort, batch=rung.batch,
+        s = self.settings
+        fitted = fit(self.sets['training'], self.sets['cross-validation'], PaperSettings(
+            (s.widths[0], *map(max, zip(*(one.hidden for one in group))), s.widths[-1]),
+            networks=len(group), epochs=rung.epochs, batch=s.batch,
             rate=[one.rate for one in group], momentum=[one.momentum for one in group],
             initial=[one.initial for one in group], hidden=[one.hidden for one in group],
-            wrap=self.settings.wrap, seed=seed))
-        scores = [{'error': error} for error in fitted.error.tolist()]
+            wrap=s.wrap, seed=seed))
+        errors = {'error': fitted.error.tolist()}
         if rung == self.rungs[-1]:
-            for score, error in zip(scores, fitted.errors(self.sets['external']).tolist()):
-                score['external'] = error
-        return scores
+            errors['external'] = fitted.errors(self.sets['external']).tolist()
+        return {one.number: dict(zip(errors, values))
+                for one, *values in zip(group, *errors.values())}
+
+    def settings_of(self, one: Candidate) -> dict[str, float]:
+        """Return the settings that the search varies, by their names on the page."""
+        return {'multiply-adds': self.cost(one), 'learning rate': one.rate,
+                'momentum': one.momentum, 'initial range': one.initial}
 
 
-def paper_searches(*, seed: int, count: int, quick: bool) -> list[PaperSearch]:
+def ranking(candidates: Sequence[Candidate], scores: Mapping[int, Scores]) -> list[Candidate]:
+    """Return candidates in the order of their errors; networks that diverged come last."""
+    def order(one: Candidate) -> tuple[bool, float, int]:
+        error = scores[one.number]['error']
+        return not math.isfinite(error), error, one.number
+
+    return sorted(candidates, key=order)
+
+
+def survivors(candidates: Sequence[Candidate], scores: Mapping[int, Scores], count: int,
+              ) -> list[Candidate]:
+    """Return the settings in use, and the best of the others, `count` in all."""
+    shipped = [one for one in candidates if one.shipped]
+    others = ranking([one for one in candidates if not one.shipped], scores)
+    return shipped + others[:count - len(shipped)]
+
+
+def searches(*, seed: int, count: int, quick: bool) -> list[Search]:
     """Return one for the network with discontinuities, and one for a subset of that without.
 
     Both are on the patterns of Tables 1 and 2, each with half of the candidates.
     """
-    common: dict[str, Any] = {'seed': seed, 'quick': quick, 'count': count // 2}
     counts, subset_counts = ((QUICK_COUNTS,) * 2 if quick else
                              (dataset.PAPER_COUNTS, dataset.CONTINUOUS_COUNTS))
     whole = dataset.paper(seed, counts=counts, folded_in=False, kept=MIXTURE)
     subsets = dataset.by_subset(seed, dataset.NO_FOLD, counts=subset_counts, kept=MIXTURE)
-    return [PaperSearch('with discontinuities', JOBS['table-1-mixture'], whole, **common),
-            PaperSearch('without, signs +++', JOBS['table-2-by-signs'], subsets['+++'], **common)]
+    return [Search(name, JOBS[job], sets, seed=seed, count=count // 2, quick=quick)
+            for name, job, sets in (
+                ('with discontinuities', 'table-1-mixture', whole),
+                ('without, signs +++', 'table-2-by-signs', subsets['+++']))]
 
 
-def settings_of(search: Search, one: Candidate) -> dict[str, float]:
-    """Return the settings that the search varies, by their names on the page."""
-    return {'multiply-adds': search.cost(one), 'learning rate': one.rate,
-            'momentum': one.momentum, 'initial range': one.initial}
-
-
-def section(search: Search, done: Rungs) -> str:
+def section(search: Search) -> str:
     """Return a search's rungs, its best finalists and the rank of the settings in use."""
-    last = done[-1]
-    ranked = ranking([one for one in search.candidates() if one.number in last], last)
+    last = search.done[-1]
+    ranked = ranking([one for one in search.candidates if one.number in last], last)
     rank = next(place for place, one in enumerate(ranked, start=1) if one.shipped)
     shown = [one for place, one in enumerate(ranked) if place < 8 or one.shipped]
     rows = [['-'.join(map(str, one.hidden)) + (', in use' if one.shipped else ''),
-             *(f'{value:.4g}' for value in (*settings_of(search, one).values(),
+             *(f'{value:.4g}' for value in (*search.settings_of(one).values(),
                                             *last[one.number].values()))] for one in shown]
-    rungs = markdown_table(['rung', 'candidates', 'steps or epochs', 'batch'], [
-        [number, f'{rung.candidates:,}', f'{rung.effort:,}', rung.batch]
+    rungs = markdown_table(['rung', 'candidates', 'epochs', 'batch'], [
+        [number, f'{rung.candidates:,}', rung.epochs, search.settings.batch]
         for number, rung in enumerate(search.rungs, start=1)], words=0)
-    found = markdown_table(['hidden units', *settings_of(search, ranked[0]), *last[0]], rows,
+    found = markdown_table(['hidden units', *search.settings_of(ranked[0]), *last[0]], rows,
                            words=0)
     return (f'\n## {search.name}\n\n{rungs}\n\nThe best finalists.\n\n{found}\n\n'
             f'The settings in use are {rank} of {len(ranked)} finalists. The best has '
             f'{last[ranked[0].number]["error"]:.4g}, they have {last[0]["error"]:.4g}.\n')
 
 
-def write_table(path: Path, results: Sequence[tuple[Search, Rungs]]) -> None:
+def write_table(path: Path, results: Sequence[Search]) -> None:
     """Write all candidates of all searches, with the scores of their last rung."""
     rows = []
-    for search, done in results:
-        for one in search.candidates():
-            entry, scores = asdict(one), [rung[one.number] for rung in done if one.number in rung]
+    for search in results:
+        for one in search.candidates:
+            entry = asdict(one)
+            scores = [rung[one.number] for rung in search.done if one.number in rung]
             units = {f'hidden_{k}': width for k, width in enumerate(entry.pop('hidden'), start=1)}
             rows.append({'search': search.name, 'number': entry.pop('number'), **units,
                          'multiply_adds': search.cost(one), **entry, 'rungs': len(scores),
@@ -148,74 +212,51 @@ def write_table(path: Path, results: Sequence[tuple[Search, Rungs]]) -> None:
     write_csv(path, rows, about=machine(native, PACKAGES))
 
 
-def plot(path: Path, results: Sequence[tuple[Search, Rungs]]) -> None:
+def plot(path: Path, results: Sequence[Search]) -> None:
     """Draw the error of each network after its last rung against its size, where it converged."""
-    name = 'multiply-adds'
     figure, panels = subplots(1, len(results), (3.3 * len(results), 3.3), sharey=True)
-    for panel, (search, done) in zip(panels[0], results):
-        some = search.candidates()
+    for panel, search in zip(panels[0], results):
+        done = search.done
         for number, rung in enumerate(done, start=1):
-            left = [one for one in some if one.number in rung and rung[one.number]['error'] < SHOWN
+            left = [one for one in search.candidates
+                    if one.number in rung and rung[one.number]['error'] < SHOWN
                     and not (number < len(done) and one.number in done[number])]
-            panel.scatter([settings_of(search, one)[name] for one in left],
+            panel.scatter([search.cost(one) for one in left],
                           [rung[one.number]['error'] for one in left], s=5, linewidths=0,
                           color=f'C{number}', label=f'last rung: {number}')
-        panel.plot(settings_of(search, some[0])[name], done[-1][0]['error'], 'k*', markersize=11,
+        panel.plot(search.cost(search.candidates[0]), done[-1][0]['error'], 'k*', markersize=11,
                    label='in use')
-        panel.set(title=search.name, xlabel=f'{name} of the network')
+        panel.set(title=search.name, xlabel='multiply-adds of the network')
     panels[0, 0].set_ylabel('RMSE over the angles [rad]')
     panels[0, 0].legend(fontsize=8)
     figure.savefig(path)
 
 
-def _options(args: Sequence[str] | None) -> argparse.Namespace:
-    parser = report_parser(
-        'python -m benchmarks.paper.search',
-        'Train thousands of networks at once, keep the best, train those longer.\n\n'
-        'Measured on one core: 8 minutes.\n\n'
-        'Stopped, it goes on from its checkpoint file when it is started again with the same\n'
-        'options, and ends with the same result.', seed=1,
-        out='page, table, plot and, until the end, the checkpoint',
-        quick='little data and two short rungs, to try it out in seconds')
+def main(args: Sequence[str] | None = None) -> int:
+    """Search, and write what was found."""
+    parser = report_parser('python -m benchmarks.paper.search', __doc__, seed=1,
+                           out='page, table and plot',
+                           quick='little data and two short rungs, to try it out in seconds')
     parser.add_argument('--candidates', type=within(16), default=2048, metavar='N',
                         help='networks to begin with (default 2048); the time grows with them')
     options = parser.parse_args(args)
-    options.out = results_folder(parser, options)
-    return options
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Search, and write what was found."""
-    options = _options(args)
-    import matplotlib  # noqa: F401  (if it is missing, that is said now)
+    folder = results_folder(parser, options)
     torch.set_num_threads(1)  # matrices this small gain little from more
     began = time.monotonic()
-    searches = paper_searches(seed=options.seed, count=options.candidates, quick=options.quick)
-    name = 'search_paper'
-    checkpoints = [options.out / f'{name}_{k}.checkpoint' for k in range(len(searches))]
-    results: list[tuple[Search, Rungs]] = []
-    for search, checkpoint in zip(searches, checkpoints):
-        if checkpoint.exists():
-            print(f'going on from {checkpoint}')
-        try:
-            results.append((search, search.run(checkpoint)))
-        except CheckpointError as error:
-            print(f'search: {error}', file=sys.stderr)
-            return 1
+    results = searches(seed=options.seed, count=options.candidates, quick=options.quick)
+    for search in results:
+        search.run()
     made = (f'Made by `{command_line("benchmarks.paper.search", args)}` in '
             f'{(time.monotonic() - began) / 60.0:.1f} minutes on '
             f'{machine(native, PACKAGES)}.')
     text = page('benchmarks/paper/pages/search', made=made,
-                total=sum(len(done[0]) for _, done in results), external=' and '.join(
-            f'{len(search.sets["external"]):,} patterns' for search in searches))
-    text += f'\n![Settings and errors]({name}.png)\n' + ''.join(
-        section(*result) for result in results)
-    text += f'\nAll candidates: [{name}.csv]({name}.csv).\n'
-    (options.out / f'{name}.md').write_text(text, 'utf-8')
-    write_table(options.out / f'{name}.csv', results)
-    plot(options.out / f'{name}.png', results)
-    for path in checkpoints:
-        path.unlink()
+                total=sum(len(search.candidates) for search in results), external=' and '.join(
+            f'{len(search.sets["external"]):,} patterns' for search in results))
+    text += f'\n![Settings and errors]({NAME}.png)\n' + ''.join(map(section, results))
+    text += f'\nAll candidates: [{NAME}.csv]({NAME}.csv).\n'
+    (folder / f'{NAME}.md').write_text(text, 'utf-8')
+    write_table(folder / f'{NAME}.csv', results)
+    plot(folder / f'{NAME}.png', results)
     print(text)
     return 0
 
