@@ -13,12 +13,14 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from box_contact_ros.core import FORCE
+from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix
@@ -29,6 +31,8 @@ MODELS = ('exact', 'mlp', 'paper', *(f'soup-{n}' for n in (8, 10, 12, 14, 16, 18
 """Our contestants; the soups are those of the paper's Table 3."""
 CORE_MODELS = ('exact', 'mlp')
 """Models in C++ with volume and covariance: each instruction set of the machine is measured."""
+SIZES_FOLDER = Path(__file__).with_name('mlp_sizes')
+"""Weights of other sizes of the network of `mlp`: `python -m training mlp --sizes`."""
 ENDING = 5.0  # time that a subprocess has to end after its answer [s]
 MOST_CONTACTS = 16  # contacts asked for; two boxes have at most eight
 
@@ -126,8 +130,16 @@ def ours(model: Any, *, weights: str | None = None, name: str = '') -> Contestan
     return Contestant(
         name=name, patch='volume, covariance', choices=('its point',), boxes=solver,
         at=lambda a, b: (a, b), read=read, solve=solve,
-        any_boxes=name != 'paper' and not hasattr(model, 'size_fault'),
+        any_boxes=model != 'paper' and not hasattr(model, 'size_fault'),
         prepare_batch=None if name.startswith('soup') else prepare_batch)  # it loops over pairs
+
+
+def other_networks() -> list[Contestant]:
+    """Return `mlp` by its other sizes, and `paper` on containers with x, y and z as outputs."""
+    place = resource_path('weights', 'paper-12.192x2.438x2.591-place.safetensors')
+    return [*(ours('mlp', weights=str(path), name=path.stem)
+              for path in sorted(SIZES_FOLDER.glob('mlp-*.safetensors'))),
+            ours('paper', weights=str(place), name='paper-place')]
 
 
 def _deepest(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> np.ndarray:

@@ -23,11 +23,21 @@ from inspect import getdoc
 from pathlib import Path
 
 from box_contact_ros.core import instruction_sets, native
+from box_contact_ros.solver.mlp import GROUP, load_mlp
 
 from . import output
 from .accuracy import CLASSES, WINNERS, Summary
 from .arguments import report_parser
-from .contestant import CORE_MODELS, MODELS, Contestant, in_subprocess, ours, packages_of
+from .contestant import (
+    CORE_MODELS,
+    MODELS,
+    SIZES_FOLDER,
+    Contestant,
+    in_subprocess,
+    other_networks,
+    ours,
+    packages_of,
+)
 from .engines import installed
 from .output import markdown_table, number
 from .pose_sets import SETS, apart
@@ -45,18 +55,23 @@ from .trials import (
 )
 
 TIMED_SETS = {**SETS, 'just apart': apart}
-IN_SHORT = ('exact', 'mlp', 'paper', 'soup-8', 'soup-22')
-"""Models in the first table, and with `--quick` all that are measured but the last."""
+IN_SHORT = ('exact', 'mlp', 'paper', 'paper-place', 'soup-8', 'soup-22')
+"""Models in the first table."""
+QUICK_MODELS = ('exact', 'mlp', 'paper', 'soup-8')
 ODD_NORMAL = 10.0  # error of an engine's normal that is explained [deg]
 
-SHOWN_SET, EDGE = 'containers', 12.192e3
-"""The set of poses that is drawn, and its longest edge [mm], which errors are a share of."""
-SHOWN = {'exact': ('exact', 'C0'), 'mlp': ('mlp', 'C0'),
-         'paper': ("the paper's network", 'C4'), 'soup-8': ('polygon soup, N = 8', 'C5'),
-         'MuJoCo mj_collision': ('MuJoCo, best of its points', 'C1')}
-"""Contestant: how the picture calls it, and its colour."""
-ERRORS = (0.1, 1e4)
-"""Errors that are drawn to scale [mm]; 0 has a band of its own below."""
+SIZES = ('mlp-16-16', 'mlp-20-18', 'mlp', 'mlp-32-32')
+"""The network of `mlp` by size; the shipped one has 24-24."""
+SHOWN = {'exact': ('exact', 'C0', 0), **dict.fromkeys(SIZES, ('mlp, four sizes', 'C2', 0)),
+         'paper': ("the paper's network", 'C4', 4),
+         'paper-place': ('the same, output x y z', 'C4', -2),
+         'soup-8': ('polygon soup, N = 8', 'C5', -5),
+         'MuJoCo mj_collision': ('MuJoCo, best point', 'C1', 0)}
+"""Contestant: how the picture calls it, its colour, and how much higher the name stands [pt]."""
+PANELS = {'containers': 'A 12 m container on another, swaying', 'random cubes': 'Cubes in any pose'}
+"""The sets of poses that are drawn, with the titles."""
+ERRORS = (1e-2, 1e2)
+"""Errors that are drawn to scale [%]; 0 has a band of its own below."""
 TIMES = (0.3, 2e4)
 """Times that the picture shows [µs]: names stand on the right of their points."""
 
@@ -98,9 +113,9 @@ def in_short(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> str:
                                              if row.name == name):
             mine = {row.set: row for row in rows
                     if (row.name, row.instruction_set) == (name, instruction_set)}
-            if SHOWN_SET not in mine:
+            if 'containers' not in mine:
                 continue
-            shown, stack = mine[SHOWN_SET], mine.get('stacks')
+            shown, stack = mine['containers'], mine.get('stacks')
             normals = [row.errors.normal[1] for row in mine.values()
                        if not math.isnan(row.errors.normal[1])]
             lines.append([
@@ -119,6 +134,28 @@ def in_short(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> str:
         ['', 'single call, p50 / p99 [µs]', 'batch [ns per pair]', 'best point',
          'point error p99, containers [%]', 'stacks [%]', 'normal, worst [°]', 'missed', 'invented',
          'exceptions / aborts'], lines)
+
+
+def sizes_table(rows: Sequence[FrontierRow]) -> str:
+    """Return the network of `mlp` by size: its times by that of `exact`, and its errors."""
+    by = {(row.name, row.set): row for row in rows if row.instruction_set == native.instruction_set}
+    lines = []
+    for name in SIZES:
+        shown, stack = by[name, 'containers'], by[name, 'stacks']
+        shipped = name == 'mlp'
+        card = (load_mlp() if shipped else load_mlp(str(SIZES_FOLDER / f'{name}.safetensors'))).card
+        units, metrics = card['architecture'][1:3], card['metrics']
+        lines.append([
+            '-'.join(map(str, units)) + (', shipped' if shipped else ''),
+            '-'.join(str(GROUP * -(-unit // GROUP)) for unit in units),
+            *(f'{ratio:.2f}' for ratio in (*by_exact(shown, rows), by_exact(stack, rows)[1])),
+            *(number(row.errors.points['all'].p99) for row in (shown, stack)),
+            *(number(metrics[of_set][quantity]['p99']) for quantity in ('volume', 'covariance')
+              for of_set in ('containers', 'stacks'))])
+    return markdown_table(
+        ['units', 'computed', 'a call', 'batch, containers', 'stacks', 'point p99, containers [%]',
+         'stacks', 'volume p99, containers [%]', 'stacks', 'covariance p99, containers [%]',
+         'stacks'], lines)
 
 
 def calls_table(engines: Iterable[Contestant]) -> str:
@@ -156,7 +193,7 @@ def page(rows: Sequence[FrontierRow], models: Sequence[Contestant], engines: Seq
         'benchmarks/pages/frontier', command=command,
         machine=output.machine(native, packages_of([*models, *engines])),
         skipped=''.join(f'\n\nLeft out: {line}.' for line in missing),
-        in_short=in_short(rows, engines), odd='\n'.join(
+        in_short=in_short(rows, engines), sizes=sizes_table(rows), odd='\n'.join(
             f'{place}. {line}' for place, line in enumerate(odd_answers(rows, engines), start=1)
         ) or 'None.',
         single=by_exact(by['mlp', 'containers'], rows)[0],
@@ -195,36 +232,38 @@ def csv_rows(rows: Sequence[FrontierRow], contestants: Sequence[Contestant],
                     'instruction_set': row.instruction_set}
 
 
-def shown_points(table: Path) -> dict[str, tuple[float, float]]:
-    """Return the time of a call [µs] and the p99 point error [mm] of each contestant of a CSV.
+def shown_points(table: Path, of_set: str) -> dict[str, tuple[float, float]]:
+    """Return the time of a call [µs] and the p99 point error [%] by contestant, from a CSV.
 
     An engine with several ways to make one point has the best of them. Models have the fastest
     instruction set, whose rows come first.
     """
     points: dict[str, tuple[float, float]] = {}
     for row in output.read_csv(table):
-        if row['set'] == SHOWN_SET and row['class'] == 'all' and row['contestant'] in SHOWN:
-            time, error = float(row['call_p50']) / 1e3, float(row['point_p99']) * EDGE / 100.0
+        if row['set'] == of_set and row['class'] == 'all' and row['contestant'] in SHOWN:
+            time, error = float(row['call_p50']) / 1e3, float(row['point_p99'])
             before = points.get(row['contestant'], (time, math.inf))
             points[row['contestant']] = before[0], min(before[1], error)
     return points
 
 
 def draw(path: Path, table: Path) -> None:
-    """Draw the point error of five contestants over the time of a call, from the CSV."""
-    figure = output.figure((6.4, 4.2))
-    axis = figure.subplots()
-    height = output.log_errors(axis, *ERRORS)
-    axis.set_xscale('log')
-    axis.xaxis.set_major_formatter('{x:g}')
-    axis.set(xlim=TIMES, xlabel='time of a call from Python [µs]',
-             ylabel='point error, p99 [mm]',
-             title='A 12 m container on another: error and time')
-    for name, (time, error) in shown_points(table).items():
-        label, colour = SHOWN[name]
-        axis.plot(time, height(error), 'o', color=colour, markersize=8)
-        axis.annotate(label, (time, height(error)), xytext=(9, 0), textcoords='offset points',
-                      va='center', color=colour, fontsize=11)
+    """Draw the point error of some contestants over the time of a call, from the CSV."""
+    figure, axes = output.subplots(1, len(PANELS), (10.5, 4.4), sharey=True)
+    for axis, (of_set, title) in zip(axes[0], PANELS.items()):
+        height = output.log_errors(axis, *ERRORS)
+        axis.set_xscale('log')
+        axis.xaxis.set_major_formatter('{x:g}')
+        axis.set(xlim=TIMES, xlabel='time of a call from Python [µs]', title=title)
+        named = set()
+        for name, (time, error) in shown_points(table, of_set).items():
+            label, colour, rise = SHOWN[name]
+            axis.plot(time, height(error), 'o', color=colour, markersize=7, alpha=0.7)
+            if label not in named:
+                axis.annotate(label, (time, height(error)), xytext=(9, rise), va='center',
+                              textcoords='offset points', color=colour, fontsize=10)
+            named.add(label)
+    axes[0, 0].set_ylabel('point error, p99 [% of the edge]')
     figure.savefig(path, metadata={'Software': None})
 
 
@@ -234,8 +273,8 @@ def main(args: Sequence[str] | None = None) -> int:
                            seed=3, out='frontier.md, .csv, .png')
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
-    plan, names = (QUICK, IN_SHORT[:-1]) if options.quick else (FULL, MODELS)
-    models, (engines, missing) = list(map(ours, names)), installed()
+    plan, names = (QUICK, QUICK_MODELS) if options.quick else (FULL, MODELS)
+    models, (engines, missing) = [*map(ours, names), *other_networks()], installed()
     for line in missing:
         print(f'frontier: left out: {line}', file=sys.stderr)
     with pinned({usable_cores()[-1]}):

@@ -4,6 +4,7 @@
 """Make the data, fit the networks, write the weights files with their model cards.
 
 mlp                      any two boxes; the default
+mlp --sizes              other sizes of its network, which the report frontier compares
 paper                    two boxes of edge 2 that just touch, as the paper draws them
 paper --scene NAME       two equal boxes in the poses of a scene
 paper-…, table-1-…       what only the tables of benchmarks.paper need
@@ -20,6 +21,7 @@ from pathlib import Path
 import torch
 
 from benchmarks.arguments import report_parser
+from benchmarks.contestant import SIZES_FOLDER
 from benchmarks.output import QUICK_RESULTS, make_folder
 from benchmarks.paper import jobs
 from box_contact_ros.core import UNITS_MAX
@@ -46,12 +48,14 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--hidden', type=within(1, UNITS_MAX), nargs=2, metavar='UNITS',
                         help=f'units of the hidden layers of mlp (default: {recipe.HIDDEN[0]} '
                         f'{recipe.HIDDEN[1]}), named in the file')
+    parser.add_argument('--sizes', action='store_const', const=recipe.SIZES,
+                        help='mlp with each of the other sizes of its hidden layers')
     parser.add_argument('--scene', choices=paper.SCENES, help='pose set that paper is trained for')
     parser.add_argument('--output', choices=tuple(paper.SETTINGS), default=paper.ANGLES,
                         help='of paper --scene: four angles, or x, y and z of the point')
     parser.add_argument('--out', type=Path, metavar='DIR',
-                        help='folder to write to (default: weights/, benchmarks/paper/weights/ for '
-                        'what the tables alone need, and quick-results/ with --quick)')
+                        help='folder to write to (default: weights/, benchmarks/ for what reports '
+                        'alone need, and quick-results/ with --quick)')
     options = parser.parse_args(args)
     options.what = options.what or [MLP]
     if options.scene and options.what != [PAPER]:
@@ -72,14 +76,15 @@ def _commit() -> str:
     return done.stdout.strip()
 
 
-def _train_mlp(options: argparse.Namespace) -> None:
-    hidden = tuple(options.hidden or recipe.HIDDEN)
-    name = '-'.join((MLP, *map(str, options.hidden or ())))
-    path = (options.out or jobs.SHIPPED) / f'{name}.safetensors'
+def _train_mlp(options: argparse.Namespace, hidden: tuple[int, int] | None = None) -> None:
+    """Train the shipped network, or one of other hidden layers."""
+    name = '-'.join((MLP, *map(str, hidden or ())))
+    folder = options.out or (SIZES_FOLDER if hidden else jobs.SHIPPED)
+    path = folder / f'{name}.safetensors'
     card = recipe.train(path, seed=options.seed, commit=_commit(), quick=options.quick,
-                        hidden=hidden)
+                        hidden=hidden or recipe.HIDDEN)
     print(f'{path}, {card["training"]["minutes"]} min\n{recipe.metrics_table(card)}')
-    if name == MLP and options.out is None:
+    if hidden is None and options.out is None:
         network = load_weights(path).networks[NETWORK]
         SHIPPED_HEADER.write_text(recipe.header(network.layers), encoding='utf-8')
         print(f'{SHIPPED_HEADER}: build the library anew')
@@ -108,7 +113,8 @@ def main(args: Sequence[str] | None = None) -> int:
     torch.set_num_threads(1)  # matrices this small gain nothing from more
     for name in dict.fromkeys(options.what):
         if name == MLP:
-            _train_mlp(options)
+            for hidden in options.sizes or [options.hidden and tuple(options.hidden)]:
+                _train_mlp(options, hidden)
         elif options.scene:
             _train_scene(options)
         else:

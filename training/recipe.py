@@ -36,6 +36,8 @@ FEATURE_NAMES = (
 """Features of the chords of a contact (core/src/mlp/chords.hpp)."""
 HIDDEN = (24, 24)
 """Units of both hidden layers."""
+SIZES = ((16, 16), (20, 18), (32, 32))
+"""The other sizes that the report `frontier` compares."""
 HARD_START, HARD_COUNT = 200_000, 3_000
 """Pairs drawn for each search, which climbs from the HARD_COUNT worst."""
 HARD_SHARE = 30

@@ -118,3 +118,22 @@ def test_quick_training(quick: Path, data: MlpSamples) -> None:
             zero.zero_()
         one, other = (errors_of(network, tensors(data)) for network in (learned, body))
     assert loss_of(one) < loss_of(other)
+
+
+def test_other_sizes_go_to_the_benchmarks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each under its own name, and the compiled-in weights stay as they are."""
+    trained: dict[str, tuple[int, int]] = {}
+
+    def train_one(path: Path, *, hidden: tuple[int, int], **_: object) -> dict[str, Any]:
+        trained[path.name] = hidden
+        assert path.parent == tmp_path
+        return {**load_mlp().card, 'training': {'minutes': 0.0}}
+
+    monkeypatch.setattr(recipe, 'train', train_one)
+    monkeypatch.setattr(train, 'SIZES_FOLDER', tmp_path)
+    monkeypatch.setattr(train, 'SHIPPED_HEADER', tmp_path / 'unwritten.hpp')
+    assert train.main(['mlp', '--sizes']) == 0
+    assert train.main(['mlp', '--hidden', '3', '5']) == 0
+    assert trained == {**{f'mlp-{a}-{b}.safetensors': (a, b) for a, b in recipe.SIZES},
+                       'mlp-3-5.safetensors': (3, 5)}
+    assert not list(tmp_path.iterdir())
