@@ -106,24 +106,10 @@ class Stop:
 
     def __init__(self) -> None:
         self.signals: list[int] = []
-        self._raises = False
 
     def take(self, number: int, _frame: Any) -> None:
-        """Note a signal; raise KeyboardInterrupt within `interrupting`."""
+        """Note a signal."""
         self.signals.append(number)
-        if self._raises:
-            raise KeyboardInterrupt
-
-    @contextlib.contextmanager
-    def interrupting(self) -> Iterator[None]:
-        """Let signals interrupt the block, which starts nothing that would be left behind."""
-        self._raises = True
-        try:
-            if self.signals:
-                raise KeyboardInterrupt
-            yield
-        finally:
-            self._raises = False
 
     def is_set(self) -> bool:
         """Return whether a signal came."""

@@ -105,23 +105,18 @@ class GuardedNode(Node):
                 return type(response)()  # nothing in it says success
         return answered
 
-    def may_log(self, reason: str) -> bool:
-        """Return whether no line for a reason was logged within LOG_SECONDS."""
-        now = time.monotonic()
-        if now < self._silent_until.get(reason, 0.0):
-            return False
-        self._silent_until[reason] = now + LOG_SECONDS
-        return True
-
     def _complain(self, what: str, error: Exception) -> None:
-        if self.may_log(getattr(error, 'reason', type(error).__name__)):
-            logger, line = self.get_logger(), f'{what}: {reason_of(error)}; ignored'
-            # Two lines of code: rclpy refuses another severity from the same one.
-            if isinstance(error, ValueError):  # a refusal
-                logger.warning(line)
-            else:
-                logger.error(line)
-            logger.debug(''.join(traceback.format_exception(error)))
+        now, reason = time.monotonic(), getattr(error, 'reason', type(error).__name__)
+        if now < self._silent_until.get(reason, 0.0):
+            return
+        self._silent_until[reason] = now + LOG_SECONDS
+        logger, line = self.get_logger(), f'{what}: {reason_of(error)}; ignored'
+        # Two lines of code: rclpy refuses another severity from the same one.
+        if isinstance(error, ValueError):  # a refusal
+            logger.warning(line)
+        else:
+            logger.error(line)
+        logger.debug(''.join(traceback.format_exception(error)))
 
 
 def spin_for(node: Node, executor: Any, seconds: float) -> None:

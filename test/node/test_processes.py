@@ -60,23 +60,6 @@ def test_a_signal_ends_the_wait_and_says_the_status(number):
     assert len(stop.signals) == 2
 
 
-def test_a_signal_before_what_it_would_interrupt():
-    with processes.asked_to_end() as stop:
-        os.kill(os.getpid(), signal.SIGTERM)
-        assert stop.wait(1.0)
-        with pytest.raises(KeyboardInterrupt), stop.interrupting():
-            raise AssertionError('it went on')
-    assert stop.status == 143
-
-
-def test_a_flag_interrupts_nothing_outside():
-    stop = processes.Stop()
-    with stop.interrupting():
-        pass
-    stop.take(signal.SIGTERM, None)
-    assert stop.is_set()
-
-
 def test_without_a_signal_the_handlers_come_back():
     before = signal.getsignal(signal.SIGINT)
     with processes.asked_to_end():
