@@ -72,13 +72,6 @@ def test_answers_with_point_normal_and_contacts(node, client):
         'contact/point', 'contact/normal', 'contacts']
 
 
-def test_no_contact_is_an_empty_message(node, client):
-    stamp = client.ask(ORIGIN, APART)
-    message = client.contacts[stamp]
-    assert not message.contacts and not message.stale
-    assert stamp not in client.points and stamp not in client.normals
-
-
 def test_poses_pair_by_stamp_in_any_order(node, client):
     """B far ahead of A: each stamp is answered once, with its own poses."""
     stamps = [client.next_stamp() for _ in range(50)]
@@ -91,32 +84,6 @@ def test_poses_pair_by_stamp_in_any_order(node, client):
     for stamp in stamps:
         contact = contacts_by_pair(client.contacts[stamp])[PAIR]
         assert -contact.separation == pytest.approx(2 - heights[stamp], abs=1e-14)
-
-
-def test_latest_pairing_answers_every_pose(client):
-    with serving(lambda context: ContactNode(
-            context, parameter_overrides=overrides(pairing='latest'))):
-        client.offer_until_answered(ORIGIN, APART)
-        assert client.answer(ORIGIN) == {}
-        assert PAIR in client.answer(None, TOUCHING)
-
-
-def test_bad_poses_are_refused_counted_and_never_answered(node, client):
-    """NaN, infinite, zero and huge poses: no answer, a count by reason; then all is well again."""
-    bad = [(math.nan, 0, 0, 0, 0, 0, 1), (0, 0, math.inf, 0, 0, 0, 1), (0, 0, 0, 0, 0, 0, 0),
-           (0, 0, 0, 0, math.nan, 0, 1), (1e300, 0, 0, 0, 0, 0, 1)]
-    refused = [client.send(pose, TOUCHING) for pose in bad]
-    refused += [client.send(ORIGIN, pose) for pose in bad]
-    assert PAIR in client.answer(ORIGIN, TOUCHING)
-    assert not any(stamp in client.contacts or stamp in client.points for stamp in refused)
-    assert client.diagnostic('refused: bad pose') == '10'
-
-
-def test_frames_must_agree(node, client):
-    stamp = client.send(ORIGIN, TOUCHING, frames=('map', 'odom'))
-    client.ask(ORIGIN, TOUCHING)
-    assert stamp not in client.contacts
-    assert client.diagnostic('refused: frame_id differs') == '1'
 
 
 def test_an_error_inside_does_not_end_the_node(node, client, monkeypatch):

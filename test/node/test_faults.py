@@ -29,7 +29,7 @@ from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from ros_client import PATIENCE, Client
+from ros_client import PATIENCE
 
 from box_contact_msgs.msg import Contacts
 from box_contact_ros import ContactSolver
@@ -259,25 +259,6 @@ def test_publishers_killed_and_started_again(node, client):
                 publisher.send_signal(signal.SIGKILL)
         client.assert_answered()
     assert node.process.poll() is None
-
-
-def test_two_nodes_in_namespaces(program):
-    """Each answers its own poses, and the other one's never."""
-    clients = []
-    try:
-        for name, height in (('/north', 1.875), ('/south', 1.75)):
-            running = program('contact_node', *CUBES, '-r', f'__ns:={name}')
-            running.wait_for_output(f'poses from {name}/box_a/pose', 120)
-            clients.append((Client(name), height))
-        for client, height in clients:
-            client.offer_until_answered(ORIGIN, APART)
-            contact = client.answer(ORIGIN, (0, 0, height, 0, 0, 0, 1))['box_a_box_b']
-            assert contact.separation == height - 2.0
-        (north, _), (south, _) = clients
-        assert not north.contacts.keys() & south.contacts.keys()
-    finally:
-        for client, _ in clients:
-            client.close()
 
 
 def test_configured_again_and_again_under_a_stream(node, client):
