@@ -155,27 +155,22 @@ class ContactWriter:
     """Makes the messages of one scene; the bytes of its names are made once."""
 
     def __init__(self, scene: Scene) -> None:
-        self._scene = scene
-        self._names_of: dict[tuple[int, int, int], bytes] = {}
+        self._names_of = lru_cache(MOST_NAMES)(
+            lambda a, b, at: _names(scene.pair_of(a, b), at))
 
     def contacts(self, header: bytes, answer: Answer) -> bytes:
         """Return the `Contacts` of an answer."""
-        names_of, contacts = self._names_of, answer.contacts
+        contacts = answer.contacts
         numbers = native.message_numbers(contacts.point, contacts.normal, contacts.separation,
                                          contacts.volume, contacts.covariance).tobytes()
-        if len(names_of) > MOST_NAMES:
-            names_of.clear()
         pairs, touching = answer.pairs.tolist(), answer.touching
         parts, at, end = [header], (len(header) - ENCAPSULATION) % 8, 0
         for listed in (pairs[:touching], pairs[touching:]):  # `contacts` and `near`
             parts.append(_COUNT.pack(len(listed)))
             at = (at + _COUNT.size) % 8
             for a, b in listed:
-                names = names_of.get((a, b, at))
-                if names is None:
-                    names = names_of[a, b, at] = _names(self._scene.pair_of(a, b), at)
                 begin, end = end, end + CONTACT_BYTES
-                parts += names, numbers[begin:end]
+                parts += self._names_of(a, b, at), numbers[begin:end]
                 at = 0  # doubles end each contact, so the next one begins at a multiple of 8
         stale = answer.named_stale()
         parts.append(_COUNT.pack(len(stale)))
