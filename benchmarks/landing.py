@@ -27,7 +27,7 @@ from tqdm import tqdm
 
 from box_contact_ros.core import native
 from box_contact_ros.demo.crane import CraneScenario
-from box_contact_ros.demo.landing import CORNER_SPEED_LIMIT, WATCHED, LandingRecord
+from box_contact_ros.demo.landing import CORNER_SPEED_LIMIT, LandingRecord
 from box_contact_ros.solver.pose import rotation_matrix
 
 from . import output
@@ -35,6 +35,7 @@ from .arguments import report_parser
 from .landing_ways import (
     ADDED,
     MUJOCO,
+    WATCHED,
     WAYS,
     HeldLimits,
     Landed,

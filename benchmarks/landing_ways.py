@@ -25,7 +25,6 @@ from box_contact_ros.demo.crane import Crane, CraneScenario
 from box_contact_ros.demo.landing import (
     DURATION,
     TILT_LIMIT,
-    WINDOW,
     ClosedLoop,
     Landing,
     LandingRecord,
@@ -37,6 +36,9 @@ from box_contact_ros.solver.contact import Contact
 from box_contact_ros.solver.contact_solver import ContactSolver
 
 from .point_law import PointLaw
+
+WATCHED, WINDOW = 15.0, 5.0
+"""Time that is judged after the first touch, and its last part [s]: longer than in the demo."""
 
 # --- one landing ----------------------------------------------------------------------------------
 
@@ -57,7 +59,7 @@ def land(scenario: CraneScenario, sources: Sequence[ContactSource], *, rate_hz: 
     sources: for each box of the stack, such as `solvers`. ValueError: a contact lacks what the law
     needs.
     """
-    loop = ClosedLoop(scenario, rate_hz, latency=latency, law=law)
+    loop = ClosedLoop(scenario, rate_hz, latency=latency, law=law, watched=WATCHED, window=WINDOW)
     while not loop.record.ended:
         state = loop.ask()
         loop.answer(state, {name: source(state.pose, pose) for (name, (pose, _)), source in zip(
@@ -140,7 +142,7 @@ class Landed(Landing):
         if math.isnan(landing.touched):
             return cls()
         first = round(landing.touched * record.rate_hz)
-        window = record.window(first)
+        window = record.window_after(first)
         poses = np.array(record.poses)[:window.stop]
         figures = {'overhang': float(np.hypot(*poses[first, :2])),
                    'drop': scenario.stack_size[2] + 0.5 * scenario.size[2] - float(poses[-1, 2])}
@@ -353,7 +355,8 @@ def mujoco_sources(scenario: CraneScenario, choice: str) -> list[MujocoSource]:
 
 def own_contact(scenario: CraneScenario, rate_hz: float) -> LandingRecord:
     """Run one landing on MuJoCo's own contacts; it ends when all that is judged was seen."""
-    crane, record = Crane(scenario, rate_hz, own_contact=True), LandingRecord(scenario, rate_hz)
+    crane = Crane(scenario, rate_hz, own_contact=True)
+    record = LandingRecord(scenario, rate_hz, WATCHED, WINDOW)
     while not record.ended:
         record.poses.append(crane.load_pose)
         record.velocities.append(crane.load_velocity)

@@ -8,7 +8,7 @@ The node then waits for the answer to them on `contacts`, at most for most of th
 simulates the tick under the patch of the newest answer. A contact acts from the time at which it
 really came. In lockstep simulated time waits for each answer instead.
 
-The landing ends 15 s after the first touch. The exit status is 0 only if the stack carries the load
+The landing ends 8 s after the first touch. The exit status is 0 only if the stack carries the load
 and no answer was lost.
 """
 from __future__ import annotations

@@ -6,7 +6,7 @@
 A `ClosedLoop` steps a crane under a law of force, wherever the contacts come from, and records what
 happened. `LandingRecord.judge` measures the record. The load settles if, from some time on, no
 corner moves faster than `SETTLED_SPEED`. It is at rest if it meets every limit of `Landing.limits`.
-The window is the last `WINDOW` s of the `WATCHED` s after the first touch.
+The window is the last part of the time that is watched after the first touch.
 
 Depth, gap and first touch are those of the exact solver on the recorded poses, whatever model gave
 the contacts. Conventions: those of `laws` and `crane`.
@@ -29,7 +29,7 @@ from ..solver.pose import rotation_matrix
 from .crane import Crane, CraneScenario
 
 DURATION = 25.0  # longest landing [s]; the first touch comes after 5 to 8 s
-WATCHED, WINDOW = 15.0, 5.0  # time that is judged after the first touch, and its last part [s]
+WATCHED, WINDOW = 8.0, 2.0  # time that is judged after the first touch, and its last part [s]
 TIME_ROUNDING = 1e-9  # times that differ by less are the same: sums of ticks are rounded [s]
 SETTLED_SPEED = 0.010  # speed of the load's fastest corner below which it has settled [m/s]
 SETTLED_LIMIT = 3.0  # time from the first touch until then [s]
@@ -190,7 +190,7 @@ class Landing:
     def __str__(self) -> str:
         """Return a line for each figure, with its limit."""
         if math.isnan(self.corner_speed):
-            return f'  not judged: that takes a touch and {WATCHED:g} s more'
+            return '  not judged: the load touched too late, or never'
         return '\n'.join(f'  {name:<13} {figure}{"" if met else "  <-- not met"}'
                          for name, (met, figure) in self.limits.items())
 
@@ -201,6 +201,8 @@ class LandingRecord:
 
     scenario: CraneScenario
     rate_hz: float
+    watched: float = WATCHED  # time that is judged after the first touch [s]
+    window: float = WINDOW  # its last part [s]
     poses: list[np.ndarray] = field(default_factory=list)
     velocities: list[np.ndarray] = field(default_factory=list)
     tensions: list[np.ndarray] = field(default_factory=list)
@@ -212,7 +214,7 @@ class LandingRecord:
     def ended(self) -> bool:
         """Return whether all that is judged has been recorded, or the time is over."""
         ticks, first = len(self.forces), next(iter(self.points), len(self.poses))
-        return ticks - first > (WATCHED * self.rate_hz) + 1 or ticks >= DURATION * self.rate_hz
+        return ticks - first > self.watched * self.rate_hz + 1 or ticks >= DURATION * self.rate_hz
 
     def corner_speeds(self, first: int = 0) -> np.ndarray:
         """Return the speed [m/s] of the fastest of the load's eight corners, per tick (n,).
@@ -239,10 +241,10 @@ class LandingRecord:
                 poses, np.broadcast_to(pose, poses.shape)).separation
             for pose, size in self.scenario.stack_boxes.values()], axis=0)
 
-    def window(self, touched: int) -> slice:
+    def window_after(self, touched: int) -> slice:
         """Return the ticks of the window, where the first touch came in the tick `touched`."""
-        return slice(touched + round((WATCHED - WINDOW) * self.rate_hz),
-                     touched + round(WATCHED * self.rate_hz))
+        return slice(touched + round((self.watched - self.window) * self.rate_hz),
+                     touched + round(self.watched * self.rate_hz))
 
     def judge(self) -> Landing:
         """Measure the landing; what would have to be measured later than its end is NaN."""
@@ -251,7 +253,7 @@ class LandingRecord:
         if not len(touching):
             return Landing()
         first = int(touching[0])
-        window = self.window(first)
+        window = self.window_after(first)
         ticks = min(len(self.forces), window.stop)  # what comes later is not judged
         separations = separations[:ticks]
         fast = np.flatnonzero(self.corner_speeds(first)[:ticks - first] >= SETTLED_SPEED)
@@ -275,9 +277,14 @@ class ClosedLoop:
     """A crane under the wrench of a law, recorded tick by tick, wherever contacts come from."""
 
     def __init__(self, scenario: CraneScenario, rate_hz: float, *, latency: float = 0.0,
-                 law: MakeLaw = LoadForces.at_rate) -> None:
-        """Make the crane, and the law for its load, this rate and latency [s]."""
-        self.crane, self.record = Crane(scenario, rate_hz), LandingRecord(scenario, rate_hz)
+                 law: MakeLaw = LoadForces.at_rate, watched: float = WATCHED,
+                 window: float = WINDOW) -> None:
+        """Make the crane, and the law for its load, this rate and latency [s].
+
+        watched, window: those of the record [s].
+        """
+        self.crane = Crane(scenario, rate_hz)
+        self.record = LandingRecord(scenario, rate_hz, watched, window)
         self._law = law(scenario.load, rate_hz=rate_hz, latency=latency,
                         step=self.crane.physics_step)
         self._under_way: deque[tuple[float, NamedContacts, LoopState]] = deque()
