@@ -193,15 +193,6 @@ class Crane:
         tensions[self.data.efc_id[rows]] = self.data.efc_force[rows]
         return tensions
 
-    @property
-    def ropes(self) -> np.ndarray:
-        """Return upper and lower ends (4, 2, 3) of the ropes, world frame; order as tensions."""
-        corners = np.column_stack([_CORNERS, np.ones(len(_CORNERS))]) * self.scenario.size / 2.0
-        pose = self.load_pose
-        holds = [self.data.site(f'hold_{i}').xpos for i in range(len(_CORNERS))]
-        lower = pose[:3] + corners @ rotation_matrix(pose[3:]).T
-        return np.stack([np.array(holds), lower], axis=1)
-
     def step(self, wrench: Callable[[float], np.ndarray] | None = None) -> None:
         """Advance one tick, under a wrench that may change from one physics step to the next.
 

@@ -26,7 +26,6 @@ from geometry_msgs.msg import PoseStamped, Vector3, WrenchStamped
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 from rclpy.signals import SignalHandlerOptions
-from visualization_msgs.msg import MarkerArray
 
 from box_contact_msgs.msg import Contacts
 
@@ -42,14 +41,7 @@ from ..node.parameters import (
     text,
     warn_of_unknown,
 )
-from ..node.ros_client import (
-    CRANE_MARKERS,
-    CRANE_WRENCH,
-    DEEP_RELIABLE,
-    line_marker,
-    pose_message,
-    stamp_of,
-)
+from ..node.ros_client import CRANE_WRENCH, DEEP_RELIABLE, pose_message, stamp_of
 from ..node.runtime import REFUSALS, GuardedNode, running_node, spin_once
 from ..node.topics import contact_qos
 from .crane import LIMITS, CraneScenario
@@ -61,8 +53,7 @@ LOCKSTEP_PATIENCE = 1.0  # time after which lockstep takes an answer for lost [s
 LOST_MOST = 5  # so many lost answers in a row end a run in lockstep: nobody answers any more
 DRAIN = 1.0  # patience for the last answers [s]
 LOOK_PERIOD = 0.05  # time after which a signal is noticed, at most [s]
-DRAW_RATE = 30.0  # drawings and looks at the landing's stage per second, at most [Hz]
-ROPE = (60, 60, 60)  # colour of the lines that are drawn
+LOOK_RATE = 30.0  # forces published, and looks at the landing's stage, at most [Hz]
 STAGES = ('hanging', 'first touch', 'settling', 'at rest')
 POINTS_ALONE = ("the contact node's model gives contacts without a patch: the whole load stands "
                 'for it, and may not come to rest')
@@ -107,7 +98,7 @@ class CraneNode(GuardedNode):
         self._rate, self._wait, self._frame = (
             values[name] for name in ('rate', 'wait', 'frame_id'))
         self._lockstep = values['lockstep']
-        self._look_every = math.ceil(self._rate / DRAW_RATE)
+        self._look_every = math.ceil(self._rate / LOOK_RATE)
         scenario = CraneScenario(**{field: values[name] for name, (field, _) in SCENARIO.items()})
         # In real time answers are late or lost, so the law's constants are for a period's latency.
         self.loop = ClosedLoop(scenario, self._rate,
@@ -120,7 +111,6 @@ class CraneNode(GuardedNode):
                        for box in ('box_a', 'box_b')]
         self._contacts = self.create_subscription(
             Contacts, 'contacts', self._on_contacts, DEEP_RELIABLE)
-        self._markers = self.create_publisher(MarkerArray, CRANE_MARKERS, contact_qos())
         self._force = self.create_publisher(WrenchStamped, CRANE_WRENCH, contact_qos())
 
     @property
@@ -158,7 +148,7 @@ class CraneNode(GuardedNode):
                 self._serve(executor, start + tick / self._rate - time.perf_counter())
             stamp = self._publish(self.loop.ask())
             if tick % self._look_every == 0:
-                self._draw(stamp)
+                self._publish_force(stamp)
                 for line in stages.lines():
                     print(line, flush=True)
             self._serve(executor, patience, lambda: stamp not in self._asked)  # noqa: B023
@@ -210,16 +200,10 @@ class CraneNode(GuardedNode):
                                  for name, contact in touches.items()},
                          latency=0.0 if self._lockstep else latency)
 
-    def _draw(self, stamp: int) -> None:
-        """Publish ropes, spreader, and the force on the load of the last physics step."""
-        header, ropes = make_header(stamp, self._frame), self.loop.crane.ropes
-        corners = ropes[[0, 1, 3, 2], 1]  # once around
-        spreader = np.stack([corners, np.roll(corners, 1, axis=0)], axis=1)
-        self._markers.publish(MarkerArray(markers=[
-            line_marker(header, name, lines, width=width, colour=ROPE)
-            for name, lines, width in (('ropes', ropes, 0.04), ('spreader', spreader, 0.15))]))
+    def _publish_force(self, stamp: int) -> None:
+        """Publish the force on the load of the last physics step."""
         if self.loop.record.forces:
-            message = WrenchStamped(header=header)
+            message = WrenchStamped(header=make_header(stamp, self._frame))
             x, y, z = map(float, self.loop.record.forces[-1])
             message.wrench.force = Vector3(x=x, y=y, z=z)
             self._force.publish(message)

@@ -21,8 +21,7 @@ from .message_bytes import PoseReader
 from .messages import NANOSECONDS, Refused
 from .topics import pose_qos
 
-CRANE_MARKERS = 'crane/markers'  # where the crane publishes its ropes and its spreader, as lines
-CRANE_WRENCH = 'crane/wrench'  # and the force of the contacts on its load
+CRANE_WRENCH = 'crane/wrench'  # where the crane publishes the force of the contacts on its load
 DEEP_RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 """What the DDS layer delivers while Python is busy must not push out the rest."""
 

@@ -28,7 +28,7 @@ from box_contact_ros.demo.crane import CraneScenario
 from box_contact_ros.demo.landing import LandingRecord
 from box_contact_ros.scene.laws import GRAVITY
 from box_contact_ros.solver.pose import rotation_matrix
-from box_contact_ros.view.style import BOX_A, BOX_B, CONTACT, ROPE
+from box_contact_ros.view.style import BOX_A, BOX_B, CONTACT
 
 sys.path.append(str(Path(__file__).resolve().parents[2]))  # where benchmarks/ is
 
@@ -41,7 +41,7 @@ TILT = 6.0
 """Factor by which tilt and gap are drawn larger: 1.2 degrees would hardly be seen."""
 WIDTH, HEIGHT, DPI = 7.2, 4.0, 100
 COLOURS = {name: tuple(value / 255.0 for value in colour) for name, colour in (
-    ('load', BOX_A), ('stack', BOX_B), ('contact', CONTACT), ('rope', ROPE))}
+    ('load', BOX_A), ('stack', BOX_B), ('contact', CONTACT), ('rope', (60, 60, 70)))}
 GREEN = (0.0, 0.45, 0.3)
 
 

@@ -21,7 +21,6 @@ from visualization_msgs.msg import Marker, MarkerArray
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
-from box_contact_ros.node.ros_client import CRANE_MARKERS
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene
 from box_contact_ros.solver.contact import Contact
@@ -112,9 +111,8 @@ def test_the_rviz_config_names_topics_and_namespaces_that_exist():
     config = yaml.safe_load(resource_path('config', 'contact.rviz').read_text('utf-8'))
     displays = config['Visualization Manager']['Displays']
     topics = {display['Topic']['Value']: display for display in displays if 'Topic' in display}
-    assert set(topics) == {'markers', CRANE_MARKERS, 'contact/point'}
+    assert set(topics) == {'markers', 'contact/point'}
     assert set(topics['markers']['Namespaces']) == set(NAMESPACES)
-    assert set(topics[CRANE_MARKERS]['Namespaces']) == {'ropes', 'spreader'}
     assert all(display['Enabled'] for display in displays)
 
 
@@ -133,7 +131,7 @@ def test_the_foxglove_layout_names_topics_and_fields_that_exist():
         'channels']
     known = {'/' + channel['address'].lstrip('/') for channel in channels.values()}
     drawn = {topic for topic, shown in panels['3D!scene']['topics'].items() if shown['visible']}
-    assert drawn == {'/markers', f'/{CRANE_MARKERS}'}
+    assert drawn == {'/markers'}
     assert set(panels['3D!scene']['topics']) - drawn < known
     assert panels['DiagnosticSummary!node']['topicToRender'] in known
     schemas = {'/contact/point': 'point_stamped.json', '/contact/normal': 'vector3_stamped.json'}
