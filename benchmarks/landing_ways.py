@@ -31,6 +31,7 @@ from box_contact_ros.demo.landing import (
     LoadForces,
     MakeLaw,
 )
+from box_contact_ros.scene.laws import FRICTION
 from box_contact_ros.scene.scene_solver import CONTAINER
 from box_contact_ros.solver.contact import Contact
 from box_contact_ros.solver.contact_solver import ContactSolver
@@ -355,7 +356,11 @@ def mujoco_sources(scenario: CraneScenario, choice: str) -> list[MujocoSource]:
 
 def own_contact(scenario: CraneScenario, rate_hz: float) -> LandingRecord:
     """Run one landing on MuJoCo's own contacts; it ends when all that is judged was seen."""
-    crane = Crane(scenario, rate_hz, own_contact=True)
+    crane = Crane(scenario, rate_hz)
+    for kind in ('geom', 'body'):  # MuJoCo keeps for each body what its geoms have
+        for bits in ('contype', 'conaffinity'):
+            getattr(crane.model, f'{kind}_{bits}')[:] = 1
+    crane.model.geom_friction[:, 0] = FRICTION
     record = LandingRecord(scenario, rate_hz, WATCHED, WINDOW)
     while not record.ended:
         record.poses.append(crane.load_pose)

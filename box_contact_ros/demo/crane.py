@@ -24,7 +24,7 @@ from dataclasses import dataclass, fields
 import mujoco
 import numpy as np
 
-from ..scene.laws import FRICTION, GRAVITY, Body
+from ..scene.laws import GRAVITY, Body
 from ..scene.scene_solver import CONTAINER
 from ..solver.pose import cross, rotation_matrix
 
@@ -52,9 +52,6 @@ LIMITS = {'mass': (1.0, 1e6), 'rope_length': (1.0, 200.0), 'rope_spread': (0.0, 
           'roll': (-10.0, 10.0), 'yaw': (-20.0, 20.0), 'lowering_speed': (0.0, MAX_HOIST_SPEED),
           'overlap': (-100.0, 1.0)}
 """Least and largest value of the numbers of a `CraneScenario`."""
-
-FRICTION_OF_OWN_CONTACT = (FRICTION, 0.005, 0.0001)
-"""MuJoCo's friction along, about and across the normal: the law's, then MuJoCo's own defaults."""
 
 _CORNERS = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]], dtype=float)
 
@@ -137,19 +134,15 @@ class CraneScenario:
 class Crane:
     """The running simulation: load, stack and ropes, advanced by ticks of 1 / rate_hz seconds."""
 
-    def __init__(self, scenario: CraneScenario, rate_hz: float = 200.0, *,
-                 own_contact: bool = False) -> None:
-        """Build the model and put the load at its start; `rate_hz` is ticks per second.
-
-        own_contact: MuJoCo computes contacts and their forces itself, for comparison.
-        """
+    def __init__(self, scenario: CraneScenario, rate_hz: float = 200.0) -> None:
+        """Build the model and put the load at its start; `rate_hz` is ticks per second."""
         if not (math.isfinite(rate_hz) and rate_hz > 0.0):
             raise ValueError(f'rate_hz must be positive, got {rate_hz}')
         self.scenario = scenario
         self._substeps = math.ceil(1.0 / (rate_hz * PHYSICS_STEP))
         self._rate_hz = float(rate_hz)
         self._ticks = 0
-        self.model = _build(scenario, own_contact)
+        self.model = _build(scenario)
         self.model.opt.timestep = 1.0 / (rate_hz * self._substeps)
         self.data = mujoco.MjData(self.model)
         self._load = self.model.body('load').id
@@ -264,11 +257,10 @@ def _rotation(axis: str, angle: float) -> np.ndarray:
     return rotation
 
 
-def _build(scenario: CraneScenario, own_contact: bool) -> mujoco.MjModel:
+def _build(scenario: CraneScenario) -> mujoco.MjModel:
     """Return the scenario as a MuJoCo model: static trolley and stack, free load, four ropes."""
     half = np.array(scenario.size) / 2.0
-    contact = {'contype': int(own_contact), 'conaffinity': int(own_contact),
-               'friction': FRICTION_OF_OWN_CONTACT, 'type': mujoco.mjtGeom.mjGEOM_BOX}
+    box = {'contype': 0, 'conaffinity': 0, 'type': mujoco.mjtGeom.mjGEOM_BOX}
     lowest_top = scenario.stack_size[2] - scenario.overlap + scenario.size[2]
 
     spec = mujoco.MjSpec()
@@ -280,9 +272,9 @@ def _build(scenario: CraneScenario, own_contact: bool) -> mujoco.MjModel:
     load.add_freejoint()
     load.mass, load.inertia, load.ipos = scenario.mass, scenario.load.inertia, scenario.mass_offset
     load.explicitinertial = True
-    load.add_geom(size=half, **contact)
+    load.add_geom(size=half, **box)
     for pose, size in scenario.stack_boxes.values():
-        stack.add_geom(size=np.array(size) / 2.0, pos=pose[:3], **contact)
+        stack.add_geom(size=np.array(size) / 2.0, pos=pose[:3], **box)
     for i, corner in enumerate(_CORNERS * half[:2]):
         trolley.add_site(name=f'hold_{i}', pos=[*(scenario.rope_spread * corner), 0.0])
         load.add_site(name=f'corner_{i}', pos=[*corner, half[2]])
