@@ -16,11 +16,11 @@ def test_axis_aligned_overlap():
     a = oracle.make_box(poses.IDENTITY, (2, 2, 2))
     b = oracle.make_box((0.5, 0.25, 1.875, 0, 0, 0, 1), (2, 2, 2))
     assert oracle.separation(a, b) == -0.125
-    volume, centroid = oracle.overlap(a, b)
+    volume, centroid, covariance = oracle.moments(a, b)
     extents = [mpfr('1.5'), mpfr('1.75'), mpfr('0.125')]
     assert abs(volume - extents[0] * extents[1] * extents[2]) < 1e-50
     assert np.allclose(oracle.as_array(centroid), (0.25, 0.125, 0.9375), atol=1e-16)
-    for j, row in enumerate(oracle.covariance(a, b)):
+    for j, row in enumerate(covariance):
         for k, entry in enumerate(row):
             assert abs(entry - (extents[j]**2 / 12 if j == k else 0)) < 1e-50
 
@@ -37,10 +37,10 @@ def test_corner_pyramid():
     d = 0.125
     a = oracle.make_box(poses.IDENTITY, (4, 4, 2))
     b = oracle.make_box((0, 0, 1 + np.sqrt(3) - d, *turn), (2, 2, 2))
-    volume, centroid = oracle.overlap(a, b)
+    volume, centroid, covariance = oracle.moments(a, b)
     assert float(volume) == pytest.approx(d**3 * np.sqrt(3) / 2, rel=1e-12)
     assert oracle.as_array(centroid) == pytest.approx((0, 0, 1 - d / 4), abs=1e-12)
-    found = np.array([oracle.as_array(row) for row in oracle.covariance(a, b)])
+    found = np.array([oracle.as_array(row) for row in covariance])
     assert found == pytest.approx(np.diag([12, 12, 3]) / 80 * d * d, abs=1e-14)
 
 
@@ -52,7 +52,7 @@ def test_overlap_against_sampling():
     for i in range(12):
         box_a = oracle.make_box(a[i], size_a[i])
         box_b = oracle.make_box(b[i], size_b[i])
-        volume, centroid = oracle.overlap(box_a, box_b)
+        volume, centroid, covariance = oracle.moments(box_a, box_b)
         local = rng.uniform(-0.5, 0.5, (200_000, 3)) * size_a[i]
         points = poses.rotate(np.tile(a[i, 3:], (len(local), 1)), local) + a[i, :3]
         inverse = np.tile(b[i, 3:] * (-1, -1, -1, 1), (len(local), 1))
@@ -65,7 +65,7 @@ def test_overlap_against_sampling():
             hits += 1
             error = points[inside].mean(axis=0) - oracle.as_array(centroid)
             assert np.all(np.abs(error) < 5 * points[inside].std(axis=0) / np.sqrt(inside.sum()))
-            spread = np.array([oracle.as_array(row) for row in oracle.covariance(box_a, box_b)])
+            spread = np.array([oracle.as_array(row) for row in covariance])
             drawn = np.cov(points[inside].T)
             assert np.abs(drawn - spread).max() < 10 * np.trace(spread) / np.sqrt(inside.sum())
         assert (volume > 0) == (oracle.separation(box_a, box_b) < 0)

@@ -35,10 +35,10 @@ def truth(a, b, size_a, size_b):
     size = mpfr(float(max(*size_a, *size_b)))
     centroid = None
     if gap < -FLOOR * size:
-        volume, centroid = oracle.overlap(box_a, box_b)
+        volume, centroid, spread = oracle.moments(box_a, box_b)
     if centroid is None:
         return float(gap), np.full(3, np.nan), np.nan, np.full((3, 3), np.nan)
-    covariance = np.array([oracle.as_array(row) for row in oracle.covariance(box_a, box_b)])
+    covariance = np.array([oracle.as_array(row) for row in spread])
     centroid = oracle.as_array(oracle.add(centroid, box_a.centre, -1))
     return float(gap), centroid, float(volume), covariance
 

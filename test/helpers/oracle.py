@@ -130,47 +130,43 @@ def overlap_faces(a, b):
     return faces
 
 
-def overlap(a, b):
-    """Volume and centroid of A∩B (centroid None where there is no volume)."""
-    faces = overlap_faces(a, b)
-    corners = [p for face in faces for p in face]
-    if not corners:
-        return ZERO, None
-    apex = scaled((sum(p[0] for p in corners), sum(p[1] for p in corners),
-                   sum(p[2] for p in corners)), ONE / len(corners))
-    volume, moment = ZERO, (ZERO, ZERO, ZERO)
+def pyramids(faces, apex):
+    """Yield the tetrahedra of a convex body: three corners from its apex, and the volume."""
     for face in faces:
         p = add(face[0], apex, -1)
         for i in range(1, len(face) - 1):
             q, r = add(face[i], apex, -1), add(face[i + 1], apex, -1)
-            v = abs(dot(p, cross(q, r))) / 6
-            volume += v
-            moment = add(moment, add(add(p, q), r), v / 4)
-    if volume <= 0:
-        return ZERO, None
-    return volume, add(apex, moment, 1 / volume)
+            yield p, q, r, abs(dot(p, cross(q, r))) / 6
 
 
-def covariance(a, b):
-    """Second central moments of A∩B by its volume, as rows; None where there is no volume.
+def moments(a, b):
+    """Return volume, centroid and covariance of A∩B; None for both where there is no volume.
 
     A tetrahedron of corners p, q, r, s from any origin has ∫ x xᵀ dV = v/20 · (p pᵀ + q qᵀ + r rᵀ +
     s sᵀ + m mᵀ), with v its volume and m the sum of its corners. Here s is the centroid of A∩B.
     """
-    volume, centroid = overlap(a, b)
-    if centroid is None:
-        return None
+    faces = overlap_faces(a, b)
+    corners = [p for face in faces for p in face]
+    if not corners:
+        return ZERO, None, None
+    apex = scaled((sum(p[0] for p in corners), sum(p[1] for p in corners),
+                   sum(p[2] for p in corners)), ONE / len(corners))
+    volume, moment = ZERO, (ZERO, ZERO, ZERO)
+    for p, q, r, v in pyramids(faces, apex):
+        volume += v
+        moment = add(moment, add(add(p, q), r), v / 4)
+    if volume <= 0:
+        return ZERO, None, None
+    centroid = add(apex, moment, 1 / volume)
     total = [[ZERO] * 3 for _ in range(3)]
-    for face in overlap_faces(a, b):
-        p = add(face[0], centroid, -1)
-        for i in range(1, len(face) - 1):
-            q, r = add(face[i], centroid, -1), add(face[i + 1], centroid, -1)
-            v = abs(dot(p, cross(q, r))) / 6
-            m = add(add(p, q), r)
-            for j in range(3):
-                for k in range(3):
-                    total[j][k] += v / 20 * (p[j] * p[k] + q[j] * q[k] + r[j] * r[k] + m[j] * m[k])
-    return tuple(tuple(entry / volume for entry in row) for row in total)
+    for p, q, r, v in pyramids(faces, centroid):
+        m = add(add(p, q), r)
+        for j in range(3):
+            for k in range(j + 1):
+                total[j][k] += v / 20 * (p[j] * p[k] + q[j] * q[k] + r[j] * r[k] + m[j] * m[k])
+    covariance = tuple(tuple(total[max(j, k)][min(j, k)] / volume for k in range(3))
+                       for j in range(3))
+    return volume, centroid, covariance
 
 
 def pressed(a, b, axis, depth, floor):
@@ -186,10 +182,10 @@ def contact_moments(a, b, axis, depth, size):
     """
     floor = mpfr(10)**-9 * mpfr(float(size))
     moved = pressed(a, b, axis, depth, floor)
-    volume, centroid = overlap(a, moved)
+    volume, centroid, covariance = moments(a, moved)
     if depth < floor and separation(a, moved) > -0.51 * floor:
         return None, centroid, None
-    return volume, centroid, covariance(a, moved)
+    return volume, centroid, covariance
 
 
 def as_array(vector):
