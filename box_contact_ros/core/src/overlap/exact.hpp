@@ -92,7 +92,7 @@ BC_INLINE void solve_overlaps(const Query<T>& q, const Pressed<T>& pressed,
     copy_lane(found, i, one);
   }
 }
-// Not inlined, and with boxes of its own: those of the caller stay in registers.
+// Not inlined: most pairs do without.
 template <class T, class Found>
 [[gnu::noinline]] void solve_two_sided(const Query<T>& q, const Pressed<T>& pressed,
                                        const planes::PairOfBoxes<T>& boxes, Found& found,
@@ -114,8 +114,7 @@ template <class T, class Found>
   unsigned touching = bits(q.touching);
   unsigned two_sided = bits(any_of(boxes.p.both | boxes.q.both)) & touching;
   if (all || 2 * __builtin_popcount(two_sided) > __builtin_popcount(touching)) {
-    planes::PairOfBoxes<T> own = boxes;
-    solve_two_sided(q, pressed, own, found, counts);
+    solve_two_sided(q, pressed, boxes, found, counts);
     return 0;
   }
   solve_overlaps<false>(q, pressed, boxes, touching & ~two_sided, found, counts);
