@@ -12,11 +12,12 @@ namespace box_contact::BOX_CONTACT_SET {
 BC_INLINE void store(const Triple<double>& v, double* numbers) {
   for (int k = 0; k < 3; ++k) numbers[k] = v[k];
 }
-BC_INLINE Vec<double> half_of(const double* size) {
-  return {0.5 * size[0], 0.5 * size[1], 0.5 * size[2]};
+// Numbers in memory, without a copy.
+BC_INLINE const Vec<double>& size_at(const double* numbers) {
+  return *reinterpret_cast<const Vec<double>*>(numbers);
 }
-BC_INLINE Pose<double> pose_of(const double* p) {
-  return {{p[0], p[1], p[2]}, {p[3], p[4], p[5], p[6]}};
+BC_INLINE const Pose<double>& pose_at(const double* numbers) {
+  return *reinterpret_cast<const Pose<double>*>(numbers);
 }
 
 BC_INLINE void store(const PointAndVolume<double>& overlap, bc_contact& contact) {
@@ -36,21 +37,26 @@ template <class Model>
 BC_INLINE bool solve_pair(const Model& model, const detail::PairNumbers& pair, double margin,
                           bc_contact& contact, Counts& counts) {
   Query<double> q;
-  query(pose_of(pair.pose_a), pose_of(pair.pose_b), half_of(pair.size_a), half_of(pair.size_b), q);
+  query(pose_at(pair.pose_a), pose_at(pair.pose_b), size_at(pair.size_a), size_at(pair.size_b), q);
   if (!q.pair.valid) return false;
   contact.separation = q.axis.separation;
   contact.colliding = q.touching;
-  contact.axis = int32_t(q.pair.swapped ? swapped_axis(q.axis.axis) : q.axis.axis);
+  contact.axis = q.pair.swapped ? swapped_axis(q.axis.axis) : q.axis.axis;
   const Triple<double> unknown = uniform(not_a_number);
   Triple<double> normal = direction_in_common_frame(q.pair, q.axis.normal);
   // Zeros keep no sign on a swap.
   normal = select(q.pair.swapped, Triple<double>{} - normal, normal);
-  store(select(q.touching || q.axis.separation <= margin, normal, unknown), contact.normal);
-  store(unknown, contact.point);
-  for (double(&row)[3] : contact.covariance) store(unknown, row);
-  contact.volume = 0.0;
-  if (!q.touching) return true;
-  typename Model::template Found<double> overlap;
+  using Found = typename Model::template Found<double>;
+  if (!q.touching || std::is_same_v<Found, PointAndVolume<double>>)
+    for (double(&row)[3] : contact.covariance) store(unknown, row);
+  if (!q.touching) {
+    store(q.axis.separation <= margin ? normal : unknown, contact.normal);
+    store(unknown, contact.point);
+    contact.volume = 0.0;
+    return true;
+  }
+  store(normal, contact.normal);
+  Found overlap;
   model.solve(q, overlap, counts);  // a pair alone is left to nobody
   store(overlap, contact);
   return true;

@@ -48,22 +48,24 @@ struct Pair {
   Mask<T> valid;                 // poses and sizes are accepted
 };
 
+template <class T>
+BC_INLINE T squared_norm(const T (&q)[4]) {
+  return (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]);
+}
 // The matrix of a quaternion of any length. Dividing by the squared norm needs no square root, and q
 // and −q give the same bits.
 template <class T>
-BC_INLINE Mat<T> rotation_matrix(const T (&q)[4]) {
-  T x = q[0], y = q[1], z = q[2], w = q[3];
-  T s = 2.0 / ((x * x + y * y) + (z * z + w * w));
+BC_INLINE Mat<T> rotation_matrix(const T (&q)[4], T norm2) {
+  T x = q[0], y = q[1], z = q[2], w = q[3], s = 2.0 / norm2;
   return {{{1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)},
            {s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)},
            {s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)}}};
 }
 // Its rows.
 template <class T>
-BC_INLINE Columns<T> rotation_rows(const T (&q)[4]) {
+BC_INLINE Columns<T> rotation_rows(const T (&q)[4], T norm2) {
   if constexpr (packed<T>) {
-    T x = q[0], y = q[1], z = q[2], w = q[3];
-    T s = 2.0 / ((x * x + y * y) + (z * z + w * w));
+    T x = q[0], y = q[1], z = q[2], w = q[3], s = 2.0 / norm2;
     Triple<T> v{x, y, z, w}, yxw = __builtin_shufflevector(v, v, 1, 0, 3, 3);
     Triple<T> zwx = __builtin_shufflevector(v, v, 2, 3, 0, 0);
     Triple<T> wzy = __builtin_shufflevector(v, v, 3, 2, 1, 1);
@@ -74,22 +76,19 @@ BC_INLINE Columns<T> rotation_rows(const T (&q)[4]) {
     for (int i = 0; i < 3; ++i) rows[i] = choose(is_at<T>(i), 1.0 + rows[i], rows[i]);
     return rows;
   } else {
-    Mat<T> m = rotation_matrix(q);
+    Mat<T> m = rotation_matrix(q, norm2);
     return {{triple(row(m, 0)), triple(row(m, 1)), triple(row(m, 2))}};
   }
 }
 
 // Comparisons are written so that NaN fails them. An overflown square is infinite and fails too.
 template <class T>
-BC_INLINE Mask<T> pose_valid(const Pose<T>& pose) {
-  const T* q = pose.quaternion;
-  T norm2 = (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]);
-  return all_of(abs(triple(pose.position)) <= uniform(splat<T>(length_max))) &
+BC_INLINE Mask<T> pose_valid(const Triple<T>& position, T norm2) {
+  return all_of(abs(position) <= uniform(splat<T>(length_max))) &
          (norm2 >= quaternion_min * quaternion_min) & (norm2 <= quaternion_max * quaternion_max);
 }
 template <class T>
-BC_INLINE Mask<T> size_valid(const Vec<T>& half) {
-  Triple<T> size = 2.0 * triple(half);
+BC_INLINE Mask<T> size_valid(const Triple<T>& size) {
   return all_of((size >= uniform(splat<T>(length_min))) & (size <= uniform(splat<T>(length_max))));
 }
 
@@ -102,10 +101,10 @@ BC_INLINE T ulp(T x) {
 
 // Order two boxes with the same centre: by their sizes, then by their axes.
 template <class T>
-Mask<T> a_first_of_concentric(const Vec<T>& half_a, const Vec<T>& half_b, const Columns<T>& rows_a,
-                              const Columns<T>& rows_b) {
-  T order = half_b[0] - half_a[0];
-  for (int k = 1; k < 3; ++k) order = select<T>(order == 0.0, half_b[k] - half_a[k], order);
+Mask<T> a_first_of_concentric(const Triple<T>& size_a, const Triple<T>& size_b,
+                              const Columns<T>& rows_a, const Columns<T>& rows_b) {
+  T order = size_b[0] - size_a[0];
+  for (int k = 1; k < 3; ++k) order = select<T>(order == 0.0, size_b[k] - size_a[k], order);
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) order = select<T>(order == 0.0, rows_b[i][j] - rows_a[i][j], order);
   return order >= 0.0;
@@ -123,20 +122,25 @@ BC_INLINE Mask<T> comes_first(const Triple<T>& t) {
   }
 }
 
+// Sizes: full extents [m].
 template <class T>
-BC_INLINE void prepare(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_a,
-                       const Vec<T>& half_b, Pair<T>& pair) {
-  Columns<T> rows_a = rotation_rows(a.quaternion), rows_b = rotation_rows(b.quaternion);
+BC_INLINE void prepare(const Pose<T>& a, const Pose<T>& b, const Vec<T>& size_a,
+                       const Vec<T>& size_b, Pair<T>& pair) {
+  T norm2_a = squared_norm(a.quaternion), norm2_b = squared_norm(b.quaternion);
+  Columns<T> rows_a = rotation_rows(a.quaternion, norm2_a);
+  Columns<T> rows_b = rotation_rows(b.quaternion, norm2_b);
   Triple<T> at_a = triple(a.position), at_b = triple(b.position), t = at_b - at_a;
-  Triple<T> given_a = triple(half_a), given_b = triple(half_b);
+  Triple<T> given_a = triple(size_a), given_b = triple(size_b);
+  Mask<T> valid = pose_valid(at_a, norm2_a) & pose_valid(at_b, norm2_b) & size_valid<T>(given_a) &
+                  size_valid<T>(given_b);
   Mask<T> in_order = comes_first<T>(t), concentric = all_of(t == Triple<T>{});
   if (any(concentric)) {
-    Mask<T> ordered = a_first_of_concentric(half_a, half_b, rows_a, rows_b);
+    Mask<T> ordered = a_first_of_concentric<T>(given_a, given_b, rows_a, rows_b);
     in_order = (in_order & (concentric == 0)) | (ordered & concentric);
   }
   pair.swapped = in_order == 0;
-  pair.half_a = select(in_order, given_a, given_b);
-  pair.half_b = select(in_order, given_b, given_a);
+  pair.half_a = 0.5 * select(in_order, given_a, given_b);
+  pair.half_b = 0.5 * select(in_order, given_b, given_a);
   pair.origin_a = select(in_order, at_a, at_b);
   pair.origin_b = select(in_order, at_b, at_a);
   Columns<T> first = select<T>(in_order, rows_a, rows_b);
@@ -150,10 +154,10 @@ BC_INLINE void prepare(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_a,
   pair.b_in_a = transpose(pair.a_in_b);
   pair.axes_a = transpose(first);
   pair.axes_b = transpose(other);
-  pair.size = 2.0 * largest(max(given_a, given_b));
+  pair.size = largest(max(given_a, given_b));
   T reach = largest(max(abs(at_a), abs(at_b)));
   pair.touch = contact_ulps * ulp(max(reach, pair.size));
-  pair.valid = pose_valid(a) & pose_valid(b) & size_valid(half_a) & size_valid(half_b);
+  pair.valid = valid;
 }
 
 // Move B by `distance` [m] against a direction given in A's frame.

@@ -60,8 +60,7 @@ template <class T>
   load_rows(turns_b, pose_b.quaternion);
   load_rows(sizes_a, size_a.v);
   load_rows(sizes_b, size_b.v);
-  T half = splat<T>(0.5);
-  query(pose_a, pose_b, half * size_a, half * size_b, q);
+  query(pose_a, pose_b, size_a, size_b, q);
   for (long i = max(0L, last - first); i < width<T>; ++i) set_lane(q.touching, int(i), 0);
 }
 
@@ -78,7 +77,7 @@ template <class T>
   // Zeros keep no sign on a swap.
   Triple<T> from_a = select(q.pair.swapped, Triple<T>{} - from_first, from_first);
   Vec<T> normal = components<T>(select(near, from_a, none));
-  T axis = select<T>(q.pair.swapped, swapped_axis(q.axis.axis), q.axis.axis);
+  Place<T> axis = select<Place<T>>(q.pair.swapped, swapped_axis(q.axis.axis), q.axis.axis);
   T separation = select<T>(q.pair.valid, q.axis.separation, nothing);
   long count = min(last - first, long(width<T>));
   unsigned here = all >> (width<T> - count);

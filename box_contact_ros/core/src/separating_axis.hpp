@@ -51,11 +51,17 @@ constexpr int first_edge_axis = 6;
 template <class T>
 struct SeparatingAxis {
   T separation;      // largest gap [m]
-  T axis;            // 0–2 faces of A, 3–5 faces of B, 6 + 3 i + j for a_i × b_j
-  T face;            // best face axis, 0–5, whatever wins
+  Place<T> axis;     // 0–2 faces of A, 3–5 faces of B, 6 + 3 i + j for a_i × b_j
+  Place<T> face;     // best face axis, 0–5, whatever wins
   Triple<T> normal;  // unit vector along the axis, from A to B, in A's frame
   Mask<T> doubtful;  // rounding of an edge axis may matter: see near_parallel_edges.hpp
 };
+
+template <class T>
+BC_INLINE SeparatingAxis<double> lane(const SeparatingAxis<T>& axis, int i) {
+  return {lane(axis.separation, i), int(lane(axis.axis, i)), int(lane(axis.face, i)),
+          triple_of_lane<T>(axis.normal, i), lane(axis.doubtful, i) != 0};
+}
 
 // The best axis so far. Axes are offered three at a time. The largest gap is kept apart, because ties
 // keep the earlier axis.
@@ -70,7 +76,7 @@ struct BestAxis {
       offer_one(gaps[k], splat<T>(first + k), scales[k], tolerance);
   }
   BC_INLINE T largest() const { return largest_gap; }
-  BC_INLINE T winner(T) const { return place; }
+  BC_INLINE Place<T> winner(T) const { return Place<T>(place); }
 
  private:
   BC_INLINE void offer_one(T candidate_gap, T candidate, T candidate_scale, T tolerance) {
@@ -95,7 +101,7 @@ struct BestAxis<T, true> {
     scales[count++] = their_scales;
   }
   BC_INLINE T largest() const { return box_contact::BOX_CONTACT_SET::largest(highest); }
-  BC_INLINE T winner(T tolerance) const {
+  BC_INLINE int winner(T tolerance) const {
     Triple<T> limit = Triple<T>{} + largest();
     unsigned near = 0;
     auto note = [&](int n) { near |= (~bits(offered[n] + tolerance < limit) & 7) << (3 * n); };
@@ -105,7 +111,7 @@ struct BestAxis<T, true> {
   }
 
  private:
-  [[gnu::noinline]] T first_of_near(T tolerance) const {
+  [[gnu::noinline]] int first_of_near(T tolerance) const {
     T gap = offered[0][0];
     int place = 0;
     for (int n = 0; n < count; ++n)
@@ -207,6 +213,7 @@ BC_INLINE void offer_edge_axes(const Pair<T>& pair, BestAxis<T>& best, Mask<T>& 
 }
 
 // The edge of A, 0 to 2, of the edge axis at a place.
+BC_INLINE int edge_of_a(int place) { return (place - first_edge_axis) / 3; }
 template <class T>
 BC_INLINE T edge_of_a(T place) {
   return select<T>(place < double(first_edge_axis + 3), T{},
@@ -251,8 +258,8 @@ BC_INLINE Triple<T> axis_normal_by_place(const Pair<T>& pair, const BestAxis<T>&
   Triple<T> zero{}, n, offset = pair.offset_a;
   T along;
   if (place < 6) {
-    n = place < 3 ? choose(is_at<T>(k), uniform(1.0), zero) : pair.b_in_a[k];
-    along = place < 3 ? offset[k] : pair.offset_b[k];
+    n = select(place < 3, choose(is_at<T>(k), uniform(1.0), zero), pair.b_in_a[k]);
+    along = pick(place < 3, pair.offset_a, pair.offset_b)[k];
   } else {
     int i = group - 2, y = (i + 1) % 3, z = (i + 2) % 3;
     Triple<T> u = pair.b_in_a[k];
@@ -264,6 +271,10 @@ BC_INLINE Triple<T> axis_normal_by_place(const Pair<T>& pair, const BestAxis<T>&
 }
 
 // The number of an axis when the boxes change names.
+BC_INLINE int swapped_axis(int axis) {
+  static constexpr int8_t swapped[15] = {3, 4, 5, 0, 1, 2, 6, 9, 12, 7, 10, 13, 8, 11, 14};
+  return swapped[axis];
+}
 template <class T>
 BC_INLINE T swapped_axis(T axis) {
   T i = edge_of_a(axis), j = (axis - double(first_edge_axis)) - 3.0 * i;
@@ -282,7 +293,7 @@ BC_INLINE SeparatingAxis<T> separating_axis(const Pair<T>& pair) {
   found.separation = best.largest();
   found.axis = best.winner(tolerance);
   if constexpr (packed<T>) {
-    found.normal = axis_normal_by_place(pair, best, int(found.axis));
+    found.normal = axis_normal_by_place(pair, best, found.axis);
   } else {
     found.normal = axis_normal(pair, best);
   }

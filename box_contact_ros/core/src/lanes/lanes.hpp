@@ -60,6 +60,10 @@ constexpr int width = sizeof(T) / sizeof(Number<T>);
 template <class T>
 using Mask = decltype(T() < T());
 
+// A small whole number: of a single pair an index.
+template <class T>
+using Place = std::conditional_t<is_scalar<T>, int, T>;
+
 // The same number in every lane.
 template <class T>
 BC_INLINE T splat(Number<T> x) {
@@ -69,6 +73,13 @@ BC_INLINE T splat(Number<T> x) {
 template <class T>
 BC_INLINE T select(Mask<T> mask, T if_true, T if_false) {
   return mask ? if_true : if_false;
+}
+
+// One of two objects. No processor predicts which: compilers make no branch of this.
+template <class Object>
+BC_INLINE const Object& pick(bool first, const Object& a, const Object& b) {
+  auto at_a = reinterpret_cast<uintptr_t>(&a), at_b = reinterpret_cast<uintptr_t>(&b);
+  return *reinterpret_cast<const Object*>(at_b ^ ((at_a ^ at_b) & -uintptr_t(first)));
 }
 
 // Of two equal numbers, or with a NaN in `a` or `b`, min and max return b. The instructions are named

@@ -141,10 +141,18 @@ template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_
 BC_INLINE Packed choose(Mask<Packed> masks, Packed a, Packed b) {
   return masks ? a : b;
 }
-// Which of three numbers is the one at `place`: 0, 1 or 2.
+// Which of three numbers is the one at `place`: 0, 1 or 2. None is at −1.
 template <class T>
-BC_INLINE Flags<T> is_at(T place) {
-  return triple(Vec<T>{splat<T>(0.0), splat<T>(1.0), splat<T>(2.0)}) == uniform(place);
+BC_INLINE Flags<T> is_at(Place<T> place) {
+  if constexpr (packed<T>) {
+    static constexpr int64_t flags[4][4] = {{}, {-1}, {0, -1}, {0, 0, -1, -1}};
+    Flags<T> found;
+    std::memcpy(&found, flags[place + 1], sizeof found);
+    return found;
+  } else {
+    T number = T(place);
+    return Flags<T>{number == 0.0, number == 1.0, number == 2.0};
+  }
 }
 // Whether all, or any, of three masks are set.
 template <class M>

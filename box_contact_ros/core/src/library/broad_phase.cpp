@@ -50,7 +50,7 @@ bc_status make(const bc_boxes& boxes, bc_broad_phase** made) {
   for (int64_t box = 0; box < boxes.count; ++box) {
     const double* size = boxes.sizes[box].extent;
     Vec<double> extents{0.5 * size[0], 0.5 * size[1], 0.5 * size[2]};
-    if (!size_valid(extents))
+    if (!size_valid<double>(triple(Vec<double>{size[0], size[1], size[2]})))
       return fail(BC_BAD_SIZE, "sizes[%lld] (%g, %g, %g) is not within 1e-50 to 1e50 m",
                   (long long)box, size[0], size[1], size[2]);
     // Boxes that are larger by the margin overlap, if the boxes are apart by the margin at most.

@@ -50,7 +50,7 @@ bc_status refuse_size(const char* field, const double* size) {
 }
 
 bool size_is_valid(const double* size) {
-  return size_valid(Vec<double>{0.5 * size[0], 0.5 * size[1], 0.5 * size[2]});
+  return size_valid<double>(triple(Vec<double>{size[0], size[1], size[2]}));
 }
 
 // Why a pair is refused.

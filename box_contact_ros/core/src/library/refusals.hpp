@@ -68,7 +68,8 @@ unsigned number_of(const Enumeration& given) {
 }
 
 inline bool pose_is_valid(const double* p) {
-  return pose_valid(Pose<double>{{p[0], p[1], p[2]}, {p[3], p[4], p[5], p[6]}});
+  double quaternion[4] = {p[3], p[4], p[5], p[6]};
+  return pose_valid<double>(triple(Vec<double>{p[0], p[1], p[2]}), squared_norm(quaternion));
 }
 
 inline bc_status refuse_pose(const char* field, const double* p) {

@@ -114,17 +114,17 @@ BC_INLINE Triple<T> totals(const Triple<T>& a, const Triple<T>& b, const Triple<
 
 // The number of a triple, and the column of a matrix, at the axis `place` (0, 1 or 2).
 template <class T>
-BC_INLINE T at(const Triple<T>& x, T place) {
+BC_INLINE T at(const Triple<T>& x, Place<T> place) {
   if constexpr (is_scalar<T>) {
-    return x[int(place)];
+    return x[place];
   } else {
     return select<T>(place == 0.0, x[0], select<T>(place == 1.0, x[1], x[2]));
   }
 }
 template <class T>
-BC_INLINE Triple<T> at(const Columns<T>& m, T place) {
+BC_INLINE Triple<T> at(const Columns<T>& m, Place<T> place) {
   if constexpr (is_scalar<T>) {
-    return m[int(place)];
+    return m[place];
   } else {
     return select(place == 0.0, m[0], select(place == 1.0, m[1], m[2]));
   }
@@ -135,7 +135,7 @@ using OneOf = std::conditional_t<is_scalar<T>, const Thing&, Thing>;
 template <class T, class Thing>
 BC_INLINE OneOf<T, Thing> one_of(Mask<T> mask, const Thing& a, const Thing& b) {
   if constexpr (is_scalar<T>) {
-    return mask ? a : b;
+    return pick(mask, a, b);
   } else if constexpr (std::is_same_v<Thing, Columns<T>>) {
     return select<T>(mask, a, b);
   } else {
@@ -186,7 +186,7 @@ struct PairOfBoxes {
   Box<T> p, q;
 
   BC_INLINE explicit PairOfBoxes(const Pair<T>& pair, const SeparatingAxis<T>& axis)
-      : p_is_a(axis.face < 3.0),
+      : p_is_a(axis.face < splat<Place<T>>(3)),
         columns(one_of<T>(p_is_a, pair.b_in_a, pair.a_in_b)),
         rows(one_of<T>(p_is_a, pair.a_in_b, pair.b_in_a)),
         by_columns(reciprocals(columns)),
@@ -198,18 +198,19 @@ template <class T>
 BC_INLINE Triple<T> crossing(const Pair<T>& pair, const Triple<T>& offset_a,
                              const SeparatingAxis<T>& axis) {
   const Columns<T>& axes_b = pair.b_in_a;
-  T i = edge_of_a(axis.axis), j = (axis.axis - double(first_edge_axis)) - 3.0 * i;
+  Place<T> i = edge_of_a(axis.axis);
+  Place<T> j = (axis.axis - splat<Place<T>>(first_edge_axis)) - splat<Place<T>>(3) * i;
   Triple<T> zero{}, one = uniform(splat<T>(1.0)), n = axis.normal, n_b = pair.a_in_b * n;
   auto corner = [&](const Triple<T>& half, const Triple<T>& direction) {
     return choose(direction >= zero, half, -half);
   };
-  Triple<T> on_a = choose(is_at(i), zero, corner(pair.half_a, n));
-  Triple<T> on_b = choose(is_at(j), zero, corner(pair.half_b, n_b));
-  Triple<T> along = at(axes_b, j), way = (offset_a - axes_b * on_b) - on_a;
+  Triple<T> on_a = choose(is_at<T>(i), zero, corner(pair.half_a, n));
+  Triple<T> on_b = choose(is_at<T>(j), zero, corner(pair.half_b, n_b));
+  Triple<T> along = at<T>(axes_b, j), way = (offset_a - axes_b * on_b) - on_a;
   T cosine = at<T>(along, i), way_i = at<T>(way, i), way_j = dot(way, along);
   T scale = 1.0 / max(1.0 - cosine * cosine, splat<T>(1e-20));
   T s = (way_i - cosine * way_j) * scale, t = (cosine * way_i - way_j) * scale;
-  return on_a + 0.5 * ((choose(is_at(i), s * one, zero) + way) + t * along);
+  return on_a + 0.5 * ((choose(is_at<T>(i), s * one, zero) + way) + t * along);
 }
 
 // Find the planes that may meet the overlap. `offset_a`, `offset_b`: from A to B in their frames [m].
@@ -225,21 +226,22 @@ BC_INLINE void find_planes(const Pair<T>& pair, const SeparatingAxis<T>& axis,
   const Triple<T>& c = boxes.offset = select(is_a, offset_a, -offset_b);
 
   // 1. Q's part below the contact face.
-  T z = select<T>(is_a, axis.face, axis.face - 3.0), slack = place_slack * pair.size;
-  Triple<T> zero{}, up = at(boxes.rows, z);
+  Place<T> z = select<Place<T>>(is_a, axis.face, axis.face - splat<Place<T>>(3));
+  T slack = place_slack * pair.size;
+  Triple<T> zero{}, up = at<T>(boxes.rows, z);
   T height = at<T>(c, z);
   Mask<T> above = height >= 0.0;
   T half_z = at<T>(p.half, z), radius_z = dot(abs(up), q.half);
   T depth = (half_z + radius_z) - abs(height);
-  Triple<T> reach = min(q.half, (0.5 * depth) * abs(at(boxes.by_rows, z)));
+  Triple<T> reach = min(q.half, (0.5 * depth) * abs(at<T>(boxes.by_rows, z)));
   Triple<T> rises = select(above, up, -up);
   Triple<T> middle_q = choose(rises >= zero, reach - q.half, q.half - reach);
   Triple<T> centre = c + m * middle_q, radius = abs(m) * reach;
   Triple<T> high = centre + radius, low = centre - radius;
   // P's sides: strictly through it. The contact face counts, unless Q does not come out of it.
   Mask<T> comes_out = abs(height) + radius_z > half_z + max(flush_limit * depth, slack);
-  Flags<T> top = is_at(select<T>(comes_out & above, z, splat<T>(-1.0)));
-  Flags<T> bottom = is_at(select<T>(comes_out & (above == 0), z, splat<T>(-1.0)));
+  Flags<T> contact_face = is_at<T>(select<Place<T>>(comes_out, z, splat<Place<T>>(-1)));
+  Flags<T> top = contact_face & (c >= zero), bottom = contact_face & (zero > c);
   Triple<T> extent = min(high, p.half) - max(low, -p.half);
   Triple<T> side = p.half + max(flush_limit * extent, uniform(slack));
   Flags<T> plus = (high > side) | top, minus = (-low > side) | bottom;
@@ -255,7 +257,7 @@ BC_INLINE void find_planes(const Pair<T>& pair, const SeparatingAxis<T>& axis,
                   (radius_q - in_q >= edge) & (reach - middle_q >= edge));
 
   // The origin: the middle of P's part. A contact of two edges may be small in it.
-  Mask<T> by_edges = axis.axis >= double(first_edge_axis);
+  Mask<T> by_edges = axis.axis >= splat<Place<T>>(first_edge_axis);
   if (any(by_edges)) {
     Triple<T> in_a = crossing(pair, offset_a, axis);
     Triple<T> in_b = pair.a_in_b * in_a - offset_b;
