@@ -54,13 +54,13 @@ def solvers(scenario: CraneScenario, model: str) -> list[ContactSolver]:
 
 
 def land(scenario: CraneScenario, sources: Sequence[ContactSource], *, rate_hz: float = 200.0,
-         latency: float = 0.0, law: MakeLaw = LoadForces.at_rate) -> LandingRecord:
+         latency: float = 0.0, law: MakeLaw = LoadForces) -> LandingRecord:
     """Run one landing with contacts that act `latency` [s] after they were asked for.
 
     sources: for each box of the stack, such as `solvers`. ValueError: a contact lacks what the law
     needs.
     """
-    loop = ClosedLoop(scenario, rate_hz, latency=latency, law=law, watched=WATCHED, window=WINDOW)
+    loop = ClosedLoop(scenario, rate_hz, law=law, watched=WATCHED, window=WINDOW)
     while not loop.record.ended:
         state = loop.ask()
         loop.answer(state, {name: source(state.pose, pose) for (name, (pose, _)), source in zip(
@@ -308,7 +308,7 @@ class Way(NamedTuple):
         """Run one landing."""
         if self.law == MUJOCO:
             return own_contact(scenario, timing.rate_hz)
-        law = (LoadForces.at_rate if self.law == PATCH
+        law = (LoadForces if self.law == PATCH
                else partial(PointLaw.at_rate, size=scenario.size))
         return land(scenario, self.sources(scenario), law=law, **timing._asdict())
 

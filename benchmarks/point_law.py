@@ -72,7 +72,7 @@ def effective_mass(mass: float, size: Sequence[float]) -> float:
 class PointLaw:
     """The law of one load, whose mass is in its middle; made by `at_rate`.
 
-    It is called as `LoadForces` is, but the wrench of an answer acts until the next answer.
+    It is asked as `LoadForces` is, but the wrench of an answer acts until the next answer.
     """
 
     def __init__(self, *, stiffness: float, damping: float, torsion_radius: float,

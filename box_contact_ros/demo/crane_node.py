@@ -37,8 +37,6 @@ from ..node.parameters import (
     number,
     numbers,
     parse_command_line,
-    size,
-    text,
     warn_of_unknown,
 )
 from ..node.ros_client import CRANE_WRENCH, DEEP_RELIABLE, pose_message, stamp_of
@@ -47,6 +45,7 @@ from ..node.topics import contact_qos
 from .crane import LIMITS, CraneScenario
 from .landing import CORNER_SPEED_LIMIT, ClosedLoop, Landing, LandingRecord, LoopState, with_patch
 
+FRAME = 'world'  # of the published poses
 OFFER_PERIOD = 0.1  # time between the pairs that only ask whether anyone answers [s]
 ANSWER_SHARE = 0.8  # share of a tick that waits for its answer; the rest is for simulating it
 LOCKSTEP_PATIENCE = 1.0  # time after which lockstep takes an answer for lost [s]
@@ -59,32 +58,23 @@ POINTS_ALONE = ("the contact node's model gives contacts without a patch: the wh
                 'for it, and may not come to rest')
 
 
-def _of_scenario(field: str, description: str) -> Setting:
-    """Return the setting of a field of `CraneScenario`."""
-    default = getattr(CraneScenario, field)
-    return Setting(default, description, size if field.endswith('size') else
-                   number(*LIMITS[field]) if field in LIMITS else numbers(len(default)))
-
-
 SCENARIO = {
-    'size_a': ('size', 'full extents of the load [m]'),
-    'size_b': ('stack_size', 'full extents of the stack [m]'),
-    'mass': ('mass', 'mass of the load [kg]'),
-    'mass_offset': ('mass_offset', "centre of mass from the load's centre, in its own axes [m]"),
-    'offset': ('offset', 'x, y of the trolley from the centre of the stack [m]'),
-    'rope_angle': ('rope_angle', 'ropes from the plumb line at the start [deg]'),
-    'rope_heading': ('rope_heading', 'whereto, counter-clockwise from x [deg]'),
-    'pitch': ('pitch', 'tilt of the load about y at the start [deg]'),
-    'roll': ('roll', 'tilt of the load about x at the start [deg]'),
-    'yaw': ('yaw', 'turn of the load about the plumb line at the start [deg]'),
+    'mass': 'mass of the load [kg]',
+    'offset': 'x, y of the trolley from the centre of the stack [m]',
+    'rope_angle': 'ropes from the plumb line at the start [deg]',
+    'rope_heading': 'whereto, counter-clockwise from x [deg]',
+    'pitch': 'tilt of the load about y at the start [deg]',
+    'roll': 'tilt of the load about x at the start [deg]',
+    'yaw': 'turn of the load about the plumb line at the start [deg]',
 }
-"""Parameter: the field of CraneScenario that it sets, and what it means."""
+"""The fields of CraneScenario that are parameters, and what they mean."""
 PARAMETERS = {
     'rate': Setting(200.0, 'pairs of poses published per second [Hz]', number(1, 2000)),
     'wait': Setting(10.0, 'patience for a contact node to answer [s]', number(0, 600)),
-    'frame_id': Setting('world', 'frame of the published poses', text),
     'lockstep': Setting(False, 'no real time: every tick waits for its answer', flag),
-} | {name: _of_scenario(*field) for name, field in SCENARIO.items()}
+} | {field: Setting(getattr(CraneScenario, field), description,
+                    numbers(2) if field == 'offset' else number(*LIMITS[field]))
+     for field, description in SCENARIO.items()}
 
 
 class CraneNode(GuardedNode):
@@ -95,14 +85,11 @@ class CraneNode(GuardedNode):
         super().__init__('crane', context=context, **options)
         values = declare(self, PARAMETERS)
         warn_of_unknown(self, PARAMETERS)
-        self._rate, self._wait, self._frame = (
-            values[name] for name in ('rate', 'wait', 'frame_id'))
-        self._lockstep = values['lockstep']
+        self._rate, self._wait, self._lockstep = (
+            values[name] for name in ('rate', 'wait', 'lockstep'))
         self._look_every = math.ceil(self._rate / LOOK_RATE)
-        scenario = CraneScenario(**{field: values[name] for name, (field, _) in SCENARIO.items()})
-        # In real time answers are late or lost, so the law's constants are for a period's latency.
-        self.loop = ClosedLoop(scenario, self._rate,
-                               latency=0.0 if self._lockstep else 1.0 / self._rate)
+        scenario = CraneScenario(**{field: values[field] for field in SCENARIO})
+        self.loop = ClosedLoop(scenario, self._rate)
         self._asked: dict[int, LoopState | None] = {}
         """What was published and not answered yet, by stamp [ns]; None for an offer."""
         self._matched = False  # whether an offer was answered
@@ -174,7 +161,7 @@ class CraneNode(GuardedNode):
         """Publish both poses under one stamp [ns], the node's clock now; None: as an offer."""
         stamp = self._now()
         self._asked[stamp] = state  # before they are published: answers may be fast
-        header, crane = make_header(stamp, self._frame), self.loop.crane
+        header, crane = make_header(stamp, FRAME), self.loop.crane
         for publisher, pose in zip(self._poses, (crane.load_pose, crane.scenario.stack_pose)):
             publisher.publish(pose_message(header, pose))
         return stamp
@@ -203,7 +190,7 @@ class CraneNode(GuardedNode):
     def _publish_force(self, stamp: int) -> None:
         """Publish the force on the load of the last physics step."""
         if self.loop.record.forces:
-            message = WrenchStamped(header=make_header(stamp, self._frame))
+            message = WrenchStamped(header=make_header(stamp, FRAME))
             x, y, z = map(float, self.loop.record.forces[-1])
             message.wrench.force = Vector3(x=x, y=y, z=z)
             self._force.publish(message)

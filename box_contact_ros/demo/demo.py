@@ -49,7 +49,6 @@ def main(args: Sequence[str] | None = None) -> int:
     """Run the demonstration and return the crane's exit status."""
     options = _options(args)
     os.environ |= on_this_host(options.domain)
-    # Both take a container for each box, unless they are told otherwise.
     node = program('node.contact_node', model=options.model)
     crane = program('demo.crane_node', rate=options.rate, wait=WAIT)
     print(f'A crane sets one container down on another. It publishes both poses at '

@@ -42,7 +42,7 @@ GAP_LIMIT = 0.020  # gap after the first touch [m]: how high it may bounce
 NamedContacts = Mapping[str, Contact]
 """The contacts of one question, by the names of their pairs; the load is box A."""
 MakeLaw = Callable[..., 'LoadLaw']
-"""What makes the law of a load, called as `LoadForces.at_rate` is."""
+"""What makes the law of a load, called as `LoadForces` is."""
 
 
 NO_TURN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)  # a pose
@@ -73,20 +73,15 @@ REMEMBERED, FADING = 1.0, 1.0
 
 
 class LoadForces:
-    """`PatchForces` of one load on boxes that are fixed; made by `at_rate`."""
+    """`PatchForces` of one load on boxes that are fixed."""
 
-    def __init__(self, load: Body, step: float, period: float) -> None:
-        """Begin without contacts; step: of physics [s]; period: from question to question [s]."""
-        self._load, self._step, self._period = load, step, period
+    def __init__(self, load: Body, *, rate_hz: float, step: float) -> None:
+        """Begin without contacts; rate_hz: questions per second; step: of physics [s]."""
+        self._load, self._step, self._period = load, step, 1.0 / rate_hz
         self._places: dict[str, int] = {}  # of the fixed boxes, by the names of their pairs
         self._forces = PatchForces([load], friction=FRICTION)
-        self._ages = deque([0.0], maxlen=max(1, round(REMEMBERED / period)))  # of the answers [s]
+        self._ages = deque([0.0], maxlen=max(1, round(REMEMBERED * rate_hz)))  # of the answers [s]
         self._late = 0.0  # how late answers are taken to be [s]
-
-    @classmethod
-    def at_rate(cls, load: Body, *, rate_hz: float, step: float, **_: float) -> LoadForces:
-        """Return the forces of a load whose contacts are asked for `rate_hz` times a second."""
-        return cls(load, step, 1.0 / rate_hz)
 
     def _rows(self, row: np.ndarray, others: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return rows of all bodies: that of the load, and `others` for each fixed box."""
@@ -276,17 +271,12 @@ class LandingRecord:
 class ClosedLoop:
     """A crane under the wrench of a law, recorded tick by tick, wherever contacts come from."""
 
-    def __init__(self, scenario: CraneScenario, rate_hz: float, *, latency: float = 0.0,
-                 law: MakeLaw = LoadForces.at_rate, watched: float = WATCHED,
-                 window: float = WINDOW) -> None:
-        """Make the crane, and the law for its load, this rate and latency [s].
-
-        watched, window: those of the record [s].
-        """
+    def __init__(self, scenario: CraneScenario, rate_hz: float, *, law: MakeLaw = LoadForces,
+                 watched: float = WATCHED, window: float = WINDOW) -> None:
+        """Make the crane, and the law of its load; watched, window: those of the record [s]."""
         self.crane = Crane(scenario, rate_hz)
         self.record = LandingRecord(scenario, rate_hz, watched, window)
-        self._law = law(scenario.load, rate_hz=rate_hz, latency=latency,
-                        step=self.crane.physics_step)
+        self._law = law(scenario.load, rate_hz=rate_hz, step=self.crane.physics_step)
         self._under_way: deque[tuple[float, NamedContacts, LoopState]] = deque()
         """Answers that do not act yet: when they will [s], and the state that they are for."""
         self._wrench = np.zeros(6)

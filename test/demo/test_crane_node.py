@@ -181,8 +181,6 @@ def test_lockstep_ends_when_nobody_answers(crane, monkeypatch):
 def test_lost_ticks_are_bridged(contact_node, crane, monkeypatch):
     """Every eleventh answer is thrown away on arrival: the last patch is held, and it lands."""
     node, executor = crane
-    # As in real time, the law is made for a period's latency.
-    node.loop = crane_node.ClosedLoop(node.loop.crane.scenario, 200.0, latency=0.005)
     take, count = node.loop.answer, 0
 
     def lossy(*arguments, **options):

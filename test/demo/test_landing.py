@@ -30,7 +30,7 @@ HARD = CraneScenario(rope_angle=3.0, rope_heading=100.0, pitch=2.0, roll=-2.0, y
 def landed(scenario, *, rate_hz=200.0, latency=0.002, lost=0.0):
     """Return what is measured of a landing by exact contacts, of which a share gets lost."""
     solver = ContactSolver(scenario.size, scenario.stack_size, model='exact')
-    random, loop = np.random.default_rng(2), ClosedLoop(scenario, rate_hz, latency=latency)
+    random, loop = np.random.default_rng(2), ClosedLoop(scenario, rate_hz)
     while not loop.record.ended:
         state = loop.ask()
         if random.random() >= lost:
@@ -120,7 +120,7 @@ def test_the_patch_of_a_flat_load_is_that_of_the_whole_load():
     assert assumed.covariance[:2, :2] == pytest.approx(exact.covariance[:2, :2])
     wrenches = []
     for contact in (exact, assumed):
-        law = LoadForces.at_rate(Body.of_box(load, 20_000.0), rate_hz=200.0, step=0.001)
+        law = LoadForces(Body.of_box(load, 20_000.0), rate_hz=200.0, step=0.001)
         law.hold({'load_stack': contact}, pose, age=0.0)
         wrenches.append(law.wrench(pose, np.array([0.1, 0.0, -0.2, 0.01, 0.02, 0.03])))
     assert wrenches[1] == pytest.approx(wrenches[0], rel=1e-9, abs=1e-3)
