@@ -41,7 +41,7 @@ from .pose_sets import LOADS, SETS, Pairs, drawn
 PAIRS, QUICK_PAIRS = 100_000, 5_000
 CLASSES = ('vertex-face', 'edge-edge', 'edge-face', 'face-face')
 WINNERS = ('face axis', 'edge axis')
-SHOWN = (1e-6, 1.0)  # errors that are drawn [%]
+SHOWN = (1e-6, 10.0)  # errors that are drawn to scale [%]; others are at the edge
 MARKS = {'o': 'half of the pairs', '|': '99 %', 'D': 'worst pair'}
 """What is drawn of a set."""
 CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
@@ -209,11 +209,11 @@ def csv_rows(rows: Sequence[AccuracyRow]) -> Iterator[dict[str, object]]:
 def draw(path: Path, rows: Sequence[AccuracyRow]) -> None:
     """Draw half, 99 % and the worst of the point errors: a line for each set and model."""
     models = list(dict.fromkeys(row.model for row in rows))
-    figure, axes = output.subplots(1, 1, (7.5, 1.3 + 0.3 * len(rows)))
+    figure, axes = output.subplots(1, 1, (6.4, 1.5 + 0.3 * len(rows)))
     axis = axes[0, 0]
     for place, row in enumerate(rows):
         errors = row.errors['point']['all']
-        values = [max(value, SHOWN[0]) for value in (errors.p50, errors.p99, errors.worst)]
+        values = np.clip((errors.p50, errors.p99, errors.worst), *SHOWN)
         colour = f'C{models.index(row.model)}'
         axis.plot(values, [place] * len(values), color=colour, linewidth=1.2)
         for (mark, label), value in zip(MARKS.items(), values):
@@ -226,7 +226,7 @@ def draw(path: Path, rows: Sequence[AccuracyRow]) -> None:
              xlabel="point error [% of the smaller box's longest edge]")
     axis.grid(color='0.9', linewidth=0.5)
     axis.set_axisbelow(True)
-    axis.legend(fontsize=9, loc='lower right')
+    figure.legend(fontsize=9, loc='outside lower center', ncols=3, frameon=False)
     figure.savefig(path)
 
 

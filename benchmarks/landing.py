@@ -4,7 +4,7 @@
 """Landings by the way of contact and force: whether the container comes to rest, and how flat.
 
 It runs a grid of 36 landings by every way (some by a sample), rate and latency. It also lands other
-loads and stacks, with an outcome that is stated beforehand (`landing_ways`). It writes landing.csv
+loads and stacks, with an expected outcome (`landing_ways`). It writes landing.csv
 (a row per landing), landing.md (tables) and landing.png (one landing, four ways). The exit status
 is 1 if patches of `exact`, the default, do not do all that is expected. Misses of `mlp` are printed
 and counted on the page.

@@ -187,7 +187,7 @@ out by 0.8 m, catch it then."""
 
 @dataclass(frozen=True, kw_only=True)
 class PlannedLanding:
-    """One landing and what is expected of it beforehand."""
+    """One landing and what is expected of it."""
 
     name: str
     scenario: CraneScenario

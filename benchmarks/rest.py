@@ -4,7 +4,7 @@
 """Whether loads rest, slide, ride and stack as they should, by the law of force and by MuJoCo.
 
 `python -m benchmarks.rest` runs every case by `PatchForces` and by MuJoCo's own contact
-(`loops`), and compares one figure with a limit that was stated beforehand. The program prints one
+(`loops`), and compares one figure with a limit. The program prints one
 table, and writes rest.md and rest.csv. The exit status is 1 if the law misses a limit.
 
 Lengths in m, masses in kg, times in s.
