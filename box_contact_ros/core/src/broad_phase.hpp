@@ -100,7 +100,8 @@ class BroadPhase {
       known_[box] = !std::all_of(p, p + 7, [](double number) { return std::isnan(number); });
       if (!known_[box]) continue;
       Pose<double> pose{{p[0], p[1], p[2]}, {p[3], p[4], p[5], p[6]}};
-      if (!pose_valid(pose)) return known_[box] = 0, int64_t(box);
+      if (!pose_valid(triple(pose.position), squared_norm(pose.quaternion)))
+        return known_[box] = 0, int64_t(box);
       bounds_[box] = bounds_of(pose, half_[box]);
     }
     test_listed();

@@ -61,6 +61,10 @@ BC_INLINE Mat<T> rotation_matrix(const T (&q)[4], T norm2) {
            {s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)},
            {s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)}}};
 }
+template <class T>
+BC_INLINE Mat<T> rotation_matrix(const T (&q)[4]) {
+  return rotation_matrix(q, squared_norm(q));
+}
 // Its rows.
 template <class T>
 BC_INLINE Columns<T> rotation_rows(const T (&q)[4], T norm2) {
