@@ -10,7 +10,7 @@ docs/reference/diagnostics.md lists all findings.
 from __future__ import annotations
 
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -64,8 +64,8 @@ class TickMonitor:
 
     def __init__(self) -> None:
         self.absent: list[str] = []  # the boxes that the last array had no pose of
-        self._times = np.zeros((KEPT_TIMES, 2))
-        """Time in the solver [us] and age of the answer [ms] of the last evaluations, a ring."""
+        self._times: deque[tuple[int, int]] = deque(maxlen=KEPT_TIMES)
+        """Time in the solver and age of the answer [ns] of the last evaluations."""
         self._evaluations = 0
         self._taken = time.monotonic()  # when `take_load` was called last
         self._refusals: dict[str, str] = {}  # log lines of the next report, by reason
@@ -88,7 +88,7 @@ class TickMonitor:
 
         The age runs from the arrival of the pose that completes the tick, by the wall clock.
         """
-        self._times[self._evaluations % KEPT_TIMES] = 1e-3 * took, 1e-6 * age
+        self._times.append((took, age))
         self._evaluations += 1
         if self._open is None:
             self._open = stale
@@ -112,9 +112,11 @@ class TickMonitor:
     def take_load(self, lost: int) -> Load:
         """Return what happened since the last call; the caller knows how many poses were lost."""
         now = time.monotonic()
-        times = self._times[:min(self._evaluations, KEPT_TIMES)].copy()
-        load = Load(now - self._taken, self._evaluations, lost, times[:, 0], times[:, 1])
+        times = np.array(self._times).reshape(-1, 2)
+        load = Load(now - self._taken, self._evaluations, lost, 1e-3 * times[:, 0],
+                    1e-6 * times[:, 1])
         self._taken, self._evaluations = now, 0
+        self._times.clear()
         return load
 
     def summary(self, *, came: bool, max_age: float) -> Summary:
