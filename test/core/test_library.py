@@ -325,14 +325,14 @@ for word; do
     before=$word
 done
 kept=$(dirname "$0")/$(basename "$before").o$library
-if [ ! -e "$kept" ]; then "$@" -O0 && cp "$output" "$kept" || exit 1; fi
+if [ ! -e "$kept" ]; then "$@" -Og && cp "$output" "$kept" || exit 1; fi
 cp "$kept" "$output"
 """
 
 
 @pytest.fixture(scope='module')
 def from_source(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, ...]]:
-    """Return options of CMake: the baseline alone, without optimisation, compiled once."""
+    """Return options of CMake: the baseline alone, hardly optimised, compiled once."""
     tool('cmake')
     launcher = tmp_path_factory.mktemp('launcher') / 'launcher'
     launcher.write_text(LAUNCHER)
