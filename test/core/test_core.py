@@ -22,6 +22,7 @@ import numpy as np
 import poses
 import pytest
 from poses import Pairs
+from test_extremes import random_network
 
 import box_contact_ros
 from box_contact_ros import Contact, ContactSolver
@@ -75,6 +76,8 @@ for model in ('exact', 'mlp'):
     solver = ContactSolver((1, 1, 1), (1, 1, 1), model=model)
     many = solver.batch(*columns[:2], size_a=columns[2], size_b=columns[3])
     found |= {f'{model} {name}': value for name, value in many._asdict().items()}
+strange = native.PairSolver('mlp', (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), pairs['network'])
+found |= {f'strange {k}': value for k, value in enumerate(strange.solve(*columns, 1)[0])}
 for row in range(0, len(columns[0]), 40):
     a, b, size_a, size_b = (column[row] for column in columns)
     one = ContactSolver(size_a, size_b, model='exact')(a, b)
@@ -85,11 +88,12 @@ np.savez(sys.argv[2], **found)
 
 
 def test_every_instruction_set_gives_the_same_bits(tmp_path: Path) -> None:
-    """All answers of both models, 70,000 pairs of all kinds and the hard poses."""
+    """All answers of both models and of a random network, 70,000 pairs and the hard poses."""
     if len(SETS_HERE) == 1:
         pytest.skip('this machine has one instruction set only')
     pairs = poses.joined(poses.of_all_kinds(10_000, 1), poses.hard_pairs())
-    np.savez(tmp_path / 'pairs.npz', **pairs._asdict())
+    np.savez(tmp_path / 'pairs.npz', **pairs._asdict(),
+             network=random_network(np.random.default_rng(3)))
     running = {name: started(name, '-c', ANSWERS, tmp_path / 'pairs.npz', tmp_path / f'{name}.npz')
                for name in SETS_HERE}
     found = {}

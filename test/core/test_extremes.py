@@ -22,16 +22,18 @@ ASPECT_KNOWN = 1e8
 nears the rounding of the longest, and points are outside by up to 1e-8 of the longest."""
 
 
-def solver(model: str, rng: np.random.Generator) -> native.PairSolver:
-    """Return a solver with random weights of up to 1 or 1e4, one in eight of them zero."""
-    if model == 'exact':
-        return native.PairSolver('exact', UNIT, UNIT)
+def random_network(rng: np.random.Generator) -> np.ndarray:
+    """Return weights of up to 1 or 1e4, one in eight of them zero, as the core reads them."""
     most, (first, second) = rng.choice([1.0, 1e4]), rng.integers(1, 4, 2)
     numbers = rng.uniform(-most, most, 8 * (
         first * (1 + native.FEATURES) + second * (1 + 8 * first) + 1 + 8 * second))
     numbers[rng.random(len(numbers)) < 1 / 8] = 0.0
-    network = np.concatenate([[first, second], numbers]).astype(np.float32)
-    return native.PairSolver('mlp', UNIT, UNIT, network)
+    return np.concatenate([[first, second], numbers]).astype(np.float32)
+
+
+def solver(model: str, rng: np.random.Generator) -> native.PairSolver:
+    """Return a solver, of `mlp` with a random network."""
+    return native.PairSolver(model, UNIT, UNIT, random_network(rng) if model == 'mlp' else None)
 
 
 def accepted(pairs: Pairs) -> np.ndarray:

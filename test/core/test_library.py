@@ -305,18 +305,15 @@ def test_a_debug_build_is_as_fast(tmp_path: Path) -> None:
     assert all(' -O3 ' in command['command'] for command in commands)
 
 
-FORMS = """
+FETCHED = f"""
 cmake_minimum_required(VERSION 3.18)
-project(forms LANGUAGES CXX)
-{take_in}
-add_executable(first_contact "{example}/first_contact.cpp")
+project(fetched LANGUAGES CXX)
+include(FetchContent)
+FetchContent_Declare(box_contact_ros SOURCE_DIR "{ROOT}")
+FetchContent_MakeAvailable(box_contact_ros)
+add_executable(first_contact "{EXAMPLE}/first_contact.cpp")
 target_link_libraries(first_contact PRIVATE box_contact_ros::box_contact)
 """
-TAKE_IN = {
-    'add_subdirectory': f'add_subdirectory("{ROOT}" core)',
-    'FetchContent': 'include(FetchContent)\n'
-                    f'FetchContent_Declare(box_contact_ros SOURCE_DIR "{ROOT}")\n'
-                    'FetchContent_MakeAvailable(box_contact_ros)'}
 LAUNCHER = """#!/bin/sh
 # Compile, or copy what the first project has compiled: sources and flags are the same.
 for word; do
@@ -342,10 +339,9 @@ def from_source(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str,
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('form', TAKE_IN)
-def test_from_source(tmp_path: Path, from_source: tuple[str, ...], form: str) -> None:
-    """Without Python."""
-    (tmp_path / 'CMakeLists.txt').write_text(FORMS.format(take_in=TAKE_IN[form], example=EXAMPLE))
+def test_from_source(tmp_path: Path, from_source: tuple[str, ...]) -> None:
+    """By FetchContent, which calls add_subdirectory; without Python."""
+    (tmp_path / 'CMakeLists.txt').write_text(FETCHED)
     configure(tmp_path, tmp_path / 'build', *from_source)
     assert example(tmp_path / 'build' / 'first_contact') == EXAMPLE_SAYS
 

@@ -89,21 +89,6 @@ def test_a_quaternion_is_normalised(model, norm):
     assert found.point == pytest.approx(wanted.point, abs=1e-13 if model == 'exact' else 1e-5)
 
 
-@every_model
-@few
-@given(st.lists(st.floats(-2, 2), min_size=14, max_size=14), st.booleans(), st.booleans())
-def test_minus_q_is_q(model, numbers, minus_a, minus_b):
-    """As q and −q are one rotation, every bit of the answer is the same."""
-    a, b = np.array(numbers[:7]), np.array(numbers[7:])
-    if pose_fault(a) or pose_fault(b):
-        return
-    flipped = [np.r_[pose[:3], -pose[3:] if minus else pose[3:]]
-               for pose, minus in ((a, minus_a), (b, minus_b))]
-    one, two = SOLVERS[model](a, b), SOLVERS[model](*flipped)
-    for mine, theirs in zip(one, two):
-        assert np.array_equal(mine, theirs, equal_nan=True)
-
-
 @pytest.mark.parametrize('norm', [QUATERNION_MIN, QUATERNION_MAX])
 def test_the_limits_of_a_quaternion_are_one(norm):
     """The checks in Python and the core draw the line at the same bit.

@@ -5,10 +5,7 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +22,9 @@ from benchmarks.steps import drawn_paths, largest_steps
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import (
     FEATURES,
-    FORCE,
     NETWORK_FORMAT,
     OUTPUTS,
     UNITS_MAX,
-    instruction_sets,
     native,
 )
 from box_contact_ros.solver.contact import Contacts
@@ -38,8 +33,6 @@ from box_contact_ros.solver.pose import rotation_matrix
 from box_contact_ros.solver.weights_file import Network, WeightsError
 
 N = 4000
-LANES = native.lanes
-"""Rows of a batch that are solved side by side."""
 UNIT = (1.0, 1.0, 1.0)
 ALL_SETS = {**SETS, **LOADS}
 
@@ -89,10 +82,6 @@ def with_numbers(pairs: Pairs, numbers: np.ndarray) -> Contacts:
 def assert_same_bits(one: Contacts, other: Contacts, where: object = None) -> None:
     for name, mine, theirs in zip(Contacts._fields, one, other, strict=True):
         assert np.array_equal(mine, theirs, equal_nan=True), (name, where)
-
-
-def rows_of(found: Contacts, rows: np.ndarray) -> Contacts:
-    return Contacts(*(field[rows] for field in found))
 
 
 def trace(covariance: np.ndarray) -> np.ndarray:
@@ -221,38 +210,6 @@ def test_swap(mlp: ContactSolver, pairs: Pairs) -> None:
     one, two = pairs.contacts(mlp), other.contacts(mlp)
     for name in ('colliding', 'separation', 'point', 'volume', 'covariance'):
         assert np.array_equal(getattr(one, name), getattr(two, name), equal_nan=True), name
-
-
-def test_all_instruction_sets_have_the_same_bits(tmp_path: Path) -> None:
-    """Of the shipped network and of garbage, in batches and in single calls."""
-    code = ("import sys, numpy as np\n"
-            "from box_contact_ros.core import native\n"
-            "data = np.load(sys.argv[1])\n"
-            "rows = [data[name] for name in ('pose_a', 'pose_b', 'size_a', 'size_b')]\n"
-            "unit, found = (1.0, 1.0, 1.0), []\n"
-            "for name in ('shipped', 'garbage'):\n"
-            "    solver = native.PairSolver('mlp', unit, unit, data[name])\n"
-            "    found += solver.solve(*rows, 1)[0]\n"
-            "    for i in range(0, len(rows[0]), 50):\n"
-            "        found += solver.solve(*(part[i:i + 1] for part in rows), 1)[0]\n"
-            "sys.stdout.buffer.write(b''.join(part.tobytes() for part in found))\n")
-    parts = [drawn(name, 500) for name in FAMILIES]
-    pairs = Pairs(*(np.concatenate(fields) for fields in zip(*parts)))
-    np.savez(tmp_path / 'pairs.npz', **pairs._asdict(), shipped=SHIPPED, garbage=garbage('random'))
-    answers = [subprocess.run([sys.executable, '-c', code, str(tmp_path / 'pairs.npz')],
-                              env={**os.environ, FORCE: name}, capture_output=True,
-                              check=True).stdout for name in instruction_sets()]
-    assert len(answers[0]) > 100 * len(pairs.size) and len(set(answers)) == 1
-
-
-@pytest.mark.parametrize('count', [1, 2, LANES - 1, LANES, LANES + 1, 2 * LANES, 4 * LANES + 2])
-@pytest.mark.parametrize('first', [0, 5])
-def test_a_row_does_not_know_its_neighbours(mlp: ContactSolver, count: int, first: int) -> None:
-    """Vectors that are not full, and rows in other lanes: the same bits."""
-    pairs = drawn('crossed bars', 200)
-    some = slice(first, first + count)
-    assert_same_bits(pairs.rows(some).contacts(mlp),
-                     Contacts(*(field[some] for field in pairs.contacts(mlp))))
 
 
 def test_rows_apart_or_refused_do_not_disturb_neighbours(mlp: ContactSolver) -> None:
