@@ -125,8 +125,9 @@ def with_patch(touch: Contact, pose: np.ndarray, size: Sequence[float]) -> Conta
     axes = rotation_matrix(pose[3:])
     along = float(np.abs(touch.normal @ axes) @ size)
     depth = max(0.0, -touch.separation)  # at exact touch the separation may be above zero
-    return touch._replace(volume=depth * float(np.prod(size)) / along,
-                          covariance=(axes * np.square(size) / 12.0) @ axes.T)
+    return Contact(touch.colliding, touch.separation, touch.normal, touch.point,
+                   depth * float(np.prod(size)) / along,
+                   (axes * np.square(size) / 12.0) @ axes.T, touch.axis)
 
 
 @dataclass(frozen=True, kw_only=True)

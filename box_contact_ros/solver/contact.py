@@ -11,31 +11,7 @@ import numpy as np
 
 from ..core import native
 
-
-class Contact(NamedTuple):
-    """The contact of one pair of boxes; frame: that of the poses."""
-
-    colliding: bool
-    """True from exact touch on: separation ≤ 8 ulp of the largest coordinate or size."""
-    separation: float
-    """Signed [m]: negative is the overlap depth, positive the largest gap on a SAT axis."""
-    normal: np.ndarray
-    """(3,) unit vector from A to B; NaN where the separation exceeds the solver's margin."""
-    point: np.ndarray
-    """(3,) centroid of A∩B [m]; NaN without contact."""
-    volume: float
-    """Volume of A∩B [m³]; 0 without contact; NaN from models that give the point alone."""
-    covariance: np.ndarray
-    """(3, 3) second central moments of A∩B divided by its volume [m²]; NaN where volume is
-    NaN, and without contact.
-
-    Volume and covariance are those of the overlap whose centroid is `point`, pressed in or not.
-    """
-    axis: int = -1
-    """The winning axis, also of pairs apart; −1 from models that do not tell it.
-
-    0 to 2 faces of A, 3 to 5 faces of B, 6 + 3·i + j the edges i of A and j of B.
-    """
+Contact = native.Contact
 
 
 class Contacts(NamedTuple):
@@ -59,11 +35,14 @@ class Contacts(NamedTuple):
     @classmethod
     def of(cls, contacts: Sequence[Contact]) -> Contacts:
         """Return single contacts as arrays."""
-        n = len(contacts)
-        columns = [np.array(column) for column in zip(*contacts)] or [np.empty(0)] * 7
-        return cls(*(column.reshape(n, *shape).astype(kind) for column, shape, kind in zip(
-            columns, ((), (), (3,), (3,), (), (3, 3), ()),
-            (bool, float, float, float, float, float, np.int32))))
+        def column(name: str, kind: type, *shape: int) -> np.ndarray:
+            values = [getattr(contact, name) for contact in contacts]
+            return np.array(values, kind).reshape(len(values), *shape)
+
+        return cls(column('colliding', bool), column('separation', float),
+                   column('normal', float, 3), column('point', float, 3),
+                   column('volume', float), column('covariance', float, 3, 3),
+                   column('axis', np.int32))
 
     def row(self, number: int) -> Contact:
         """Return the contact of one pair."""
@@ -98,4 +77,4 @@ def without_patch(colliding: np.ndarray, separation: np.ndarray, normal: np.ndar
                     np.full(len(colliding), -1, dtype=np.int32))
 
 
-native.use_contact_types(Contact, Contacts)
+native.use_contacts(Contacts)

@@ -4,6 +4,7 @@
 """The native core gives the same bits in every instruction set, thread, call and kind of array."""
 from __future__ import annotations
 
+import copy
 import gc
 import os
 import pickle
@@ -47,8 +48,15 @@ def a_solver(model: str) -> ContactSolver:
     return ContactSolver((1, 1, 1), (1, 1, 1), model=model)
 
 
-def assert_same_bits(one: tuple, other: tuple, where: object = None) -> None:
-    for name, mine, theirs in zip(Contact._fields, one, other, strict=True):
+def fields(found: tuple | Contact) -> tuple:
+    if isinstance(found, Contact):
+        return tuple(getattr(found, name) for name in Contacts._fields)
+    return found
+
+
+def assert_same_bits(one: tuple | Contact, other: tuple | Contact,
+                     where: object = None) -> None:
+    for name, mine, theirs in zip(Contacts._fields, *map(fields, (one, other)), strict=True):
         assert np.array_equal(mine, theirs, equal_nan=True), (name, where)
 
 
@@ -247,7 +255,7 @@ def test_one_solver_in_many_threads(model: str) -> None:
                 assert_same_bits(solve(solver, pairs, 1 + number % 3), wanted)
             else:
                 ones = [solver(a, b) for a, b in zip(pairs.pose_a, pairs.pose_b)]
-                assert_same_bits(tuple(map(np.array, zip(*ones))), singles)
+                assert_same_bits(Contacts.of(ones), singles)
 
     with ThreadPoolExecutor(8) as pool:
         list(pool.map(work, range(8)))
@@ -274,7 +282,7 @@ def test_a_batch_is_its_single_calls(model: str, single_solvers: dict) -> None:
     make = single_solvers[model]
     rows = [make(size_a=tuple(size_a), size_b=tuple(size_b))(a, b)
             for a, b, size_a, size_b in zip(*pairs)]
-    assert_same_bits(many, tuple(np.array(column) for column in zip(*rows)))
+    assert_same_bits(many, Contacts.of(rows))
     assert isinstance(rows[0], Contact) and type(rows[0].colliding) is bool
     assert many.colliding.sum() > 10_000
 
@@ -309,6 +317,41 @@ def test_kinds_and_shapes_of_a_patch() -> None:
     many = solver.batch([poses.IDENTITY] * 4, [b] * 4)
     assert many.volume.shape == (4,) and many.covariance.shape == (4, 3, 3)
     assert len(solver.batch(np.empty((0, 7)), np.empty((0, 7))).covariance) == 0
+
+
+def test_a_contact_never_changes() -> None:
+    """Arrays are new ones each time, and what the constructor was given stays its caller's."""
+    one = a_solver('exact')(poses.IDENTITY, (0.5, 0.25, 0.9, 0, 0, 0, 1))
+    before = fields(one)
+    for name in ('normal', 'point', 'covariance'):
+        getattr(one, name)[:] = 7.0
+    for name in (*Contacts._fields, 'another'):
+        with pytest.raises(AttributeError):
+            setattr(one, name, before[0])
+        with pytest.raises(AttributeError):
+            delattr(one, name)
+    point = np.array(one.point)
+    again = Contact(one.colliding, one.separation, one.normal, point, one.volume, one.covariance,
+                    one.axis)
+    point[:] = 7.0
+    for same in (one, again, copy.deepcopy(one)):
+        assert_same_bits(before, same)
+    assert repr(again) == repr(one)
+    assert repr(one).startswith('Contact(colliding=True, separation=-0.09')
+    assert repr(one).endswith(', axis=2)')
+
+
+def test_a_contact_of_numbers() -> None:
+    """Kinds and shapes are checked; without an axis it is the unknown one."""
+    numbers = (True, -1, [0, 0, 1], (1, 2, 3), 2, np.eye(3, dtype=np.float32))
+    one = Contact(*numbers)
+    assert one.axis == -1 and type(one.separation) is float and one.point.tolist() == [1, 2, 3]
+    for place, wrong in ((1, 'deep'), (2, [0, 0]), (3, np.eye(3)), (5, [1, 2, 3]), (4, None)):
+        with pytest.raises((TypeError, ValueError)):
+            Contact(*numbers[:place], wrong, *numbers[place + 1:])
+    for arguments in (numbers[:-1], (*numbers, 1, 2), (*numbers, 0.5)):
+        with pytest.raises(TypeError):
+            Contact(*arguments)
 
 
 # --- the object -----------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip('mujoco')
 
-from box_contact_ros import Body, ContactSolver
+from box_contact_ros import Body, Contact, ContactSolver
 from box_contact_ros.demo.crane import CraneScenario
 from box_contact_ros.demo.landing import (
     CORNER_SPEED_LIMIT,
@@ -113,7 +113,8 @@ def test_the_patch_of_a_flat_load_is_that_of_the_whole_load():
     load, stack = (12.0, 2.0, 3.0), (20.0, 20.0, 1.0)
     pose = np.array([1.0, 2.0, 1.98, *turn])
     exact = ContactSolver(load, stack, model='exact')(pose, (0, 0, 0, 0, 0, 0, 1))
-    alone = exact._replace(volume=math.nan, covariance=np.full((3, 3), math.nan))
+    alone = Contact(exact.colliding, exact.separation, exact.normal, exact.point, math.nan,
+                    np.full((3, 3), math.nan))
     assumed = with_patch(alone, pose, load)
     assert with_patch(exact, pose, load) is exact
     assert assumed.volume == pytest.approx(exact.volume) == pytest.approx(12.0 * 2.0 * 0.02)

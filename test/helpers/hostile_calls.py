@@ -242,6 +242,7 @@ def random_calls(seed: int, rounds: int) -> None:
         (public.batch, [rows(), rows()], {'size_b': boxes, 'threads': 2, 'patch': False}),
         (public.batch, [rows()], {'sizes': boxes, 'pairs': places}),
         (solver.solve, [rows(), rows(), one, one, 2, True, places], {}),
+        (native.Contact, [True, -1.0, np.ones(3), np.ones(3), 1.0, np.eye(3), 2], {}),
         (native.mlp_inputs, [rows(), rows(), one, one], {}),
         (native.clipped, [rows(), rows(), one, one], {}),
         (native.BroadPhase, phase_arguments(), {}),

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import (
@@ -26,6 +27,7 @@ from box_contact_ros.scene.pairing import StampedPose
 from box_contact_ros.scene.scene_solver import Pair
 from box_contact_ros.solver.checks import pose_fault
 from box_contact_ros.solver.contact import Contact, patch_area
+from box_contact_ros.solver.contact import Contacts as Rows
 
 
 def pose_stamped(numbers: Iterable[float], frame_id: str, stamp: int) -> PoseStamped:
@@ -113,6 +115,11 @@ def contacts_at(stamp: int, touching: Mapping[Pair, Contact], stale: Sequence[st
                 ) -> Contacts:
     """Return `contacts` of what touches at a stamp [ns], in the frame `yard`."""
     return make_contacts(make_header(stamp, 'yard'), touching.items(), stale)
+
+
+def changed(contact: Contact, **numbers: Any) -> Contact:
+    """Return a contact with some other numbers."""
+    return Contact(**{name: getattr(contact, name) for name in Rows._fields} | numbers)
 
 
 def _point(numbers: np.ndarray) -> Point:

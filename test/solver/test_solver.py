@@ -43,7 +43,7 @@ def test_area_of_a_patch():
         contact = solver(*poses.moved(pair, rng.uniform(-5, 5, 3),
                                       poses.unit_quaternions(rng, 1)))
         assert patch_area(contact) == pytest.approx(wanted, rel=1e-9)
-    nothing = contact._replace(covariance=np.full((3, 3), np.nan))
+    nothing = Contact(True, -1.0, contact.normal, contact.point, 0.1, np.full((3, 3), np.nan))
     assert math.isnan(patch_area(nothing))
 
 

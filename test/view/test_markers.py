@@ -15,7 +15,7 @@ import yaml
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from ros_client import PATIENCE, Client, serving
-from typed_messages import contacts_at
+from typed_messages import changed, contacts_at
 from visualization_msgs.msg import Marker, MarkerArray
 
 from box_contact_ros import ContactSolver
@@ -97,7 +97,7 @@ def test_all_contacts_are_drawn_and_the_deepest_labelled():
     boxes = {f's{n}': Box(f's{n}', CUBE, (n, 0, 0, 0, 0, 0, 1)) for n in range(30)}
     boxes['load'] = Box('load', CUBE, pose_topic='load/pose')
     pairs = tuple(Pair(f'p{n}', 'load', f's{n}') for n in range(30))
-    touching = {pair: CONTACT._replace(separation=-1e-3 * n, point=np.full(3, n))
+    touching = {pair: changed(CONTACT, separation=-1e-3 * n, point=np.full(3, n))
                 for n, pair in enumerate(pairs)}
     _, found = drawing(touching, Scene(boxes, pairs))
     assert [xyz(place)[0] for place in found['points'][0].points] == list(range(29, -1, -1))

@@ -31,7 +31,7 @@ import viser
 from browser import chromium, open_page
 from children import children
 from PIL import Image
-from typed_messages import contacts_at, pose_array, pose_stamped
+from typed_messages import changed, contacts_at, pose_array, pose_stamped
 from websockets.sync.client import connect
 
 from box_contact_ros import ContactSolver
@@ -157,7 +157,7 @@ def test_contacts_that_none_can_be_are_refused(make_node, numbers):
     send(node, START, ORIGIN, TOUCHING)
     node._on_contacts(contacts_at(START, {PAIR: EXACT}))
     with pytest.raises(Refused, match='numbers that none has'):
-        node._on_contacts(contacts_at(START + MS, {PAIR: EXACT._replace(**numbers)}))
+        node._on_contacts(contacts_at(START + MS, {PAIR: changed(EXACT, **numbers)}))
     assert node.tick().stamp == START
 
 
@@ -171,9 +171,9 @@ def test_the_deepest_contact_comes_first():
     """Near pairs are left out; a model without a patch gives NaN."""
     pairs = tuple(Pair.between('a', b) for b in 'bcd')
     scene = Scene({name: Box(name, CUBE, pose_topic=name) for name in 'abcd'}, pairs)
-    nothing = EXACT._replace(volume=math.nan, covariance=np.full((3, 3), math.nan))
-    apart = EXACT._replace(point=np.full(3, math.nan), separation=0.1)
-    message = contacts_at(1, {pairs[0]: EXACT, pairs[1]: nothing._replace(separation=-1.0)})
+    nothing = changed(EXACT, volume=math.nan, covariance=np.full((3, 3), math.nan))
+    apart = changed(EXACT, point=np.full(3, math.nan), separation=0.1)
+    message = contacts_at(1, {pairs[0]: EXACT, pairs[1]: changed(nothing, separation=-1.0)})
     message.near = contacts_at(1, {pairs[2]: apart}).contacts
     answer = read_touching(message, scene)
     assert answer.pairs.tolist() == [[0, 2], [0, 1]]

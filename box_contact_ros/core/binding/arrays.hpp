@@ -106,13 +106,13 @@ Array<Number> make(Shape shape) {
       int(shape.size()), const_cast<npy_intp*>(shape.begin()), numpy_type<Number>));
 }
 
-// A tuple of arrays.
+// A tuple of arrays, or an object of a type that is one.
 template <class... Arrays>
-PyObject* pack(Arrays&&... arrays) {
-  Owned tuple(made(PyTuple_New(sizeof...(arrays))));
+PyObject* pack(PyTypeObject* type, Arrays&... arrays) {
+  PyObject* tuple = made(type->tp_alloc(type, sizeof...(arrays)));
   Py_ssize_t at = 0;
-  (PyTuple_SET_ITEM(tuple.get(), at++, arrays.object.release()), ...);
-  return tuple.release();
+  (PyTuple_SET_ITEM(tuple, at++, arrays.object.release()), ...);
+  return tuple;
 }
 
 inline void write(const Vec<double>& v, double* numbers) { std::memcpy(numbers, v.v, sizeof(v.v)); }

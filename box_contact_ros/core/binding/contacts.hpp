@@ -1,53 +1,125 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// Contacts as Python has them: named tuples of Python's own, for one pair and for many.
+// Contacts as Python has them: an object for one pair, and a named tuple of arrays for many.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <limits>
 
 #include "../src/kernel.hpp"
-#include "arrays.hpp"
+#include "arrays.hpp"  // Python.h
+#include <structmember.h>
 
 namespace box_contact::binding {
 
-inline PyTypeObject* contact_type = nullptr;  // tuples, until `use_contact_types` is called
-inline PyTypeObject* contacts_type = nullptr;
+inline PyTypeObject* contact_type = nullptr;
+inline PyTypeObject* contacts_type = nullptr;  // a tuple, until `use_contacts` is called
 
-// A new tuple of a type; takes over the fields, and some of them may be nullptr.
-template <Py_ssize_t count>
-PyObject* new_tuple(PyTypeObject* type, PyObject* const (&fields)[count]) {
-  bool complete = true;
-  for (PyObject* field : fields) complete &= field != nullptr;
-  PyObject* tuple = complete ? type->tp_alloc(type, count) : nullptr;
-  for (Py_ssize_t k = 0; k < count; ++k) {
-    if (tuple) {
-      PyTuple_SET_ITEM(tuple, k, fields[k]);
-    } else {
-      Py_XDECREF(fields[k]);
-    }
-  }
-  return tuple;
+// --- Contact ------------------------------------------------------------------------------------
+
+using Contact = Holder<bc_contact>;
+
+template <class... Lengths>
+PyObject* array_of(const double* numbers, Lengths... lengths) {
+  auto array = make<double>({lengths...});
+  std::copy_n(numbers, (lengths * ...), array.numbers);
+  return array.object.release();
+}
+inline PyObject* contact_normal(PyObject* self, void*) {
+  return array_of(Contact::of(self).normal, 3);
+}
+inline PyObject* contact_point(PyObject* self, void*) {
+  return array_of(Contact::of(self).point, 3);
+}
+inline PyObject* contact_covariance(PyObject* self, void*) {
+  return array_of(Contact::of(self).covariance[0], 3, 3);
 }
 
-// A new array of 3, or of 3 × 3 numbers.
-inline PyObject* new_array(const double* numbers, int dimensions) {
-  npy_intp shape[] = {3, 3};
-  PyObject* array = PyArray_SimpleNew(dimensions, shape, NPY_DOUBLE);
-  if (array)
-    std::memcpy(PyArray_DATA(reinterpret_cast<PyArrayObject*>(array)), numbers,
-                (dimensions == 1 ? 3 : 9) * sizeof(double));
-  return array;
+inline PyObject* contact_new(PyTypeObject* type, PyObject* args, PyObject* keywords) {
+  PyObject *normal_given, *point_given, *covariance_given;
+  int colliding;
+  bc_contact contact{};
+  contact.axis = -1;
+  static const char* names[] = {"colliding", "separation", "normal", "point",
+                                "volume",    "covariance", "axis",   nullptr};
+  if (!PyArg_ParseTupleAndKeywords(args, keywords, "pdOOdO|i:Contact", const_cast<char**>(names),
+                                   &colliding, &contact.separation, &normal_given, &point_given,
+                                   &contact.volume, &covariance_given, &contact.axis))
+    return nullptr;
+  contact.colliding = colliding != 0;
+  auto normal = read<double>(normal_given, "normal", {3});
+  auto point = read<double>(point_given, "point", {3});
+  auto covariance = read<double>(covariance_given, "covariance", {3, 3});
+  std::copy_n(normal.numbers, 3, contact.normal);
+  std::copy_n(point.numbers, 3, contact.point);
+  std::copy_n(covariance.numbers, 9, contact.covariance[0]);
+  return Contact::make(type, std::move(contact));
 }
 
-inline PyObject* new_contact(const bc_contact& contact) {
-  PyObject* const fields[] = {
-      PyBool_FromLong(contact.colliding), PyFloat_FromDouble(contact.separation),
-      new_array(contact.normal, 1),       new_array(contact.point, 1),
-      PyFloat_FromDouble(contact.volume), new_array(contact.covariance[0], 2),
-      PyLong_FromLong(contact.axis)};
-  return new_tuple(contact_type, fields);
+// The arguments that make the same contact.
+inline PyObject* contact_fields(PyObject* self) {
+  const bc_contact& contact = Contact::of(self);
+  return Py_BuildValue("(NdNNdNi)", PyBool_FromLong(contact.colliding), contact.separation,
+                       contact_normal(self, nullptr), contact_point(self, nullptr), contact.volume,
+                       contact_covariance(self, nullptr), contact.axis);
 }
+inline PyObject* contact_repr(PyObject* self) {
+  Owned text(made(PyUnicode_FromString(
+      "Contact(colliding=%r, separation=%r, normal=%r, point=%r, volume=%r, covariance=%r, "
+      "axis=%r)")));
+  Owned fields(made(contact_fields(self)));
+  return PyUnicode_Format(text.get(), fields.get());
+}
+inline PyObject* contact_reduce(PyObject* self, PyObject*) {
+  return Py_BuildValue("(ON)", Py_TYPE(self), made(contact_fields(self)));
+}
+
+#define BC_MEMBER(name, type, text) \
+  {#name, type, offsetof(Contact, held) + offsetof(bc_contact, name), READONLY, text}
+inline PyMemberDef contact_members[] = {
+    BC_MEMBER(colliding, T_BOOL,
+              "True from exact touch on: separation <= 8 ulp of the largest coordinate or size."),
+    BC_MEMBER(separation, T_DOUBLE,
+              "Signed [m]: negative is the overlap depth, positive the largest gap on a SAT axis."),
+    BC_MEMBER(volume, T_DOUBLE,
+              "Volume of A∩B [m³]; 0 without contact; NaN from models that give the point alone."),
+    BC_MEMBER(axis, T_INT,
+              "The winning axis, also of pairs apart; -1 from models that do not tell it.\n\n"
+              "0 to 2 faces of A, 3 to 5 faces of B, 6 + 3·i + j the edges i of A and j of B."),
+    {}};
+#undef BC_MEMBER
+inline PyGetSetDef contact_arrays[] = {
+    {"normal", Guarded<contact_normal>::call, nullptr,
+     "(3,) unit vector from A to B; NaN where the separation exceeds the solver's margin.", nullptr},
+    {"point", Guarded<contact_point>::call, nullptr,
+     "(3,) centroid of A∩B [m]; NaN without contact.", nullptr},
+    {"covariance", Guarded<contact_covariance>::call, nullptr,
+     "(3, 3) second central moments of A∩B divided by its volume [m²]; NaN where volume is\n"
+     "NaN, and without contact.\n\n"
+     "Volume and covariance are those of the overlap whose centroid is `point`, pressed in or not.",
+     nullptr},
+    {}};
+inline PyMethodDef contact_methods[] = {
+    {"__reduce__", method<contact_reduce>(), METH_NOARGS, "Pickle the fields."}, {}};
+inline PyType_Slot contact_slots[] = {
+    {Py_tp_doc,
+     const_cast<char*>("Contact(colliding, separation, normal, point, volume, covariance, axis=-1)"
+                       "\n--\n\n"
+                       "The contact of one pair of boxes; frame: that of the poses.\n\n"
+                       "It never changes. Arrays are made when they are read, a new one each time.")},
+    {Py_tp_new, slot<contact_new>()},
+    {Py_tp_dealloc, reinterpret_cast<void*>(Contact::dealloc)},
+    {Py_tp_repr, slot<contact_repr>()},
+    {Py_tp_members, contact_members},
+    {Py_tp_getset, contact_arrays},
+    {Py_tp_methods, contact_methods},
+    {0, nullptr}};
+inline PyType_Spec contact_spec = {"box_contact_ros.Contact", sizeof(Contact), 0,
+                                   Py_TPFLAGS_DEFAULT | Py_TPFLAGS_IMMUTABLETYPE, contact_slots};
+
+// --- Contacts -----------------------------------------------------------------------------------
 
 // Arrays of a row for each pair.
 struct ContactArrays {
@@ -73,11 +145,7 @@ struct ContactArrays {
     // Without a patch, the volume of pairs in contact is unknown.
     for (npy_intp row = 0; !patch && row < count; ++row)
       volume.numbers[row] = colliding.numbers[row] ? unknown : 0.0;
-    PyObject* const fields[] = {colliding.object.release(), separation.object.release(),
-                                normal.object.release(),    point.object.release(),
-                                volume.object.release(),    covariance.object.release(),
-                                axis.object.release()};
-    return new_tuple(type, fields);
+    return pack(type, colliding, separation, normal, point, volume, covariance, axis);
   }
 
  private:

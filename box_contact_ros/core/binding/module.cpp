@@ -13,16 +13,12 @@ namespace {
 using namespace box_contact;
 using namespace box_contact::binding;
 
-PyObject* use_contact_types(PyObject*, PyObject* const* args, Py_ssize_t count) {
-  bool tuples = count == 2;
-  for (Py_ssize_t k = 0; tuples && k < count; ++k)
-    tuples = PyType_Check(args[k]) &&
-             PyType_IsSubtype(reinterpret_cast<PyTypeObject*>(args[k]), &PyTuple_Type);
-  if (!tuples) fail(PyExc_TypeError, "two named tuple types are needed");
-  for (auto [place, type] : {std::pair{&contact_type, args[0]}, {&contacts_type, args[1]}}) {
-    Owned before(reinterpret_cast<PyObject*>(*place));
-    *place = reinterpret_cast<PyTypeObject*>(Py_NewRef(type));
-  }
+PyObject* use_contacts(PyObject*, PyObject* type) {
+  if (!PyType_Check(type) ||
+      !PyType_IsSubtype(reinterpret_cast<PyTypeObject*>(type), &PyTuple_Type))
+    fail(PyExc_TypeError, "a named tuple type is needed");
+  Owned before(reinterpret_cast<PyObject*>(contacts_type));
+  contacts_type = reinterpret_cast<PyTypeObject*>(Py_NewRef(type));
   Py_RETURN_NONE;
 }
 
@@ -38,8 +34,8 @@ PyMethodDef module_methods[] = {
     {"instruction_sets", method<instruction_sets>(), METH_NOARGS,
      "instruction_sets()\n--\n\n"
      "Return the instruction sets that were built and that this machine can run, best last."},
-    {"use_contact_types", method<use_contact_types>(), METH_FASTCALL,
-     "use_contact_types(single, many)\n--\n\nSet the named tuples that calls and batches return."},
+    {"use_contacts", method<use_contacts>(), METH_O,
+     "use_contacts(type)\n--\n\nSet the named tuple that batches return."},
     {"mlp_inputs", method<mlp_inputs>(), METH_FASTCALL,
      "mlp_inputs(poses_a, poses_b, sizes_a, sizes_b)\n--\n\n"
      "Return what model `mlp` reads of n pairs that touch.\n\n"
@@ -71,8 +67,8 @@ PyModuleDef module_definition = {PyModuleDef_HEAD_INIT,
 PyObject* make_module() {
   import_array1(nullptr);
   kernel = detail::chosen_kernel();
-  for (auto place : {&contact_type, &contacts_type})
-    *place = reinterpret_cast<PyTypeObject*>(Py_NewRef(&PyTuple_Type));
+  contacts_type = reinterpret_cast<PyTypeObject*>(Py_NewRef(&PyTuple_Type));
+  contact_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&contact_spec)));
   name_call_general = made(PyUnicode_InternFromString("_call_general"));
   name_batch_general = made(PyUnicode_InternFromString("_batch_general"));
   Owned module(made(PyModule_Create(&module_definition)));
@@ -84,6 +80,7 @@ PyObject* make_module() {
   add("instruction_set", PyUnicode_FromString(kernel ? kernel->title : ""));
   add("lanes", PyLong_FromLong(kernel ? kernel->lanes : 0));
   add("compiler", PyUnicode_FromString(__VERSION__));
+  add("Contact", Py_NewRef(contact_type));
   add("PairSolver", PyType_FromSpec(&solver_spec));
   add("BroadPhase", PyType_FromSpec(&broad_phase_spec));
   add("PatchForces", PyType_FromSpec(&forces_spec));

@@ -137,7 +137,7 @@ inline PyObject* solver_call(PyObject* self, PyObject* args, PyObject* keywords)
     if (b && detail::solve_pair(setup->solver(), setup->pair(a, b), BC_COVARIANCE, setup->margin,
                                 contact, counts)) {
       setup->count(counts);
-      return new_contact(contact);
+      return Contact::make(contact_type, std::move(contact));
     }
   }
   return call_method(self, name_call_general, args, keywords);

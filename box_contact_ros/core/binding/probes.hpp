@@ -55,7 +55,7 @@ inline PyObject* mlp_inputs(PyObject*, PyObject* const* args, Py_ssize_t count) 
     write(matrix(placed.axes), axes.numbers + 9 * row);
     write(matrix(body), covariance.numbers + 9 * row);
   });
-  return pack(axes, middle, half, features, volume, mean, covariance);
+  return pack(&PyTuple_Type, axes, middle, half, features, volume, mean, covariance);
 }
 
 // The moments of pairs that touch, all by clipping.
@@ -72,7 +72,7 @@ inline PyObject* clipped(PyObject*, PyObject* const* args, Py_ssize_t count) {
     volume.numbers[row] = found.volume;
     write(matrix(found.covariance), covariance.numbers + 9 * row);
   });
-  return pack(point, volume, covariance);
+  return pack(&PyTuple_Type, point, volume, covariance);
 }
 
 }  // namespace box_contact::binding
