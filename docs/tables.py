@@ -97,7 +97,7 @@ def network_by_exact() -> str:
                for column in ('call_by_exact', 'batch_by_exact'))
     words = '; '.join(f'{cell(row, "call_by_exact")} per call and {cell(row, "batch_by_exact")} '
                       f'in a batch with {name}' for name, row in ratios)
-    return (f'{"The network lost on this machine. It" if lost else "The network"} has an error. '
+    return (f'{"On these poses, the network lost. It" if lost else "The network"} has an error. '
             f'Its time divided by that of `exact` is {words}.')
 
 
