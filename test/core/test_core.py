@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 import poses
 import pytest
-from poses import Pairs
+from poses import Pairs, fields
 from test_extremes import random_network
 
 import box_contact_ros
@@ -46,12 +46,6 @@ def solve(solver: ContactSolver, pairs: Pairs, threads: int = 1) -> Contacts:
 
 def a_solver(model: str) -> ContactSolver:
     return ContactSolver((1, 1, 1), (1, 1, 1), model=model)
-
-
-def fields(found: tuple | Contact) -> tuple:
-    if isinstance(found, Contact):
-        return tuple(getattr(found, name) for name in Contacts._fields)
-    return found
 
 
 def assert_same_bits(one: tuple | Contact, other: tuple | Contact,

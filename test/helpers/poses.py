@@ -9,6 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from box_contact_ros import Contacts
+
 CONTAINER = (12.192, 2.438, 2.591)
 CUBE = (2.0, 2.0, 2.0)
 IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -25,6 +27,13 @@ class Pairs(NamedTuple):
 
     def first(self, count: int) -> Pairs:
         return Pairs(*(part[:count] for part in self))
+
+
+def fields(found):
+    """Return the fields of a Contact as a tuple, as Contacts has them; a tuple stays as it is."""
+    if isinstance(found, tuple):
+        return found
+    return tuple(getattr(found, name) for name in Contacts._fields)
 
 
 def joined(*parts: tuple[np.ndarray, ...]) -> Pairs:

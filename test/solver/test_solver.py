@@ -64,7 +64,7 @@ def test_a_solver_goes_to_other_processes(model):
     other = pickle.loads(pickle.dumps(solver))
     assert other.model == model
     above = [0.1, 0.05, 1.9, 0.02, 0.01, 0, 1]
-    for one, two in zip(solver(poses.IDENTITY, above), other(poses.IDENTITY, above)):
+    for one, two in zip(*(poses.fields(each(poses.IDENTITY, above)) for each in (solver, other))):
         assert np.array_equal(one, two, equal_nan=True)
 
 
