@@ -50,10 +50,6 @@ BC_INLINE Vec<T> operator+(const Vec<T>& a, T b) {
   return {a[0] + b, a[1] + b, a[2] + b};
 }
 template <class T>
-BC_INLINE Vec<T> operator-(T a, const Vec<T>& b) {
-  return {a - b[0], a - b[1], a - b[2]};
-}
-template <class T>
 BC_INLINE void operator+=(Vec<T>& a, const Vec<T>& b) {
   a = a + b;
 }
@@ -136,10 +132,6 @@ BC_INLINE Vec<T> column(const Mat<T>& m, int j) {
   return {m[0][j], m[1][j], m[2][j]};
 }
 template <class T>
-BC_INLINE Mat<T> transpose(const Mat<T>& m) {
-  return {{{m[0][0], m[1][0], m[2][0]}, {m[0][1], m[1][1], m[2][1]}, {m[0][2], m[1][2], m[2][2]}}};
-}
-template <class T>
 BC_INLINE Vec<T> operator*(const Mat<T>& m, const Vec<T>& a) {
   return {dot(row(m, 0), a), dot(row(m, 1), a), dot(row(m, 2), a)};
 }
@@ -148,24 +140,10 @@ template <class T>
 BC_INLINE Vec<T> transposed_times(const Mat<T>& m, const Vec<T>& a) {
   return {dot(column(m, 0), a), dot(column(m, 1), a), dot(column(m, 2), a)};
 }
-template <class T>
-BC_INLINE Mat<T> select(Mask<T> mask, const Mat<T>& a, const Mat<T>& b) {
-  Mat<T> m;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) m[i][j] = select<T>(mask, a[i][j], b[i][j]);
-  return m;
-}
 
 template <class T>
 BC_INLINE Vec<Number<T>> lane(const Vec<T>& a, int i) {
   return {lane(a[0], i), lane(a[1], i), lane(a[2], i)};
-}
-template <class T>
-BC_INLINE Mat<Number<T>> lane(const Mat<T>& m, int i) {
-  Mat<Number<T>> found;
-  for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 3; ++c) found[r][c] = lane(m[r][c], i);
-  return found;
 }
 template <class T, class N>
 BC_INLINE void set_lane(Vec<T>& a, int i, const Vec<N>& value) {
