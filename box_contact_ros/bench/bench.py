@@ -97,12 +97,12 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
     add_domain(parser)
     options = parser.parse_args(list(args))
     if options.out:
-        require('report')
         try:
             options.out.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=options.out).close()
         except OSError as error:
             parser.error(f'cannot write to {options.out} ({error.strerror})')
+        require('report')
     return options
 
 
