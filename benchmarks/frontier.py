@@ -72,7 +72,7 @@ PANELS = {'containers': 'A 12 m container on another, swaying', 'random cubes': 
 """The sets of poses that are drawn, with the titles."""
 ERRORS = (1e-2, 1e2)
 """Errors that are drawn to scale [%]; 0 has a band of its own below."""
-TIMES = (0.3, 2e4)
+TIMES = (0.1, 2e4)
 """Times that the picture shows [µs]: names stand on the right of their points."""
 
 
