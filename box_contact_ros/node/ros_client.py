@@ -9,10 +9,9 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from geometry_msgs.msg import Point, PoseArray, PoseStamped
+from geometry_msgs.msg import PoseArray, PoseStamped
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from std_msgs.msg import ColorRGBA, Header
-from visualization_msgs.msg import Marker
+from std_msgs.msg import Header
 
 from ..scene.pairing import StampedPose
 from ..scene.scene_solver import ALL_BOXES, Scene
@@ -62,23 +61,6 @@ def _read_array(reader: PoseReader, count: int, data: bytes) -> StampedPose:
                       f'{len(poses.numbers)} poses, but {count} boxes of the scene move')
     poses.numbers[~are_poses(poses.numbers)] = np.nan
     return poses
-
-
-def make_marker(header: Header, name: str, kind: int, colour: tuple[int, int, int],
-                opacity: float = 1.0, *, number: int = 0) -> Marker:
-    """Return a marker of a kind (`Marker.CUBE`, ...) without pose and scale; colour: 0 to 255."""
-    red, green, blue = (value / 255.0 for value in colour)
-    return Marker(header=header, ns=name, id=number, type=kind, action=Marker.ADD,
-                  color=ColorRGBA(r=red, g=green, b=blue, a=opacity))
-
-
-def line_marker(header: Header, name: str, lines: np.ndarray, *, width: float,
-                colour: tuple[int, int, int]) -> Marker:
-    """Return the marker of straight lines with ends (n, 2, 3) [m]; colour: 0 to 255."""
-    marker = make_marker(header, name, Marker.LINE_LIST, colour)
-    marker.scale.x = float(width)
-    marker.points = [Point(x=x, y=y, z=z) for x, y, z in lines.reshape(-1, 3).tolist()]
-    return marker
 
 
 def stamp_of(header: Header) -> int:

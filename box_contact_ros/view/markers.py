@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import Point
 from rclpy.context import Context
-from std_msgs.msg import Header
+from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ..node.contact_node import PARAMETERS as CONTACT_PARAMETERS
 from ..node.messages import make_header
 from ..node.parameters import declare, parse_command_line, warn_of_unknown
-from ..node.ros_client import line_marker, make_marker, set_pose
+from ..node.ros_client import set_pose
 from ..node.runtime import run_node
 from ..node.topics import contact_qos
 from ..scene.scene_file import read_scene
@@ -39,6 +39,23 @@ TEXT_HEIGHT = 0.04  # of the longest edge
 NAMESPACES = ('boxes', 'points', 'normals', 'patches', 'depths')
 """RViz shows a tick box for each. Of boxes, normals and depths every marker has its own id."""
 WHITE: style.Colour = (255, 255, 255)
+
+
+def make_marker(header: Header, name: str, kind: int, colour: style.Colour,
+                opacity: float = 1.0, *, number: int = 0) -> Marker:
+    """Return a marker of a kind (`Marker.CUBE`, ...) without pose and scale; colour: 0 to 255."""
+    red, green, blue = (value / 255.0 for value in colour)
+    return Marker(header=header, ns=name, id=number, type=kind, action=Marker.ADD,
+                  color=ColorRGBA(r=red, g=green, b=blue, a=opacity))
+
+
+def line_marker(header: Header, name: str, lines: np.ndarray, *, width: float,
+                colour: style.Colour) -> Marker:
+    """Return the marker of straight lines with ends (n, 2, 3) [m]; colour: 0 to 255."""
+    marker = make_marker(header, name, Marker.LINE_LIST, colour)
+    marker.scale.x = float(width)
+    marker.points = [Point(x=x, y=y, z=z) for x, y, z in lines.reshape(-1, 3).tolist()]
+    return marker
 
 
 def scene_markers(tick: Tick) -> list[Marker]:
