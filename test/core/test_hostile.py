@@ -50,8 +50,6 @@ def test_with_sanitizers(tmp_path: Path) -> None:
         # Null pointers and ends of objects are the address sanitizer's too; twice takes long.
         '-fsanitize=address,undefined,float-cast-overflow', '-fno-sanitize-recover=all',
         '-fno-sanitize=null,object-size,pointer-overflow',
-        # Nor is the scope of each temporary watched, which would take longer than all the rest.
-        '-fno-sanitize-address-use-after-scope',
         '-DBOX_CONTACT_VERSION=""', '-ffp-contract=off', '-fno-tree-slp-vectorize',
         f'-I{sysconfig.get_path("include")}', f'-I{np.get_include()}', CORE / 'binding/module.cpp',
         *(CORE / 'src' / f'{name}.cpp' for name in (
