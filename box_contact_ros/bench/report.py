@@ -100,14 +100,14 @@ def figures(logs: Sequence[AnswerLog]) -> list[dict[str, Any]]:
     return [{
         'node': log.node, 'sent': np.count_nonzero(log.stamps), 'lost': int(log.lost.sum()),
         'wrong': int(log.wrong.sum()),
-        **{f'{name} [ms]': 1e3 * percentile(log.latencies, percent)
+        **{f'{name} [ms]': 1e3 * _percentile(log.latencies, percent)
            for name, percent in (('p50', 50), ('p99', 99), ('max', 100))},
-        'point error [mm]': 1e3 * percentile(
+        'point error [mm]': 1e3 * _percentile(
             np.linalg.norm(log.points - log.truth.point, axis=1), 100),
-        LATE: 1e3 * percentile(log.lateness, 99)} for log in logs]
+        LATE: 1e3 * _percentile(log.lateness, 99)} for log in logs]
 
 
-def percentile(values: np.ndarray, percent: float) -> float:
+def _percentile(values: np.ndarray, percent: float) -> float:
     """Return a percentile of those values that are not NaN; NaN of none."""
     values = values[~np.isnan(values)]
     return float(np.percentile(values, percent)) if len(values) else math.nan
@@ -157,7 +157,7 @@ def draw(path: Path, logs: Sequence[AnswerLog], *, block: int) -> None:
         axis.set(xscale='log', yticks=[])
         axis.spines[['left', 'top', 'right']].set_visible(False)
         words = 'no answer' if not len(times) else '\n'.join(
-            f'{name} {percentile(times, percent):.3g} ms'
+            f'{name} {_percentile(times, percent):.3g} ms'
             for name, percent in (('median', 50), ('p99', 99)))
         axis.set_ylabel(f'{log.node}\n{words}', rotation=0, horizontalalignment='right',
                         verticalalignment='center')

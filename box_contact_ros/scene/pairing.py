@@ -309,8 +309,6 @@ class StampPairing(Pairing):
     def _is_awaiting(self, key: int, tick: WaitingTick) -> bool:
         """Return whether a box that is missing from a tick may still give its pose."""
         names = self._scene.streams
-        if len(tick.poses) == len(names):
-            return False
         while tick.settled < len(names):
             box = names[tick.settled]
             if box not in tick.poses and self._may_come(self._boxes[box], key, tick.number):
