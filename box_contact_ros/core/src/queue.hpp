@@ -11,6 +11,10 @@
 
 namespace box_contact::BOX_CONTACT_SET {
 
+// Blocks whose axes are found before their overlaps, so that the code of either stays in the first
+// cache.
+constexpr int blocks_at_once = 4;
+
 // Pairs that a model takes at once.
 template <class T, class Model>
 struct Block {
@@ -123,22 +127,29 @@ template <class T, class Model>
   long refused = -1, first = begin;
   auto note = [&](long row) { refused = refused < 0 ? row : refused; };
   if constexpr (!is_scalar<T>) {
-    Block<T, Model> block;
+    Block<T, Model> blocks[blocks_at_once];
     Waiting<T, Model> waiting;
     Rest<T, Model> rest;
     constexpr int lanes = width<T>;
     constexpr long few = lanes <= 2 ? 0 : 2;
-    for (; end - first > few; first += lanes) {
-      long last = min(first + lanes, end);
-      fetch_rows(results, first, last);
-      query_rows(rows, first, last, block.query);
-      note(write_query(block.query, first, last, results, counts));
-      for (int i = 0; i < lanes; ++i) block.rows[i] = first + i;
-      unsigned touching = bits(block.query.touching);
-      int count = __builtin_popcount(touching);
-      if (count == lanes || (count && first == begin && last == end)) {
-        block.solve(model, results, counts, rest);
-      } else {
+    bool only_block = end - begin <= lanes;
+    while (end - first > few) {
+      int count = 0;
+      for (; count < blocks_at_once && end - first > few; ++count, first += lanes) {
+        Block<T, Model>& block = blocks[count];
+        long last = min(first + lanes, end);
+        fetch_rows(results, first, last);
+        query_rows(rows, first, last, block.query);
+        note(write_query(block.query, first, last, results, counts));
+        for (int i = 0; i < lanes; ++i) block.rows[i] = first + i;
+      }
+      for (int n = 0; n < count; ++n) {
+        Block<T, Model>& block = blocks[n];
+        unsigned touching = bits(block.query.touching);
+        if (__builtin_popcount(touching) == lanes || (touching && only_block)) {
+          block.solve(model, results, counts, rest);
+          continue;
+        }
         for (; touching; touching &= touching - 1) {
           int i = __builtin_ctz(touching);
           waiting.put(block.query, i, block.rows[i], waiting.count);

@@ -290,7 +290,7 @@ BC_INLINE void clip(const N& at, const Slab& slab, const N& inverse, N& back, N&
 // What pieces of lines add to the planes of a box. N: one plane, or one across each axis.
 template <class N>
 struct Faces {
-  N area{};        // twice the area, with the side's sign [m²]
+  N area{};           // twice the area, with the side's sign [m²]
   N next{}, after{};  // three times its first moments along the two axes that follow, likewise
 };
 
@@ -318,11 +318,9 @@ BC_INLINE Sym<T> sym(const Squares<T>& s) {
 // A tensor of the frame with these axes.
 template <class T>
 BC_INLINE Squares<T> turned(const Columns<T>& axes, const Squares<T>& s) {
-  Columns<T> c =
-      from_diagonals<T>({{s.diagonal, rotated_back(s.beside), rotated(s.beside)}});
+  Columns<T> c = from_diagonals<T>({{s.diagonal, rotated_back(s.beside), rotated(s.beside)}});
   Columns<T> half_way{{axes * c[0], axes * c[1], axes * c[2]}}, rows = transpose(axes);
-  Columns<T> found =
-      diagonals<T>({{half_way * rows[0], half_way * rows[1], half_way * rows[2]}});
+  Columns<T> found = diagonals<T>({{half_way * rows[0], half_way * rows[1], half_way * rows[2]}});
   return {found[0], rotated(found[1])};
 }
 
@@ -359,6 +357,9 @@ using Line = std::conditional_t<packed<T>, Triple<T>, T>;
 template <class T>
 constexpr int lines_at_once = packed<T> ? 3 : 1;
 
+// The axis that follows.
+constexpr int following[3] = {1, 2, 0};
+
 // The line of P's plane s across axis i with Q's plane t across axis j.
 template <bool squares, class T>
 BC_INLINE void add_line(const PairOfBoxes<T>& boxes, int i, int s, int j, int t,
@@ -367,7 +368,7 @@ BC_INLINE void add_line(const PairOfBoxes<T>& boxes, int i, int s, int j, int t,
   using N = Line<T>;
   const Box<T>&p = boxes.p, &q = boxes.q;
   const Planes<T>&of_p = p.planes[s], &of_q = q.planes[t];
-  int y = (i + 1) % 3, z = (i + 2) % 3;
+  int y = following[i], z = following[y];
   const Triple<T>&row_i = boxes.rows[i], &by_i = boxes.by_rows[i];
   auto on = [&](const Triple<T>& x) { return of_axis<T>(x, j); };
   // Components: of n_g along y and z; of n_f along the axes k and l of Q that follow j.
@@ -392,8 +393,7 @@ BC_INLINE void add_line(const PairOfBoxes<T>& boxes, int i, int s, int j, int t,
   clip(from_k, on(rotated(q.slab)), by_l, back, to);
   clip(from_l, on(rotated_back(q.slab)), by_k, to, back);
   N span = max(to + back, N{}), middle = 0.5 * (to - back);
-  least_sine2_here =
-      min(least_sine2_here, select<N>(span > 0.0, sine2, splat<N>(1.0)));
+  least_sine2_here = min(least_sine2_here, select<N>(span > 0.0, sine2, splat<N>(1.0)));
 
   N side = span * (spread(of_p.sign, i) * on(of_q.sign)), area_p = side * u, area_q = side * v;
   N my = at_y - middle * qz, mz = at_z + middle * qy;
@@ -438,48 +438,74 @@ struct Gathered {
   }
 };
 
-// All lines of P's planes with Q's.
+// What the lines of P's planes on one side add up to, by P's axes.
+template <bool squares, class T>
+struct SideSums {
+  Gathered<T> area, next, after, w, y, z, yy, zz, yz;
+
+  BC_INLINE void put(int i, int j, const Faces<Line<T>>& face,
+                     const Weighted<Line<T>, squares>& sums) {
+    area.put(i, j, face.area);
+    next.put(i, j, face.next);
+    after.put(i, j, face.after);
+    w.put(i, j, sums.w);
+    y.put(i, j, sums.y);
+    z.put(i, j, sums.z);
+    if constexpr (squares) {
+      yy.put(i, j, sums.yy);
+      zz.put(i, j, sums.zz);
+      yz.put(i, j, sums.yz);
+    }
+  }
+};
+
+// The lines of P's plane s across axis i with Q's planes across axis j, `sides_q` of them.
+template <bool squares, bool two_sided, class T>
+BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, int i, int s, int j, int sides_q,
+                         SideSums<squares, T>& of_side, Sums<T>& of_q, Line<T>& least_sine2_here) {
+  Faces<Line<T>> face;
+  Weighted<Line<T>, squares> sums;
+  if (!(packed<T> || two_sided) || any(spread(boxes.p.planes[s].start, i) > 0.0))
+    for (int t = 0; t < sides_q; ++t)
+      if (!two_sided || any(of_axis<T>(boxes.q.planes[t].start, j) > 0.0))
+        add_line<squares>(boxes, i, s, j, t, face, sums, of_q.faces[t], least_sine2_here);
+  of_side.put(i, j, face, sums);
+}
+
+// All lines of P's planes with Q's. Code that does not fit the first cache takes up to twice the time:
+// no loop over two sides is unrolled, and of W pairs none over P's axes.
 template <bool squares, bool two_sided, class T>
 BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, Sums<T>& of_p, Sums<T>& of_q,
                          Line<T>& least_sine2_here) {
-  constexpr int sides = two_sided ? 2 : 1;
-#pragma GCC unroll 1  // unrolled, the code would not fit the first cache
-  for (int s = 0; s < sides; ++s) {
-    Gathered<T> area, next, after, w, y, z, yy, zz, yz;
-#pragma GCC unroll 3
-    for (int i = 0; i < 3; ++i) {
-#pragma GCC unroll 3
-      for (int j = 0; j < 3; j += lines_at_once<T>) {
-        Faces<Line<T>> face;
-        Weighted<Line<T>, squares> sums;
-        if (!(packed<T> || two_sided) || any(spread(boxes.p.planes[s].start, i) > 0.0))
+  int sides_p = two_sided && any(any_of(boxes.p.both)) ? 2 : 1;
+  int sides_q = two_sided && any(any_of(boxes.q.both)) ? 2 : 1;
+  for (int s = 0; s < sides_p; ++s) {
+    SideSums<squares, T> side;
+    auto add = [&](int i, int j) __attribute__((always_inline)) {
+      add_lines<squares, two_sided>(boxes, i, s, j, sides_q, side, of_q, least_sine2_here);
+    };
+    if constexpr (packed<T>) {
+      add(0, 0);
+      add(1, 0);
+      add(2, 0);
+    } else {
 #pragma GCC unroll 1
-          for (int t = 0; t < sides; ++t)
-            if (!two_sided || any(of_axis<T>(boxes.q.planes[t].start, j) > 0.0))
-              add_line<squares>(boxes, i, s, j, t, face, sums, of_q.faces[t], least_sine2_here);
-        area.put(i, j, face.area);
-        next.put(i, j, face.next);
-        after.put(i, j, face.after);
-        w.put(i, j, sums.w);
-        y.put(i, j, sums.y);
-        z.put(i, j, sums.z);
-        if constexpr (squares) {
-          yy.put(i, j, sums.yy);
-          zz.put(i, j, sums.zz);
-          yz.put(i, j, sums.yz);
-        }
+      for (int i = 0; i < 3; ++i) {
+        add(i, 0);
+        add(i, 1);
+        add(i, 2);
       }
     }
     const Triple<T>& f = boxes.p.planes[s].place;
     Faces<Triple<T>>& faces = of_p.faces[s];
-    faces.area = area.sum();
-    faces.next = next.sum();
-    faces.after = after.sum();
-    Triple<T> wx = f * w.sum(), wy = y.sum(), wz = z.sum();
+    faces.area = side.area.sum();
+    faces.next = side.next.sum();
+    faces.after = side.after.sum();
+    Triple<T> wx = f * side.w.sum(), wy = side.y.sum(), wz = side.z.sum();
     of_p.first += ((wx + rotated_back(wy)) + rotated(wz));
     if constexpr (squares) {
-      of_p.squares.diagonal += ((f * wx + rotated_back(yy.sum())) + rotated(zz.sum()));
-      of_p.squares.beside += ((yz.sum() + rotated(f * wy)) + rotated_back(f * wz));
+      of_p.squares.diagonal += ((f * wx + rotated_back(side.yy.sum())) + rotated(side.zz.sum()));
+      of_p.squares.beside += ((side.yz.sum() + rotated(f * wy)) + rotated_back(f * wz));
     }
   }
 }
@@ -529,14 +555,19 @@ BC_INLINE void add_edges(const Box<T>& x, const Box<T>& y, const Columns<T>& axe
     if ((there & (there - 1)) == 0) return;
   }
   add_edges<squares>(x, 0, 0, y, axes, inverse, sums, length);
-  if constexpr (two_sided) {
-    if (!any(any_of(x.both))) return;
-#pragma GCC unroll 1
-    for (int c = 1; c < 4; ++c)
-      if (any(any_of(min(rotated(x.planes[c & 1].start), rotated_back(x.planes[c >> 1].start)) >
-                     Triple<T>{})))
-        add_edges<squares>(x, c & 1, c >> 1, y, axes, inverse, sums, length);
-  }
+  int ways = two_sided && any(any_of(x.both)) ? 4 : 1;
+  for (int c = 1; c < ways; ++c)
+    if (any(any_of(min(rotated(x.planes[c & 1].start), rotated_back(x.planes[c >> 1].start)) >
+                   Triple<T>{})))
+      add_edges<squares>(x, c & 1, c >> 1, y, axes, inverse, sums, length);
+}
+
+// The same of W pairs: not inlined, because the code is long.
+template <bool squares, bool two_sided, class T>
+[[gnu::noinline]] void add_edges_apart(const Box<T>& x, const Box<T>& y, const Columns<T>& axes,
+                                       const Columns<T>& inverse, Sums<T>& sums,
+                                       Triple<T>& length) {
+  add_edges<squares, two_sided>(x, y, axes, inverse, sums, length);
 }
 
 // What the planes of a box add up to, in its frame, about the origin.
@@ -569,8 +600,8 @@ BC_INLINE Surface<T> surface(const Box<T>& box, const Sums<T>& sums) {
     if constexpr (squares) {
       Triple<T> third = (1.0 / 3.0) * (f * f);
       s.second.diagonal += f * by_f2;
-      s.second.beside = s.second.beside +
-                        (rotated(third * faces.next) + rotated_back(third * faces.after));
+      s.second.beside =
+          s.second.beside + (rotated(third * faces.next) + rotated_back(third * faces.after));
     }
   }
   // Column k has its own component from the places of the planes, and two from the moments.
@@ -630,8 +661,10 @@ BC_INLINE Mask<T> overlap_by_planes(const Pair<T>& pair, const planes::PairOfBox
   Line<T> least = splat<Line<T>>(1.0);
   add_lines<squares, two_sided>(boxes, of_p, of_q, least);
   Triple<T> lengths{};
-  add_edges<squares, two_sided>(boxes.p, boxes.q, boxes.columns, boxes.by_columns, of_p, lengths);
-  add_edges<squares, two_sided>(boxes.q, boxes.p, boxes.rows, boxes.by_rows, of_q, lengths);
+  constexpr auto edges =
+      packed<T> ? add_edges<squares, two_sided, T> : add_edges_apart<squares, two_sided, T>;
+  edges(boxes.p, boxes.q, boxes.columns, boxes.by_columns, of_p, lengths);
+  edges(boxes.q, boxes.p, boxes.rows, boxes.by_rows, of_q, lengths);
   Surface<T> p = surface<squares, two_sided>(boxes.p, of_p);
   Surface<T> q = surface<squares, two_sided>(boxes.q, of_q);
 
