@@ -30,19 +30,11 @@ from rclpy.signals import SignalHandlerOptions
 from box_contact_msgs.msg import Contacts
 
 from ..node.messages import contacts_by_pair, make_header
-from ..node.parameters import (
-    Setting,
-    declare,
-    flag,
-    number,
-    numbers,
-    parse_command_line,
-    warn_of_unknown,
-)
+from ..node.parameters import Setting, declare, flag, number, parse_command_line, warn_of_unknown
 from ..node.ros_client import CRANE_WRENCH, DEEP_RELIABLE, pose_message, stamp_of
 from ..node.runtime import REFUSALS, GuardedNode, running_node, spin_once
 from ..node.topics import contact_qos
-from .crane import LIMITS, CraneScenario
+from .crane import CraneScenario
 from .landing import CORNER_SPEED_LIMIT, ClosedLoop, Landing, LandingRecord, LoopState, with_patch
 
 FRAME = 'world'  # of the published poses
@@ -57,30 +49,18 @@ STAGES = ('hanging', 'first touch', 'settling', 'at rest')
 POINTS_ALONE = ("the contact node's model gives contacts without a patch: the whole load stands "
                 'for it, and may not come to rest')
 
-
-SCENARIO = {
-    'mass': 'mass of the load [kg]',
-    'offset': 'x, y of the trolley from the centre of the stack [m]',
-    'rope_angle': 'ropes from the plumb line at the start [deg]',
-    'rope_heading': 'whereto, counter-clockwise from x [deg]',
-    'pitch': 'tilt of the load about y at the start [deg]',
-    'roll': 'tilt of the load about x at the start [deg]',
-    'yaw': 'turn of the load about the plumb line at the start [deg]',
-}
-"""The fields of CraneScenario that are parameters, and what they mean."""
 PARAMETERS = {
     'rate': Setting(200.0, 'pairs of poses published per second [Hz]', number(1, 2000)),
     'wait': Setting(10.0, 'patience for a contact node to answer [s]', number(0, 600)),
     'lockstep': Setting(False, 'no real time: every tick waits for its answer', flag),
-} | {field: Setting(getattr(CraneScenario, field), description,
-                    numbers(2) if field == 'offset' else number(*LIMITS[field]))
-     for field, description in SCENARIO.items()}
+}
 
 
 class CraneNode(GuardedNode):
     """Publishes the poses of a crane, and lands it on the answers."""
 
-    def __init__(self, context: Context, **options: Any) -> None:
+    def __init__(self, context: Context, scenario: CraneScenario | None = None,
+                 **options: Any) -> None:
         """Read the parameters and make the crane; `options` go to Node."""
         super().__init__('crane', context=context, **options)
         values = declare(self, PARAMETERS)
@@ -88,8 +68,7 @@ class CraneNode(GuardedNode):
         self._rate, self._wait, self._lockstep = (
             values[name] for name in ('rate', 'wait', 'lockstep'))
         self._look_every = math.ceil(self._rate / LOOK_RATE)
-        scenario = CraneScenario(**{field: values[field] for field in SCENARIO})
-        self.loop = ClosedLoop(scenario, self._rate)
+        self.loop = ClosedLoop(scenario or CraneScenario(), self._rate)
         self._asked: dict[int, LoopState | None] = {}
         """What was published and not answered yet, by stamp [ns]; None for an offer."""
         self._matched = False  # whether an offer was answered
