@@ -52,6 +52,16 @@ def test_nothing_installed_names_what_is_not() -> None:
                 name.split('.')[0] in OUTSIDE for name in imported(file))] == []
 
 
+def test_all_nodes_are_guarded() -> None:
+    """A class that derives from rclpy's node derives from GuardedNode first."""
+    for file in INSTALLED:
+        for node in ast.walk(ast.parse(file.read_text('utf-8'))) if file.suffix == '.py' else ():
+            if isinstance(node, ast.ClassDef) and node.name != 'GuardedNode':
+                bases = [base.id for base in node.bases if isinstance(base, ast.Name)]
+                assert bases[:1] == ['GuardedNode'] or not {'Node', 'LifecycleNode'} & set(bases), (
+                    f'{file}: {node.name}')
+
+
 def test_every_source_file_has_a_header() -> None:
     assert [str(file) for file in SOURCES if not all(
         line in '\n'.join(file.read_text('utf-8').splitlines()[:3]) for line in HEADER)] == []
