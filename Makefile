@@ -57,7 +57,7 @@ demo:
 
 view:
 	@.ci/setup demo
-	exec $(PY) -m box_contact_ros.view.view $(ARGS)
+	exec $(PY) -m box_contact_ros.demo.demo --view $(ARGS)
 
 test:
 	@.ci/setup test

@@ -11,11 +11,10 @@ from __future__ import annotations
 
 import contextlib
 import os
-import random
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -29,7 +28,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from box_contact_msgs.msg import Contacts
 from box_contact_ros.bench.drive import raw_stamp, with_stamp
 from box_contact_ros.node.messages import make_header
-from box_contact_ros.node.processes import DOMAINS, end, on_this_host, program, start
+from box_contact_ros.node.processes import keep_to_this_host, program, running
 from box_contact_ros.node.runtime import GuardedNode, run_node, running_node, spin_for
 from box_contact_ros.node.topics import contact_qos, pose_qos
 from box_contact_ros.scene.scene_solver import ALL_BOXES, POSE_ARRAY
@@ -161,16 +160,6 @@ def is_near(stamps: Sequence[int], arrived: Collection[int], ahead: float) -> bo
     return sum(stamp not in arrived for stamp in stamps[-50:]) < ahead
 
 
-@contextlib.contextmanager
-def running(arguments: Sequence[str]) -> Iterator[Any]:
-    """Run a program of Python; end it afterwards."""
-    process = start(arguments)
-    try:
-        yield process
-    finally:
-        end([process])
-
-
 def cpu_seconds(pid: int) -> float:
     """Return the processor time of a process so far [s] (Linux)."""
     fields = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
@@ -186,7 +175,7 @@ def main(args: Sequence[str] | None = None) -> int:
     if options.echo is not None:
         return run_node(partial(EchoNode, length=options.echo), [])
     folder = output.results_folder(parser, options)
-    os.environ |= on_this_host(random.choice(DOMAINS))
+    keep_to_this_host()
     rows = streams(BOXES, RATE, QUICK_SECONDS if options.quick else SECONDS)
     text = output.page(
         'benchmarks/pages/scene_node',

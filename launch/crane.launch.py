@@ -24,8 +24,6 @@ from launch_ros.parameter_descriptions import ParameterValue
 
 from box_contact_ros.extras import require
 
-PATIENCE = 30.0
-"""How long the crane waits for the contact node [s]: a busy machine starts nodes slowly."""
 ARGUMENTS = {
     'rate': ('200.0', 'pairs of poses published per second [Hz]'),
     'lockstep': ('false', 'no real time: every tick waits for its answer'),
@@ -47,10 +45,9 @@ def generate_launch_description() -> LaunchDescription:
         *(DeclareLaunchArgument(name, default_value=default, description=description)
           for name, (default, description) in ARGUMENTS.items()),
         OpaqueFunction(function=lambda _: require('sim')),
-        node('crane', parameters=[values | {'wait': PATIENCE}], emulate_tty=True,
+        node('crane', parameters=[values], emulate_tty=True,
              on_exit=Shutdown(reason='the crane has ended')),
         node('soup_node', condition=IfCondition(LaunchConfiguration('soup'))),
-        node('view', arguments=['--scene=config/scenes/two_boxes.yaml'],
-             condition=IfCondition(LaunchConfiguration('view'))),
+        node('view', condition=IfCondition(LaunchConfiguration('view'))),
         IncludeLaunchDescription(str(Path(__file__).with_name('contact_node.launch.py'))),
     ])

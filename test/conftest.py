@@ -247,7 +247,7 @@ def signal_handlers() -> Iterator[None]:
 
 @pytest.fixture
 def program(tmp_path: Path) -> Iterator[Callable[..., RunningProgram]]:
-    """Start a program of setup.py; it is ended with the test, however that ends.
+    """Start a program of setup.py, or a module; it is ended with the test, however that ends.
 
     `program('crane', '--ros-args', '-p', 'rate:=200.0', env={...})`: `env` is added to this
     process's environment, `within` stands before the command, such as `ip netns exec NAME`.
@@ -261,11 +261,11 @@ def program(tmp_path: Path) -> Iterator[Callable[..., RunningProgram]]:
                 args[0], ()):
             if importlib.util.find_spec(EXTRAS[extra][0]) is None:
                 skip_without_extra(EXTRAS[extra][0])
+        module = PROGRAMS.get(args[0], args[0])
         log = tmp_path / f'program_{len(started)}.log'
         with log.open('wb') as out:
             process = subprocess.Popen(
-                [*within, sys.executable, '-u', '-m', f'box_contact_ros.{PROGRAMS[args[0]]}',
-                 *args[1:]],
+                [*within, sys.executable, '-u', '-m', f'box_contact_ros.{module}', *args[1:]],
                 stdin=subprocess.DEVNULL,
                 stdout=out,
                 stderr=subprocess.STDOUT,

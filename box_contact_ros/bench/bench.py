@@ -3,9 +3,10 @@
 
 """The bench: compares the latency of contact node, soup node and echo node on the same poses.
 
-Each node is a process of its own, in a ROS domain of its own on this host. The bench sends pairs of
-poses of equal stamp: a container that sways on top of another one. Blocks of half a second go to
-one node after the other, in an order that is drawn for each block.
+Each node is a process of its own. Only this host hears them, in the ROS domain ROS_DOMAIN_ID, or in
+one drawn at random. The bench sends pairs of poses of equal stamp: a container that sways on top of
+another one. Blocks of half a second go to one node after the other, in an order that is drawn for
+each block.
 
 The first line of the report says how many times as long a node takes as the one before it, with
 95 % intervals. A table has latencies, and answers that are lost or differ from the exact contacts.
@@ -34,10 +35,10 @@ from ..core import native
 from ..extras import require
 from ..node.contact_node import PARAMETERS
 from ..node.parameters import outside_ros_args
-from ..node.processes import add_domain, asked_to_end, on_this_host
+from ..node.processes import asked_to_end, keep_to_this_host, program, running
 from ..node.runtime import exit_on_refusal, running_node
 from ..solver.arguments import add_model, program_parser, within
-from .drive import NODES, BenchNode, MeasuredNode
+from .drive import NODES, BenchNode
 from .poses import swaying_containers
 from .report import comparison, draw, figures, table, void_reason
 
@@ -53,26 +54,28 @@ def main(args: Sequence[str] | None = None) -> int:
     if not find_spec('fcl'):
         print('without the soup node: python-fcl is not installed (extra: soup)')
         names.remove('soup')
-    os.environ |= on_this_host(options.domain)  # inherited by the nodes
+    keep_to_this_host()
     cores = os.sched_getaffinity(0)
     own = {max(cores)} if len(cores) > 1 else cores
-    os.sched_setaffinity(0, own)  # before rclpy starts its threads, which inherit it
-    gc.disable()  # `Bench` collects between blocks
+    gc.disable()  # `BenchNode` collects between blocks
     about = _about(options, own, cores - own or cores)
     print(about, flush=True)
     poses = swaying_containers(max(2, round(options.rate * options.duration / len(names))),
                                rate=options.rate)
-    with contextlib.ExitStack() as ended:
-        stop = ended.enter_context(asked_to_end())
-        bench, executor = ended.enter_context(running_node(partial(
-            BenchNode, names=names, poses=poses, rate=options.rate, stop=stop), args))
-        nodes = [ended.enter_context(contextlib.closing(MeasuredNode(
-            name, model=options.model, cores=cores - own or cores))) for name in names]
-        logs = bench.run(executor, nodes)
-        faults = [node.fault for node in nodes if node.fault]
+    with asked_to_end() as signals, contextlib.ExitStack() as ending:
+        os.sched_setaffinity(0, cores - own or cores)  # the nodes inherit it
+        nodes = {name: ending.enter_context(running([
+            *program(NODES[name][0], **({'model': options.model} if name == 'contact' else {})),
+            '-r', f'__ns:=/bench/{name}'])) for name in names}
+        os.sched_setaffinity(0, own)  # before rclpy starts its threads
+        bench, executor = ending.enter_context(running_node(partial(
+            BenchNode, nodes=nodes, poses=poses, rate=options.rate, signals=signals), args))
+        logs = bench.run(executor)
+        faults = [f'the {name} node ended early, status {node.returncode}'
+                  for name, node in nodes.items() if node.poll() is not None]
     rows, compared = figures(logs), comparison(logs, block=bench.block)
     void = void_reason(rows, options.rate)
-    stopped = 'interrupted: figures are of what was sent before' if stop.is_set() else ''
+    stopped = 'interrupted: figures are of what was sent before' if signals else ''
     results = '\n\n'.join(filter(None, (void, compared, table(rows), *faults, stopped)))
     print(f'\n{results}', flush=True)
     if options.out:
@@ -80,7 +83,7 @@ def main(args: Sequence[str] | None = None) -> int:
         (options.out / 'bench.md').write_text(
             f'# Bench\n\n![Latencies of each node](bench.png)\n\n{about}\n\n{results}\n', 'utf-8')
     faulty = any(row['wrong'] or row['lost'] and row['node'] != 'soup' for row in rows)
-    return stop.status or int(faulty or bool(faults) or bool(void))
+    return 128 + signals[0] if signals else int(faulty or bool(faults) or bool(void))
 
 
 def _options(args: Sequence[str]) -> argparse.Namespace:
@@ -94,7 +97,6 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
     parser.add_argument('--out', type=Path, metavar='DIR',
                         help='folder for the report, bench.md, and its picture, bench.png, which '
                              'needs the extra report (default: none)')
-    add_domain(parser)
     options = parser.parse_args(list(args))
     if options.out:
         try:

@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What drives the nodes: starts them, sends the poses, receives the answers, keeps the logs.
+"""What drives the nodes: sends the poses, receives the answers, keeps the logs.
 
 Poses go out in blocks of half a second. A block goes to one node after the other, in an order that
 is drawn anew each time. One thread sends poses that were serialised before, on an absolute
@@ -10,13 +10,11 @@ read after the block.
 """
 from __future__ import annotations
 
-import contextlib
 import gc
-import os
-import tempfile
+import subprocess
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -28,12 +26,11 @@ from rclpy.serialization import deserialize_message, serialize_message
 from box_contact_msgs.msg import Contacts as ContactsMessage
 
 from ..node.messages import make_header
-from ..node.processes import Stop, end, printed, program, start
 from ..node.ros_client import DEEP_RELIABLE, pose_message
 from ..node.runtime import GuardedNode, spin_for
+from ..scene.scene_solver import CONTAINER
 from ..solver.contact_solver import ContactSolver
 from .echo_node import FRAME, raw_stamp, with_stamp
-from .poses import SIZE
 from .report import AnswerLog
 
 BLOCK_SECONDS = 0.5
@@ -50,50 +47,20 @@ ANSWERS = {'point': (PointStamped, 'contact/point'), 'normal': (Vector3Stamped, 
 """Type and topic of each kind of answer."""
 
 
-class MeasuredNode:
-    """A node that is measured: a process of its own, which can be closed (Linux)."""
-
-    def __init__(self, name: str, *, model: str, cores: set[int]) -> None:
-        """Start the node on some cores; model: of the contact node."""
-        values: dict[str, object] = {} if name == 'echo' else {'size_a': SIZE, 'size_b': SIZE}
-        if name == 'contact':
-            values['model'] = model
-        self.name = name
-        self._output = tempfile.TemporaryFile()
-        self.process = start([*program(NODES[name][0], **values), '-r', f'__ns:=/bench/{name}'],
-                             self._output)
-        # It has inherited this process's core. Before it has threads, it gets its own.
-        with contextlib.suppress(ProcessLookupError):
-            os.sched_setaffinity(self.process.pid, cores)
-
-    @property
-    def fault(self) -> str:
-        """Return why the process does not run any more, '' while it runs."""
-        status = self.process.poll()
-        if status is None:
-            return ''
-        *_, last = ['', *printed(self._output).splitlines()]
-        return f'the {self.name} node ended with status {status}: {last}'
-
-    def close(self) -> None:
-        """End the process."""
-        end([self.process])
-        self._output.close()
-
-
 class BenchNode(GuardedNode):
     """Plays the stream of poses to all nodes, and keeps the logs of what they answered."""
 
-    def __init__(self, context: Context, *, names: Sequence[str],
-                 poses: tuple[np.ndarray, np.ndarray], rate: float, stop: Stop) -> None:
-        """Take the names of the nodes and the stream: poses (n, 7) of A and of B.
+    def __init__(self, context: Context, *, nodes: Mapping[str, subprocess.Popen[bytes]],
+                 poses: tuple[np.ndarray, np.ndarray], rate: float, signals: Sequence[int],
+                 ) -> None:
+        """Take the nodes, by name, and the stream: poses (n, 7) of A and of B.
 
-        rate: pairs per second [Hz]; stop: set to call all off.
+        rate: pairs per second [Hz]; signals: not empty once all is called off.
         """
         super().__init__('bench', context=context)
-        self.rate, self.stop = rate, stop
+        self.nodes, self.rate, self.signals = nodes, rate, signals
         self.block = max(1, round(rate * BLOCK_SECONDS))  # pairs
-        self._truth = ContactSolver(SIZE, SIZE, model='exact').batch(*poses)
+        self._truth = ContactSolver(CONTAINER, CONTAINER, model='exact').batch(*poses)
         header = make_header(0, FRAME)
         self._pairs = [[serialize_message(pose_message(header, pose)) for pose in pair]
                        for pair in zip(*poses)]
@@ -102,9 +69,9 @@ class BenchNode(GuardedNode):
         self._senders = {
             name: [self.create_publisher(
                 PoseStamped, f'bench/{name}/box_{box}/pose', DEEP_RELIABLE).publish
-                for box in 'ab'] for name in names}
+                for box in 'ab'] for name in nodes}
         """What sends a serialised pose of box A and of box B to a node."""
-        for name in names:
+        for name in nodes:
             for kind, (message, topic) in ANSWERS.items():  # the echo node sends no contacts
                 self.create_subscription(message, f'bench/{name}/{NODES[name][1]}{topic}',
                                          partial(self._keep, kind), DEEP_RELIABLE, raw=True)
@@ -112,39 +79,34 @@ class BenchNode(GuardedNode):
     def _keep(self, kind: str, data: bytes) -> None:
         self._arrivals.append((time.time_ns(), kind, data))
 
-    def run(self, executor: Any, nodes: Sequence[MeasuredNode]) -> list[AnswerLog]:
-        """Play the stream to all nodes; return a log for each, of what was sent before `stop`.
+    def run(self, executor: Any) -> list[AnswerLog]:
+        """Play the stream to all nodes; return a log for each, of what was sent before a signal.
 
         Raises ValueError where a node does not answer.
         """
         self._executor = executor
-        logs = {node.name: self._new_log(node.name) for node in nodes}
+        logs = {name: AnswerLog(name, self._truth) for name in self.nodes}
         rows = range(len(self._pairs))
         blocks = [rows[first:first + self.block] for first in rows[::self.block]]
-        for node in nodes:
-            self._warm_up(node, blocks[0])
+        for name in self.nodes:
+            self._warm_up(name, blocks[0])
         order = np.random.default_rng(1)
         for block in blocks:
             for name in order.permutation(list(logs)):
-                if not self.stop.is_set():
+                if not self.signals:
                     self._play(logs[name], block)
         return list(logs.values())
 
-    def _new_log(self, name: str) -> AnswerLog:
-        return AnswerLog(name, self._truth)
-
-    def _warm_up(self, node: MeasuredNode, block: range) -> None:
+    def _warm_up(self, name: str, block: range) -> None:
         """Send a node the first pair until it has answered, then a block that nobody looks at."""
         deadline = time.monotonic() + START_LIMIT
-        while not self.stop.is_set():
-            if node.fault or time.monotonic() > deadline:
-                raise ValueError(node.fault or
-                                 f'no answer of the {node.name} node in {START_LIMIT:g} s')
-            log = self._new_log(node.name)
+        log = AnswerLog(name, self._truth)
+        while not (self.signals or log.answered[0]):
+            if self.nodes[name].poll() is not None or time.monotonic() > deadline:
+                raise ValueError(f'the {name} node has not answered within {START_LIMIT:g} s, '
+                                 'or has ended')
             self._play(log, range(1))
-            if log.stamps[0] and not log.lost[0]:
-                self._play(self._new_log(node.name), block)
-                return
+        self._play(log, block)
 
     def _play(self, log: AnswerLog, block: range) -> None:
         """Send a block of pairs to a node, and log its answers."""
@@ -158,8 +120,6 @@ class BenchNode(GuardedNode):
             spin_for(self, self._executor, SLICE)
             if self._read(log, block):
                 deadline = time.monotonic() + DRAIN_SECONDS
-        spin_for(self, self._executor, SLICE)  # what is on its way behind the last answer
-        self._read(log, block)
 
     def _send(self, log: AnswerLog, block: range) -> None:
         """Send pairs at the rate; log stamp [ns] and lateness [s] of each.
@@ -170,7 +130,7 @@ class BenchNode(GuardedNode):
         for number, row in enumerate(block):
             due = begin + number / self.rate
             time.sleep(max(0.0, due - time.perf_counter()))
-            if self.stop.is_set():
+            if self.signals:
                 return
             log.lateness[row] = time.perf_counter() - due
             stamp = time.time_ns()  # it names the pair: no two are the same
@@ -190,7 +150,7 @@ class BenchNode(GuardedNode):
         for row, kind, received, data in known:
             message = deserialize_message(data, ANSWERS[kind][0])
             if kind != 'contacts' or not message.stale:
-                log.note(row, kind, received)
+                log.received[kind][row] = received
             if kind == 'point' and log.node != 'echo':
                 log.points[row] = message.point.x, message.point.y, message.point.z
             if kind == 'contacts' and message.contacts:

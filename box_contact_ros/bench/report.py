@@ -6,8 +6,7 @@
 Stamps and times of receipt are nanoseconds of one clock. A pair is answered once all messages of
 its stamp have come: point, normal and contacts, from the echo node point and normal. Its latency
 runs from the stamp to the later of point and normal. A pair that was sent and not answered is lost.
-An answer is wrong if its depth differs from the exact one, if it has no contact, or if a message
-came twice.
+An answer is wrong if its depth differs from the exact one, or if it has no contact.
 """
 from __future__ import annotations
 
@@ -39,33 +38,30 @@ class AnswerLog:
         self.lateness = np.full(rows, np.nan)  # of the bench itself [s]
         kinds = ('point', 'normal') if node == 'echo' else ('point', 'normal', 'contacts')
         self.received = {kind: np.zeros(rows, np.int64) for kind in kinds}  # [ns], 0: not yet
-        self.twice = np.zeros(rows, bool)
         self.points = np.full((rows, 3), np.nan)
         self.depths = np.full(rows, np.nan)  # [m], NaN: no contact
 
-    def note(self, row: int, kind: str, received: int) -> None:
-        """Note that a message came at `received` [ns]; of two, the first counts."""
-        if self.received[kind][row]:
-            self.twice[row] = True
-        else:
-            self.received[kind][row] = received
+    @property
+    def answered(self) -> np.ndarray:
+        """Which pairs were answered (rows,)."""
+        return np.all([times > 0 for times in self.received.values()], axis=0)
 
     @property
     def lost(self) -> np.ndarray:
         """Which pairs were sent and not answered (rows,)."""
-        return (self.stamps > 0) & ~np.all([times > 0 for times in self.received.values()], axis=0)
+        return (self.stamps > 0) & ~self.answered
 
     @property
     def latencies(self) -> np.ndarray:
         """Return the time from stamp to answer of each row [s], NaN without an answer."""
         last = np.maximum(self.received['point'], self.received['normal'])
-        return np.where((self.stamps > 0) & ~self.lost, 1e-9 * (last - self.stamps), np.nan)
+        return np.where(self.answered, 1e-9 * (last - self.stamps), np.nan)
 
     @property
     def wrong(self) -> np.ndarray:
         """Return for each row whether its answer is not that of `exact`."""
         right = np.abs(self.depths + self.truth.separation) <= DEPTH_TOLERANCE
-        return self.twice | (self.received.get('contacts', np.zeros(1)) > 0) & ~right
+        return (self.received.get('contacts', np.zeros(1)) > 0) & ~right
 
 
 def ratio(log: AnswerLog, baseline: AnswerLog, *, block: int) -> tuple[float, float, float]:

@@ -49,7 +49,7 @@ STAGES = ('hanging', 'first touch', 'settling', 'at rest')
 
 PARAMETERS = {
     'rate': Setting(200.0, 'pairs of poses published per second [Hz]', number(1, 2000)),
-    'wait': Setting(10.0, 'patience for a contact node to answer [s]', number(0, 600)),
+    'wait': Setting(30.0, 'patience for a contact node to answer [s]', number(0, 600)),
     'lockstep': Setting(False, 'no real time: every tick waits for its answer', flag),
 }
 

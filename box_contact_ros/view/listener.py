@@ -11,33 +11,31 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import WrenchStamped
 from rclpy.context import Context
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 
 from box_contact_msgs.msg import Contacts as ContactsMessage
 
-from ..core import LENGTH_MAX
-from ..node.messages import Refused, read_answer
-from ..node.ros_client import CRANE_WRENCH, PoseTopic, pose_topics, stamp_of
+from ..node.contact_node import PARAMETERS as CONTACT_PARAMETERS
+from ..node.messages import read_answer
+from ..node.parameters import Setting, declare, warn_of_unknown
+from ..node.ros_client import PoseTopic, pose_topics, stamp_of
 from ..node.runtime import GuardedNode
-from ..scene.scene_solver import Answer, Scene
+from ..scene.scene_file import read_scene
+from ..scene.scene_solver import Answer, Scene, two_boxes
 from ..solver.contact import Contacts
 
 KEPT = 1000  # poses kept per topic: a second at 1 kHz
 UNANSWERED = 0.5
 """Time [s] that poses may come without contacts; then nobody answers, and none are drawn."""
 QUIET = 1.0  # time [s] without a pose, after which nobody moves the boxes any more
-FORCE_AGE = 100_000_000  # [ns] between a force and a tick: the crane publishes every 33 ms
-MOST_FORCE = 1e12  # [N]: a chart of more shows nothing else
-LARGEST = LENGTH_MAX**3
-"""Largest number of a contact: of a volume [m³]. Others are smaller, and drawn as they come."""
+SCENE_PARAMETERS = {name: CONTACT_PARAMETERS[name] for name in ('size_a', 'size_b', 'scene')}
 
 
 class SceneRows:
@@ -68,17 +66,12 @@ class Tick:
 def read_touching(message: Any, scene: Scene) -> Answer:
     """Return what touches by a box_contact_msgs/Contacts, the deepest first.
 
-    Raises Refused for a pair that is not in the scene, and for numbers that no contact has.
+    Raises Refused for a pair that is not in the scene.
     """
     answer = read_answer(message, scene)
     touching = np.flatnonzero(answer.contacts.colliding)
     rows = touching[np.argsort(answer.contacts.separation[touching], kind='stable')]
     contacts = Contacts(*(column[rows] for column in answer.contacts))
-    # Models that give the point alone have NaN for volume and covariance.
-    for numbers in (contacts.separation, contacts.normal, contacts.point,
-                    np.nan_to_num(contacts.volume), np.nan_to_num(contacts.covariance)):
-        if not (np.abs(numbers) <= LARGEST).all():
-            raise Refused('bad contacts', 'a contact with numbers that none has')
     return answer._replace(pairs=answer.pairs[rows], contacts=contacts)
 
 
@@ -100,10 +93,16 @@ class Track:
 
 
 class Listener(GuardedNode):
-    """Keeps the last poses and contacts that it hears of a scene."""
+    """Keeps the last poses and contacts that it hears of a scene; `values`: its parameters."""
 
-    def listen_to(self, scene: Scene, contacts_qos: QoSProfile) -> None:
-        """Subscribe to the topics of a scene."""
+    def __init__(self, name: str, context: Context, settings: Mapping[str, Setting],
+                 contacts_qos: QoSProfile, **options: Any) -> None:
+        """Subscribe to the topics of the scene that the parameters tell."""
+        super().__init__(name, context=context, **options)
+        self.values = values = declare(self, settings)
+        warn_of_unknown(self, settings)
+        scene = (read_scene(values['scene']) if values['scene'] else
+                 two_boxes(values['size_a'], values['size_b']))
         self._rows = SceneRows(scene)
         self._tracks: list[Track] = []
         self._frame_id = ''
@@ -150,38 +149,3 @@ class Listener(GuardedNode):
         for track in tracks:
             poses[track.boxes] = track.at(stamp)
         return Tick(self._rows, stamp, self._frame_id, poses, answer, latency)
-
-
-class ViewNode(Listener):
-    """Hears, besides a scene, which model the contact node runs, and the force on a crane's load.
-
-    model: as /diagnostics tells it; empty before.
-    """
-
-    def __init__(self, context: Context, scene: Scene, **options: Any) -> None:
-        super().__init__('view', context=context, **options)
-        self.model = ''
-        self._force = (0, math.nan)  # stamp [ns], upward part [N]
-        # Best effort: the view must never hold up the contact node.
-        qos = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
-        self.listen_to(scene, qos)
-        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
-        self.create_subscription(WrenchStamped, CRANE_WRENCH, self._on_force, qos)
-
-    def force(self, stamp: int) -> float:
-        """Return the upward force [N] of the contacts on a crane's load at a stamp [ns], or NaN."""
-        at, force = self._force
-        return force if abs(stamp - at) <= FORCE_AGE else math.nan
-
-    def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        name = f'{self.get_namespace().rstrip("/")}/contact_node: contacts'
-        for status in message.status:
-            if status.name == name:
-                self.model = next((value.value for value in status.values if value.key == 'model'),
-                                  '')
-
-    def _on_force(self, message: WrenchStamped) -> None:
-        force = message.wrench.force.z
-        if not abs(force) <= MOST_FORCE:
-            raise Refused('bad force', f'a force of {force:g} N')
-        self._force = stamp_of(message.header), force

@@ -20,19 +20,15 @@ from rclpy.context import Context
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ..node.contact_node import PARAMETERS as CONTACT_PARAMETERS
 from ..node.messages import make_header
-from ..node.parameters import declare, parse_command_line, warn_of_unknown
+from ..node.parameters import parse_command_line
 from ..node.ros_client import set_pose
 from ..node.runtime import run_node
 from ..node.topics import contact_qos
-from ..scene.scene_file import read_scene
-from ..scene.scene_solver import two_boxes
 from ..solver.contact import Contacts
 from . import style
-from .listener import Listener, Tick
+from .listener import SCENE_PARAMETERS, Listener, Tick
 
-PARAMETERS = {name: CONTACT_PARAMETERS[name] for name in ('size_a', 'size_b', 'scene')}
 PERIOD = 1 / 30  # time [s] between marker arrays
 LABELLED = 10  # contacts whose depth is written beside them, the deepest
 TEXT_HEIGHT = 0.04  # of the longest edge
@@ -119,13 +115,9 @@ class MarkersNode(Listener):
     """Draws what it has heard when a timer triggers; takes away what is drawn no more."""
 
     def __init__(self, context: Context, **options: Any) -> None:
-        super().__init__('markers', context=context, **options)
-        values = declare(self, PARAMETERS)
-        warn_of_unknown(self, PARAMETERS)
+        super().__init__('markers', context, SCENE_PARAMETERS, contact_qos(), **options)
         self._drawn: set[tuple[str, int]] = set()
         self._markers = self.create_publisher(MarkerArray, 'markers', contact_qos())
-        self.listen_to(read_scene(values['scene']) if values['scene'] else
-                       two_boxes(values['size_a'], values['size_b']), contact_qos())
         self.create_timer(PERIOD, self._publish)
         self.get_logger().info('ready')
 
@@ -144,7 +136,7 @@ class MarkersNode(Listener):
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM."""
-    parse_command_line('markers', __doc__, PARAMETERS, args)
+    parse_command_line('markers', __doc__, SCENE_PARAMETERS, args)
     return run_node(MarkersNode, args)
 
 

@@ -31,7 +31,6 @@ ROOM = 0.1  # above the values of a chart, as a share of them
 LEAST_DEPTH, LEAST_FORCE = 1.0, 1.0
 """[mm], [kN]: what charts show at least, not to magnify noise."""
 PANEL_WIDTH = 300  # pixels
-LONGEST = 100  # characters that are shown of a model's name, which may have megabytes
 GROUND, LINES, SECTIONS = (236, 238, 241), (206, 211, 217), (176, 183, 191)
 GROUND_SIZE = 60.0  # length [m] of the ground at least
 VIEWPOINT = np.array([-0.55, -0.78, 0.42])
@@ -46,8 +45,6 @@ CUBE_EDGES = np.concatenate([CUBE[_ENDS], 1.0001 * CUBE[_ENDS[:, :1]]], axis=1)
 GAMMA = 2.2  # of the colours of screens
 LEGEND = ''.join(f'<span style="white-space:nowrap;color:rgb{colour}">■</span> {text} &ensp;'
                  for colour, text in style.LEGEND)
-TITLE = """<img src="data:," hidden onerror="document.title = 'box_contact_ros'">"""
-"""Names the browser's tab, which viser calls after itself."""
 
 
 class Server(viser.ViserServer):
@@ -82,7 +79,7 @@ class Page:
         self._history: deque[tuple[float, float, float]] = deque()  # time [s], depth, force
         self._charts: dict[str, Any] = {}
         gui.add_html('<div id="legend" style="padding:0 0.7em 0.6em;font-size:0.78em">'
-                     f'{LEGEND}{TITLE}</div>')
+                     f'{LEGEND}</div>')
         self._rows: SceneRows | None = None
         self._seen = 0  # boxes; each that joins brings all of them into view
         self._origin = np.zeros(3)
@@ -191,8 +188,8 @@ class Page:
 
     # --- figures and charts -----------------------------------------------------------------------
 
-    def show(self, tick: Tick | None, force: float, *, model: str, awaited: str) -> None:
-        """Show figures and charts of a tick; without a tick, what the page waits for.
+    def show(self, tick: Tick | None, force: float, *, model: str) -> None:
+        """Show figures and charts of a tick; without a tick, that the page waits for poses.
 
         The charts then stay as they are until the next tick begins them anew.
 
@@ -208,7 +205,7 @@ class Page:
             while time - self._history[0][0] > HISTORY:
                 self._history.popleft()
         with self._server.atomic():
-            self._figures.content = figures(tick, force, model=model, awaited=awaited)
+            self._figures.content = figures(tick, force, model=model)
             if self._history:
                 times, depths, forces = np.array(self._history).T
                 self._plot('depth [mm]', LEAST_DEPTH, times, depths)
@@ -239,9 +236,9 @@ class Page:
             legend={'show': False}, padding=(10, 24, 0, 0), height=145)
 
 
-def figures(tick: Tick | None, force: float, *, model: str, awaited: str) -> str:
+def figures(tick: Tick | None, force: float, *, model: str) -> str:
     """Return a line in plain words and a table, as HTML; each value has its name as id."""
-    words, rows = awaited, [('model', 'model', model[:LONGEST] or '–')]
+    words, rows = 'waiting for poses', [('model', 'model', model or '–')]
     if tick is not None:
         answer, pair_count = tick.answer, tick.rows.scene.pair_count
         words = in_words(answer)

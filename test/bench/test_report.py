@@ -83,15 +83,6 @@ def test_a_missing_contact_and_the_depth_of_another_tick_are_wrong(depth, wrong)
     assert counts(log) == (0, wrong)
 
 
-@pytest.mark.parametrize('node', ['contact', 'echo'])
-def test_an_answer_that_comes_twice_is_wrong(node):
-    """The first message counts, with its latency."""
-    log = played(node)
-    log.note(20, 'normal', int(log.stamps[20]) + 50 * MS)
-    assert counts(log) == (0, 1)
-    assert log.latencies[20] == pytest.approx(1e-3, abs=1e-12)
-
-
 def test_percentiles_are_over_all_answers():
     """Of a hundred answers of which ten are slow, p99 and maximum are those of a slow one."""
     log = played()

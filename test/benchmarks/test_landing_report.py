@@ -195,13 +195,10 @@ from benchmarks.landing import left_when_asked
 from box_contact_ros.node import processes
 
 with left_when_asked():
-    started = processes.start(['-c', 'import time; time.sleep(100.0)'])
-    try:
+    with processes.running(['-c', 'import time; time.sleep(100.0)']) as started:
         print(started.pid, flush=True)
         os.kill(os.getpid(), signal.SIGTERM)
         time.sleep(100.0)
-    finally:
-        processes.end([started])
 """
 
 

@@ -1,13 +1,15 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The demonstration: what it refuses, and that it ends both of its processes; see `make demo`."""
+"""The demonstration: what it refuses, and that it ends its processes; see `make demo`."""
 from __future__ import annotations
 
 import os
 import signal
 import subprocess
 import sys
+import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -26,45 +28,83 @@ def test_an_unknown_model_ends_the_demo_before_it_starts(capsys):
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_the_demo_and_both_processes(number):
-    """In the middle of the motion; the status is what a shell reports."""
-    command = [sys.executable, '-m', 'box_contact_ros.demo.demo', '--model', 'exact',
-               '--domain', os.environ['ROS_DOMAIN_ID']]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                          start_new_session=True) as running:
-        try:
-            told = ''
-            for line in running.stdout:
-                told += line
-                if 'hanging' in line:
-                    break
-            started = children(running.pid)
-            assert len(started) == 2, told
+@pytest.mark.parametrize('stopped', [False, True])
+def test_a_signal_ends_the_demo_and_all_processes(number, stopped):
+    """Also where they stand still, and whoever asks asks again and again."""
+    with started_demo() as (running, output):
+        started = children(running.pid)
+        assert len(started) == 2, output
+        for pid in started if stopped else ():
+            os.kill(pid, signal.SIGSTOP)
+        while running.poll() is None:
             running.send_signal(number)
-            told += running.communicate(timeout=60)[0]
-        finally:
-            if running.poll() is None:
-                running.kill()
-    assert running.returncode == 128 + number and 'Traceback' not in told, told
+            time.sleep(0.001)
+        output += running.stdout.read()
+    assert running.returncode == 128 + number and 'Traceback' not in output, output
     assert not [pid for pid in started if Path(f'/proc/{pid}').exists()]
 
 
-@pytest.mark.parametrize(('status', 'words'), [(0, 'Next, after'), (3, 'failed with status 3')])
-def test_its_status_is_that_of_the_crane(status, words, monkeypatch, capfd):
-    """And a failure shows what the contact node printed."""
-    programs = {'node.contact_node': 'print("node", flush=True); import time; time.sleep(100)',
-                'demo.crane_node': f'import sys, time; time.sleep(2.0); sys.exit({status})'}
-    monkeypatch.setattr(demo, 'program', lambda name, **_: ['-c', programs[name]])
-    assert demo.main(['--domain', os.environ['ROS_DOMAIN_ID']]) == status
-    shown = capfd.readouterr()
-    assert words in shown.out + shown.err
-    assert ('contact_node printed:\nnode' in shown.err) is bool(status)
+@pytest.mark.skipif(not os.path.exists('/proc'), reason='Linux alone ends them with their parent')
+def test_no_process_outlives_a_demo_that_is_killed():
+    with started_demo() as (running, _):
+        started = children(running.pid)
+        running.kill()
+        deadline = time.monotonic() + 60.0
+        while alive := [pid for pid in started if is_running(pid)]:
+            assert time.monotonic() < deadline, alive
+            time.sleep(0.1)
 
 
-def test_an_early_end_of_the_node_ends_the_demo(monkeypatch, capfd):
-    programs = {'node.contact_node': 'import sys; sys.exit("no room")',
-                'demo.crane_node': 'import time; time.sleep(100)'}
-    monkeypatch.setattr(demo, 'program', lambda name, **_: ['-c', programs[name]])
-    assert demo.main(['--domain', os.environ['ROS_DOMAIN_ID']]) == 1
+@contextmanager
+def started_demo():
+    """Run a demo until the load moves; yield its process and what it printed."""
+    with subprocess.Popen([sys.executable, '-m', 'box_contact_ros.demo.demo'],
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                          start_new_session=True) as running:
+        try:
+            output = ''
+            while 'hanging' not in output and (line := running.stdout.readline()):
+                output += line
+            yield running, output
+        finally:
+            running.kill()
+
+
+def is_running(pid):
+    """Return whether a process is there, and no zombie that nobody waits for."""
+    try:
+        return Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0] != 'Z'
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+@pytest.fixture
+def programs(monkeypatch):
+    """Return what stands for the programs: Python code by module."""
+    codes = {'node.contact_node': 'import time; time.sleep(100)'}
+    monkeypatch.setattr(demo, 'program', lambda name, **_: ['-c', codes[name]])
+    return codes
+
+
+@pytest.mark.parametrize('status', [0, 3])
+def test_its_status_is_that_of_the_crane(status, programs, capfd):
+    programs['demo.crane_node'] = f'import sys, time; time.sleep(1.0); sys.exit({status})'
+    assert demo.main([]) == status
+    assert ('Next: ' in capfd.readouterr().out) is (status == 0)
+
+
+def test_an_early_end_of_the_node_ends_the_demo(programs, capfd):
+    """In the node's own words."""
+    programs |= {'node.contact_node': 'import sys; sys.exit("no room")',
+                 'demo.crane_node': 'import time; time.sleep(100)'}
+    assert demo.main([]) == 1
     error = capfd.readouterr().err
-    assert 'contact_node ended early, status 1' in error and 'no room' in error
+    assert 'no room' in error and 'demo: contact_node ended early, status 1' in error
+
+
+def test_with_a_view_it_lands_until_something_ends(programs, monkeypatch, capfd):
+    monkeypatch.setattr(demo, 'PAUSE', 0.0)
+    programs |= {'view.view': 'import time; time.sleep(5.0)', 'demo.crane_node': 'print("PASS")'}
+    assert demo.main(['--view']) == 1
+    shown = capfd.readouterr()
+    assert shown.out.count('PASS') > 1 and 'view ended early, status 0' in shown.err

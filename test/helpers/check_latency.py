@@ -12,11 +12,11 @@ contact node. The program prints the median latencies and their ratio.
 from __future__ import annotations
 
 import argparse
-import os
 import random
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import closing
 
 import numpy as np
 from rclpy.context import Context
@@ -25,7 +25,7 @@ from typed_messages import a_box
 
 from box_contact_msgs.srv import Check
 from box_contact_ros.node.check import Checker
-from box_contact_ros.node.processes import DOMAINS, end, on_this_host, program, start
+from box_contact_ros.node.processes import keep_to_this_host, program, running
 from box_contact_ros.node.runtime import GuardedNode, run_node
 from box_contact_ros.scene.scene_solver import SceneSolver, two_boxes
 
@@ -58,12 +58,11 @@ def main(args: Sequence[str] | None = None) -> int:
     options = parser.parse_args(args)
     if options.echo:
         return run_node(lambda context: Echo(context, options.boxes), [])
-    os.environ |= on_this_host(random.choice(DOMAINS))
-    processes = [start([__file__, '--echo', '--boxes', str(options.boxes)]),
-                 start(program('node.contact_node'))]
-    client, request = Client(), question(options.boxes)
+    keep_to_this_host()
     times: dict[str, list[float]] = {'echo_service': [], 'contact_node': []}
-    try:
+    with (running([__file__, '--echo', '--boxes', str(options.boxes)]),
+          running(program('node.contact_node')), closing(Client()) as client):
+        request = question(options.boxes)
         for name in times:
             assert client.call(Check, f'{name}/check', request).contacts.contacts
         for _ in range(WARM_UP + options.calls):
@@ -73,9 +72,6 @@ def main(args: Sequence[str] | None = None) -> int:
                 client.executor.spin_until_future_complete(future, PATIENCE)
                 times[name].append(time.perf_counter() - began)
                 assert future.result().success or name == 'echo_service'
-    finally:
-        client.close()
-        end(processes)
     echo, check = (1e6 * float(np.median(kept[WARM_UP:])) for kept in times.values())
     print(f'{options.boxes} boxes: echo p50 {echo:.0f} us, check p50 {check:.0f} us, '
           f'check / echo {check / echo:.2f}')

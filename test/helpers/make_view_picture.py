@@ -29,10 +29,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--out', type=Path, default=ROOT / 'docs' / 'figures' / 'view.png')
     out = parser.parse_args().out
-    view = subprocess.Popen([sys.executable, '-u', '-m', 'box_contact_ros.view.view'], cwd=ROOT,
-                            stdout=subprocess.PIPE, text=True)
+    demo = subprocess.Popen([sys.executable, '-u', '-m', 'box_contact_ros.demo.demo', '--view'],
+                            cwd=ROOT, stdout=subprocess.PIPE, text=True)
     try:
-        url = re.search(r'http://\S+', view.stdout.readline()).group()
+        url = next(filter(None, map(re.compile(r'http://\S+').search, demo.stdout))).group()
         os.nice(19)  # this script, and the browser that it starts, which renders in software
         with open_page(url, 1280, 640) as tab:
             # The page says that rendering in software is slow; that is no news here.
@@ -48,8 +48,8 @@ def main() -> None:
             picture.quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(
                 out, optimize=True)
     finally:
-        view.send_signal(signal.SIGINT)
-        view.wait(20)
+        demo.send_signal(signal.SIGINT)
+        demo.wait(20)
 
 
 if __name__ == '__main__':
