@@ -14,7 +14,7 @@ from __future__ import annotations
 import gc
 import struct
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
@@ -27,7 +27,6 @@ from ..node.runtime import GuardedNode, run_node
 from ..node.topics import contact_qos, pose_qos
 
 FRAME = 'world'  # of all poses of the bench
-MOST_WAITING = 1000  # poses whose partner may still come
 _STAMP = struct.Struct('=iI')  # behind the encapsulation; sender and receiver are one machine
 
 
@@ -44,11 +43,11 @@ def with_stamp(data: bytes, stamp: int) -> bytes:
 
 
 class EchoNode(GuardedNode):
-    """Answers each pair of stamps once."""
+    """Answers each pair of poses of equal stamp."""
 
     def __init__(self, context: Context, **options: Any) -> None:
         super().__init__('echo_node', context=context, **options)
-        self._waiting: dict[int, int] = {}  # box by stamp, oldest first
+        self._waiting: set[int] = set()  # stamps whose second pose may still come
         self._answers = [
             (self.create_publisher(kind, f'echo/{topic}', contact_qos()),
              serialize_message(kind(header=make_header(0, FRAME))))
@@ -56,24 +55,17 @@ class EchoNode(GuardedNode):
                                 (Vector3Stamped, 'contact/normal'))]
         gc.collect()
         gc.freeze()
-        for box, topic in enumerate(('box_a/pose', 'box_b/pose')):
-            self.create_subscription(PoseStamped, topic, self._pose_callback(box), pose_qos(topic),
-                                     raw=True)
-        self.get_logger().info('ready')
+        for topic in ('box_a/pose', 'box_b/pose'):
+            self.create_subscription(PoseStamped, topic, self._on_pose, pose_qos(topic), raw=True)
 
-    def _pose_callback(self, box: int) -> Callable[[bytes], None]:
-        waiting = self._waiting
-
-        def callback(data: bytes) -> None:
-            stamp = raw_stamp(data)
-            if waiting.pop(stamp, box) != box:
-                for publisher, message in self._answers:
-                    publisher.publish(with_stamp(message, stamp))
-                return
-            waiting[stamp] = box
-            if len(waiting) > MOST_WAITING:
-                del waiting[next(iter(waiting))]
-        return callback
+    def _on_pose(self, data: bytes) -> None:
+        stamp = raw_stamp(data)
+        if stamp not in self._waiting:
+            self._waiting.add(stamp)
+            return
+        self._waiting.remove(stamp)
+        for publisher, message in self._answers:
+            publisher.publish(with_stamp(message, stamp))
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..scene.scene_solver import CONTAINER
 from ..solver.pose import rotation_matrix
 
-SIZE = (12.192, 2.438, 2.591)  # full extents of both boxes, 40 ft containers [m]
 DEPTHS = (0.005, 0.02)
 """Least and largest depth of B's lowest corner below A's top face [m]. Where that corner overhangs
 A's edge, the overlap is up to 4 mm less deep."""
@@ -28,7 +28,7 @@ def swaying_containers(count: int, *, rate: float, seed: int = 1) -> tuple[np.nd
     motion = swings * np.sin(2.0 * np.pi * (time / periods + rng.random(5)))
     turns = np.column_stack([0.5 * motion[:, 2:], np.ones(count)])
     turns /= np.linalg.norm(turns, axis=1, keepdims=True)
-    reach = 0.5 * np.abs(rotation_matrix(turns)[:, 2]) @ SIZE  # of B below its centre [m]
-    heights = 0.5 * SIZE[2] + reach - rng.uniform(*DEPTHS, count)
+    reach = 0.5 * np.abs(rotation_matrix(turns)[:, 2]) @ CONTAINER  # of B below its centre [m]
+    heights = 0.5 * CONTAINER[2] + reach - rng.uniform(*DEPTHS, count)
     return (np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (count, 1)),
             np.column_stack([motion[:, :2], heights, turns]))

@@ -7,7 +7,8 @@ from __future__ import annotations
 import numpy as np
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.bench.poses import DEPTHS, SIZE, swaying_containers
+from box_contact_ros.bench.poses import DEPTHS, swaying_containers
+from box_contact_ros.scene.scene_solver import CONTAINER
 
 
 def test_the_stream_is_the_same_for_the_same_seed():
@@ -18,7 +19,7 @@ def test_the_stream_is_the_same_for_the_same_seed():
 
 def test_all_pairs_touch_each_at_a_depth_of_its_own():
     poses = swaying_containers(5000, rate=200.0)
-    contacts = ContactSolver(SIZE, SIZE, model='exact').batch(*poses)
+    contacts = ContactSolver(CONTAINER, CONTAINER, model='exact').batch(*poses)
     assert contacts.colliding.all()
     assert contacts.separation.min() >= -DEPTHS[1] * (1.0 + 1e-9)
     assert np.diff(np.sort(contacts.separation)).min() > 0.0
