@@ -16,7 +16,6 @@ origin. A pose is `x y z qx qy qz qw` of the body's centre. Angles of a `CraneSc
 """
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -27,9 +26,6 @@ import numpy as np
 from ..scene.laws import GRAVITY, Body
 from ..scene.scene_solver import CONTAINER
 from ..solver.pose import cross, rotation_matrix
-
-# MuJoCo would write warnings to a file MUJOCO_LOG.TXT in the working directory.
-mujoco.set_mju_user_warning(logging.getLogger(__name__).warning)
 
 PHYSICS_STEP = 5e-4
 """Longest physics step [s]. A tick of publication is cut into equal steps no longer than this."""
