@@ -161,7 +161,7 @@ def test_a_report_without_matplotlib_names_the_extra(monkeypatch, tmp_path):
     ('--model exakt', "argument --model: model 'exakt' is not one of"),
     ('--out /proc/nowhere', 'cannot write to /proc/nowhere'),
 ])
-def test_bad_options(program, arguments, words):
-    running = program('bench', *arguments.split())
-    assert running.wait(PATIENCE) == 2
-    assert words in running.output
+def test_bad_options(arguments, words, capsys):
+    with pytest.raises(SystemExit, match='2'):
+        bench_main(arguments.split())
+    assert words in capsys.readouterr().err

@@ -26,7 +26,6 @@ HARD = CraneScenario(rope_angle=3.0, rope_heading=100.0, pitch=2.0, roll=-2.0, y
                      offset=(0.2, 0.4))
 """A landing at the ends of what is asked for."""
 END_SECONDS = 2.0
-BOTH = pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 
 
 def arguments(**values):
@@ -87,10 +86,10 @@ def test_bad_parameters_are_refused_by_name_and_value(program, values, status, w
 # --- signals --------------------------------------------------------------------------------------
 
 
-@BOTH
-@pytest.mark.parametrize('lockstep', [False, True])
-@pytest.mark.parametrize('state', ['alone', 'answered', 'deserted'])
-def test_a_signal_ends_it_soon(program, number, lockstep, state):
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('state, lockstep', [
+    ('alone', False), ('answered', False), ('deserted', True)])
+def test_a_signal_ends_it_soon(program, number, state, lockstep):
     """While it waits for a node, moves, or waits for the answers of a node that stands still."""
     node = program('contact_node', '--ros-args', '-p', 'model:=exact') if state != 'alone' else None
     running = program('crane', *arguments(lockstep=lockstep, wait=60.0))

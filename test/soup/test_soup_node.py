@@ -93,16 +93,6 @@ def test_both_nodes_answer_one_input(client, soup_node):
     assert soup.separation == exact.separation and soup.point[0] != exact.point[0]
 
 
-def test_a_contained_box_is_answered(client):
-    """The soup's surfaces may not meet: an answer with finite numbers all the same."""
-    with serving(lambda context: SoupNode(
-            context, parameter_overrides=overrides(divisions=4, size_b=[0.5, 0.5, 0.5]))):
-        offer_until_the_soup_answers(client)
-        stamp = client.ask_soup(ORIGIN, (0.2, 0, 0, 0, 0, 0, 1))
-    contact = contacts_by_pair(client.soup['contacts'][stamp])[PAIR]
-    assert np.isfinite([*contact.point, *contact.normal, contact.separation]).all()
-
-
 def test_its_topics_are_the_documents(client, soup_node):
     """Those of the contact node, with soup/ before what is sent; the same QoS."""
     document = yaml.safe_load(resource_path('msg_schemas', 'asyncapi.yaml').read_text('utf-8'))

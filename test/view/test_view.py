@@ -324,28 +324,17 @@ def bring(page, tick, force=math.nan, model='exact'):
     page.show(tick, force, model=model)
 
 
-def test_nothing_that_a_browser_sends_ends_the_page(page, monkeypatch):
-    """Garbage, numbers of any size, cameras that none can be; and no public tunnel is opened."""
+def test_no_browser_opens_a_public_tunnel(page, monkeypatch):
+    """Nor does garbage that it sends end the page."""
     tunnels = []
     monkeypatch.setattr('viser._viser.ViserTunnel', lambda *target: tunnels.append(target))
-    address = page.url.replace('http', 'ws')
     options = {'subprotocols': [f'viser-v{viser.__version__}'], 'max_size': None, 'proxy': None}
-    camera = dict.fromkeys(('wxyz', 'position', 'look_at', 'up_direction'), ['x'])
-    camera |= {'fov': 'wide', 'image_height': 0, 'image_width': 10**18, 'near': -1.0, 'far': -1.0}
-    for message in (b'\xff' * 100, b'\x80', packed('What'), packed('ShareUrlRequest'),
-                    packed('GuiUpdateMessage', uuid='x', updates={'value': 2**64 - 1}),
-                    packed('ViewerCameraMessage', **camera)):
-        with connect(address, **options) as client:
+    for message in (b'\xff' * 100, msgspec.msgpack.encode({'type': 'ShareUrlRequest'})):
+        with connect(page.url.replace('http', 'ws'), **options) as client:
             client.send(message)
             bring(page, tick_of(START, TOUCHING, {PAIR: EXACT}))
-    with connect(address, **options) as client:
-        assert client.recv(PATIENCE)
+            assert client.recv(PATIENCE)
     assert tunnels == []
-
-
-def packed(name, **fields):
-    """Return a message as viser's browsers send it."""
-    return msgspec.msgpack.encode({'type': name, **fields})
 
 
 in_browser = pytest.mark.skipif(chromium() is None,
