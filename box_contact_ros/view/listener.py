@@ -93,7 +93,10 @@ class Track:
 
 
 class Listener(GuardedNode):
-    """Keeps the last poses and contacts that it hears of a scene; `values`: its parameters."""
+    """Keeps the last poses and contacts that it hears of a scene.
+
+    values: its parameters; rows: the scene.
+    """
 
     def __init__(self, name: str, context: Context, settings: Mapping[str, Setting],
                  contacts_qos: QoSProfile, **options: Any) -> None:
@@ -103,7 +106,7 @@ class Listener(GuardedNode):
         warn_of_unknown(self, settings)
         scene = (read_scene(values['scene']) if values['scene'] else
                  two_boxes(values['size_a'], values['size_b']))
-        self._rows = SceneRows(scene)
+        self.rows = SceneRows(scene)
         self._tracks: list[Track] = []
         self._frame_id = ''
         self._answer: tuple[int, Answer, float] | None = None  # stamp, what touches, latency
@@ -131,7 +134,7 @@ class Listener(GuardedNode):
     def _on_contacts(self, message: Any) -> None:
         stamp = stamp_of(message.header)
         latency = 1e-9 * (self.get_clock().now().nanoseconds - stamp)
-        self._answer = stamp, read_touching(message, self._rows.scene), latency
+        self._answer = stamp, read_touching(message, self.rows.scene), latency
         self._unanswered = math.inf
 
     def tick(self) -> Tick | None:
@@ -145,7 +148,7 @@ class Listener(GuardedNode):
         stamp, answer, latency = max(track.kept[-1][0] for track in tracks), None, math.nan
         if self._answer is not None and time.monotonic() - self._unanswered <= UNANSWERED:
             stamp, answer, latency = self._answer
-        poses = self._rows.poses.copy()
+        poses = self.rows.poses.copy()
         for track in tracks:
             poses[track.boxes] = track.at(stamp)
-        return Tick(self._rows, stamp, self._frame_id, poses, answer, latency)
+        return Tick(self.rows, stamp, self._frame_id, poses, answer, latency)

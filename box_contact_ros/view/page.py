@@ -67,8 +67,8 @@ class Server(viser.ViserServer):
 class Page:
     """`draw` moves what is drawn to a tick; `show` brings figures and charts to the same tick."""
 
-    def __init__(self, host: str, port: int) -> None:
-        """Serve at a port, or the next that is free. Raises OSError."""
+    def __init__(self, host: str, port: int, rows: SceneRows) -> None:
+        """Serve a scene at a port, or the next that is free. Raises OSError."""
         self._server = Server(host, port)
         self.url = f'http://{host}:{self._server.get_port()}'
         gui = self._server.gui
@@ -80,10 +80,9 @@ class Page:
         self._charts: dict[str, Any] = {}
         gui.add_html('<div id="legend" style="padding:0 0.7em 0.6em;font-size:0.78em">'
                      f'{LEGEND}</div>')
-        self._rows: SceneRows | None = None
         self._seen = 0  # boxes; each that joins brings all of them into view
         self._origin = np.zeros(3)
-        self._add_drawing()
+        self._add_drawing(rows)
 
     def close(self) -> None:
         """End the server."""
@@ -95,38 +94,30 @@ class Page:
     def draw(self, tick: Tick) -> None:
         """Show boxes and contacts."""
         with self._server.atomic():
-            if tick.rows is not self._rows:
-                self._add_boxes(tick.rows)
             known = ~np.isnan(tick.poses[:, 0])
             if known.sum() > self._seen:
                 self._look_at(tick, known)
             self._draw_boxes(tick, known)
             self._draw_contacts(tick.answer)
 
-    def _add_drawing(self) -> None:
+    def _add_drawing(self, rows: SceneRows) -> None:
+        """Add all that is drawn. Boxes are instances of one cube: a tick moves them together."""
         scene, place = self._server.scene, np.zeros((1, 2, 3))
+        edge = float(np.median(rows.sizes.max(axis=1)))
+        radius, self._normal_length = style.POINT_RADIUS * edge, style.NORMAL_LENGTH * edge
         self._ground = scene.add_grid('/ground', GROUND_SIZE, GROUND_SIZE, cell_size=1.0,
                                       section_size=5.0, cell_color=LINES, section_color=SECTIONS,
                                       plane_color=GROUND, plane_opacity=1.0, shadow_opacity=0.0,
                                       visible=False)
         self._points = scene.add_point_cloud('/contact/points', place[:, 0], style.CONTACT,
-                                             point_shape='circle', precision='float32',
-                                             visible=False)
-        self._normals = scene.add_arrows('/contact/normals', place, style.CONTACT, visible=False)
+                                             point_shape='circle', point_size=2.0 * radius,
+                                             precision='float32', visible=False)
+        self._normals = scene.add_arrows('/contact/normals', place, style.CONTACT,
+                                         shaft_radius=0.45 * radius, head_radius=1.1 * radius,
+                                         head_length=2.6 * radius, visible=False)
         self._patches = scene.add_line_segments('/contact/patches', place, style.CONTACT,
                                                 thickness=3.0, thickness_units='screen',
                                                 visible=False)
-
-    def _add_boxes(self, rows: SceneRows) -> None:
-        """Add the boxes as instances of one cube: a tick moves all of them together."""
-        self._rows = rows
-        edge = float(np.median(rows.sizes.max(axis=1)))
-        radius = style.POINT_RADIUS * edge
-        self._points.point_size = 2.0 * radius
-        self._normals.shaft_radius = 0.45 * radius
-        self._normals.head_radius = 1.1 * radius
-        self._normals.head_length = 2.6 * radius
-        self._normal_length = style.NORMAL_LENGTH * edge
         colours = np.where(rows.is_a[:, None], style.BOX_A, style.BOX_B)
         count = len(rows.sizes)
         no_turn, nothing = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.zeros((count, 3))

@@ -51,7 +51,7 @@ class ViewNode(Listener):
         self.create_subscription(WrenchStamped, CRANE_WRENCH, self._on_force, qos)
         host = self.values['host']
         try:
-            self._page = Page(host, self.values['port'])
+            self._page = Page(host, self.values['port'], self.rows)
         except OSError as error:
             raise ValueError(f'host {host}: {error.strerror}') from error
         print(f'view: {self._page.url}', flush=True)

@@ -314,9 +314,8 @@ def test_what_it_cannot_start_with_ends_it(program, parameter, words):
 
 @pytest.fixture
 def page():
-    page = Page('127.0.0.1', 8450)
-    yield page
-    page.close()
+    with closing(Page('127.0.0.1', 8450, ROWS)) as page:
+        yield page
 
 
 def bring(page, tick, force=math.nan, model='exact'):
@@ -396,7 +395,7 @@ def test_the_page_in_a_browser(page, width):
 
 @pytest.mark.timeout(600)
 @in_browser
-def test_two_hundred_boxes_in_a_browser(page):
+def test_two_hundred_boxes_in_a_browser():
     """All are drawn, in map coordinates too, and all contacts."""
     places = np.array([(5e5 + 5.0 * (n % 10), 4e6 + 5.0 * (n // 10)) for n in range(100)])
     boxes = {f'load_{n}': Box(f'load_{n}', CUBE, pose_topic=f'load_{n}/pose') for n in range(100)}
@@ -409,10 +408,10 @@ def test_two_hundred_boxes_in_a_browser(page):
     rows = SceneRows(scene)
     contacts = {pair: solver(pose, boxes[pair.b].pose) for pair, pose in zip(pairs[:99], placed)}
     message = contacts_at(START, contacts, [pairs[99].label])
-    bring(page, Tick(rows, START, 'yard', np.where(np.isnan(rows.poses), np.r_[placed, placed],
-                                                   rows.poses),
-                     read_touching(message, scene), 1e-3))
-    with open_page(page.url) as tab:
+    with closing(Page('127.0.0.1', 8450, rows)) as page, open_page(page.url) as tab:
+        bring(page, Tick(rows, START, 'yard', np.where(np.isnan(rows.poses), np.r_[placed, placed],
+                                                       rows.poses),
+                         read_touching(message, scene), 1e-3))
         tab.wait_for('document.getElementById("pairs")?.innerText == "99 of 100"')
         assert tab.text('stale') == '1'
         wait_for_drawing(tab, 5e-4)
