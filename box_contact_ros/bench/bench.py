@@ -57,13 +57,14 @@ def main(args: Sequence[str] | None = None) -> int:
     keep_to_this_host()
     cores = os.sched_getaffinity(0)
     own = {max(cores)} if len(cores) > 1 else cores
+    theirs = cores - own or cores
     gc.disable()  # `BenchNode` collects between blocks
-    about = _about(options, own, cores - own or cores)
+    about = _about(options, own, theirs)
     print(about, flush=True)
     poses = swaying_containers(max(2, round(options.rate * options.duration / len(names))),
                                rate=options.rate)
     with asked_to_end() as signals, contextlib.ExitStack() as ending:
-        os.sched_setaffinity(0, cores - own or cores)  # the nodes inherit it
+        os.sched_setaffinity(0, theirs)  # the nodes inherit it
         nodes = {name: ending.enter_context(running([
             *program(NODES[name][0], **({'model': options.model} if name == 'contact' else {})),
             '-r', f'__ns:=/bench/{name}'])) for name in names}

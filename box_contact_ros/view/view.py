@@ -3,8 +3,9 @@
 
 """A live page in the browser: boxes, contacts, depth and force over time.
 
-Draws the boxes of a scene as the running nodes publish them, with the contacts that answer them,
-which model the contact node runs, and the force on a crane's load. It prints the page's address.
+It draws the boxes of a scene as the running nodes publish them, and the contacts that answer them.
+It also shows which model the contact node runs, and the force on a crane's load. It prints the
+page's address.
 """
 from __future__ import annotations
 
