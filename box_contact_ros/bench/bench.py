@@ -33,11 +33,11 @@ from pathlib import Path
 
 from ..core import native
 from ..extras import require
-from ..node.contact_node import PARAMETERS
 from ..node.parameters import outside_ros_args
 from ..node.processes import asked_to_end, keep_to_this_host, program, running
 from ..node.runtime import exit_on_refusal, running_node
-from ..solver.arguments import add_model, program_parser, within
+from ..solver.arguments import model_name, program_parser, within
+from ..solver.models import MODELS
 from .drive import NODES, BenchNode
 from .poses import swaying_containers
 from .report import comparison, draw, figures, table, void_reason
@@ -94,7 +94,8 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
     parser.add_argument('--duration', type=within(1.0, LONGEST), default=SECONDS, metavar='S',
                         help='time in which poses are sent, split evenly over the nodes (default: '
                              '%(default)g)')
-    add_model(parser, PARAMETERS['model'].default)
+    parser.add_argument('--model', type=model_name, default='exact', metavar='MODEL',
+                        help=f'of the contact node: {", ".join(MODELS)} (default: %(default)s)')
     parser.add_argument('--out', type=Path, metavar='DIR',
                         help='folder for the report, bench.md, and its picture, bench.png, which '
                              'needs the extra report (default: none)')

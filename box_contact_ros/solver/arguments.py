@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from .models import MODELS, check_model
+from .models import check_model
 
 Number = TypeVar('Number', int, float)
 
@@ -18,12 +18,6 @@ def program_parser(program: str, doc: str | None, **options: Any) -> argparse.Ar
     """Return the parser of a program, whose help begins with `doc`."""
     return argparse.ArgumentParser(prog=program, description=doc, **options,
                                    formatter_class=argparse.RawDescriptionHelpFormatter)
-
-
-def add_model(parser: argparse.ArgumentParser, default: str) -> None:
-    """Add the option `--model`."""
-    parser.add_argument('--model', type=model_name, default=default, metavar='MODEL',
-                        help=f'one of {", ".join(MODELS)} (default: {default})')
 
 
 def model_name(text: str) -> str:
