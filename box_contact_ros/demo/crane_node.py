@@ -35,7 +35,7 @@ from ..node.ros_client import CRANE_WRENCH, DEEP_RELIABLE, pose_message, stamp_o
 from ..node.runtime import REFUSALS, GuardedNode, running_node, spin_once
 from ..node.topics import contact_qos
 from .crane import CraneScenario
-from .landing import CORNER_SPEED_LIMIT, ClosedLoop, Landing, LandingRecord, LoopState
+from .landing import CORNER_SPEED_LIMIT, ClosedLoop, Landing, LandingRecord, LoopState, with_patch
 
 FRAME = 'world'  # of the published poses
 OFFER_PERIOD = 0.1  # time between the pairs that only ask whether anyone answers [s]
@@ -45,6 +45,8 @@ DRAIN = 1.0  # patience for the last answers [s]
 LOOK_PERIOD = 0.05  # time after which a signal is noticed, at most [s]
 LOOK_RATE = 30.0  # forces published, and looks at the landing's stage, at most [Hz]
 STAGES = ('hanging', 'first touch', 'settling', 'at rest')
+POINTS_ALONE = ("the contact node's model gives contacts without a patch: the whole load stands "
+                'for it, and may not come to rest')
 
 PARAMETERS = {
     'rate': Setting(200.0, 'pairs of poses published per second [Hz]', number(1, 2000)),
@@ -154,7 +156,12 @@ class CraneNode(GuardedNode):
         touches = {name: contact for name, contact in contacts.items() if contact.colliding}
         if touches:
             self.latencies.append(latency)
-        self.loop.answer(state, touches, latency=0.0 if self._lockstep else latency)
+        if not all(math.isfinite(contact.volume) for contact in touches.values()):
+            self.get_logger().warning(POINTS_ALONE, once=True)
+        scenario = self.loop.crane.scenario
+        self.loop.answer(state, {name: with_patch(contact, state.pose, scenario.size)
+                                 for name, contact in touches.items()},
+                         latency=0.0 if self._lockstep else latency)
 
     def _publish_force(self, stamp: int) -> None:
         """Publish the force on the load of the last physics step."""

@@ -113,6 +113,23 @@ class LoadForces:
         return wrench
 
 
+def with_patch(touch: Contact, pose: np.ndarray, size: Sequence[float]) -> Contact:
+    """Return a contact with a patch: that of the whole load where its model gives the point alone.
+
+    pose, size: of the load, (7,) and full extents [m]. Volume = depth · V / h with the load's
+    volume V and its extent h along the normal; covariance = that of the load. For the law, this is
+    a spring at the point, with the dampers of the whole bottom.
+    """
+    if math.isfinite(touch.volume):
+        return touch
+    axes = rotation_matrix(pose[3:])
+    along = float(np.abs(touch.normal @ axes) @ size)
+    depth = max(0.0, -touch.separation)  # at exact touch the separation may be above zero
+    return Contact(touch.colliding, touch.separation, touch.normal, touch.point,
+                   depth * float(np.prod(size)) / along,
+                   (axes * np.square(size) / 12.0) @ axes.T, touch.axis)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Landing:
     """Figures of one landing. SI units, angles in rad; NaN where nothing was measured."""

@@ -11,13 +11,15 @@ import pytest
 
 pytest.importorskip('mujoco')
 
-from box_contact_ros import ContactSolver
+from box_contact_ros import Body, Contact, ContactSolver
 from box_contact_ros.demo.crane import CraneScenario
 from box_contact_ros.demo.landing import (
     CORNER_SPEED_LIMIT,
     ClosedLoop,
     Landing,
     LandingRecord,
+    LoadForces,
+    with_patch,
 )
 from box_contact_ros.scene.laws import GRAVITY
 
@@ -103,6 +105,26 @@ def test_an_answer_acts_from_its_time_on():
     assert [step for step, _, _ in held] == [4, 22, 22, 30]
     assert ages == pytest.approx([0.002, 0.006, 0.001, 0.0], abs=1e-9)
     assert [pose.tolist() for _, _, pose in held] == [state.pose.tolist() for state in asked]
+
+
+def test_the_patch_of_a_flat_load_is_that_of_the_whole_load():
+    """Where the bottom lies flat, the patch that is assumed without one is the exact one."""
+    turn = (0.0, 0.0, math.sin(0.2), math.cos(0.2))
+    load, stack = (12.0, 2.0, 3.0), (20.0, 20.0, 1.0)
+    pose = np.array([1.0, 2.0, 1.98, *turn])
+    exact = ContactSolver(load, stack, model='exact')(pose, (0, 0, 0, 0, 0, 0, 1))
+    alone = Contact(exact.colliding, exact.separation, exact.normal, exact.point, math.nan,
+                    np.full((3, 3), math.nan))
+    assumed = with_patch(alone, pose, load)
+    assert with_patch(exact, pose, load) is exact
+    assert assumed.volume == pytest.approx(exact.volume) == pytest.approx(12.0 * 2.0 * 0.02)
+    assert assumed.covariance[:2, :2] == pytest.approx(exact.covariance[:2, :2])
+    wrenches = []
+    for contact in (exact, assumed):
+        law = LoadForces(Body.of_box(load, 20_000.0), rate_hz=200.0, step=0.001)
+        law.hold({'load_stack': contact}, pose, age=0.0)
+        wrenches.append(law.wrench(pose, np.array([0.1, 0.0, -0.2, 0.01, 0.02, 0.03])))
+    assert wrenches[1] == pytest.approx(wrenches[0], rel=1e-9, abs=1e-3)
 
 
 def record_of(heights, forces):
