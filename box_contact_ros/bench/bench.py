@@ -94,7 +94,7 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
     parser.add_argument('--duration', type=within(1.0, LONGEST), default=SECONDS, metavar='S',
                         help='time in which poses are sent, split evenly over the nodes (default: '
                              '%(default)g)')
-    parser.add_argument('--model', type=model_name, default='exact', metavar='MODEL',
+    parser.add_argument('--model', type=model_name, default='exact', metavar='NAME',
                         help=f'of the contact node: {", ".join(MODELS)} (default: %(default)s)')
     parser.add_argument('--out', type=Path, metavar='DIR',
                         help='folder for the report, bench.md, and its picture, bench.png, which '

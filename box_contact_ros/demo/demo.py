@@ -22,7 +22,7 @@ from contextlib import ExitStack
 
 from ..extras import require
 from ..node.processes import asked_to_end, keep_to_this_host, program, running
-from ..solver.arguments import program_parser
+from ..solver.arguments import model_name, program_parser
 
 PAUSE = 1.5  # time [s] between the end of a landing and the next, to see how it ended
 LOOK_PERIOD = 0.05  # time [s] between looks at the processes
@@ -34,7 +34,7 @@ Next: `make view` shows this in the browser, and README.md how to use the node."
 def main(args: Sequence[str] | None = None) -> int:
     """Run the demonstration and return the crane's exit status."""
     parser = program_parser('demo', __doc__)
-    parser.add_argument('--model', choices=('exact', 'mlp'), default='exact',
+    parser.add_argument('--model', type=model_name, default='exact', metavar='NAME',
                         help='model of the contact node (default: %(default)s)')
     parser.add_argument('--view', action='store_true', help='show landing after landing')
     options = parser.parse_args(args)

@@ -21,10 +21,10 @@ from children import children
 from box_contact_ros.demo import demo
 
 
-def test_a_model_without_patches_ends_the_demo_before_it_starts(capsys):
+def test_an_unknown_model_ends_the_demo_before_it_starts(capsys):
     with pytest.raises(SystemExit, match='2'):
-        demo.main(['--model', 'paper'])
-    assert "invalid choice: 'paper'" in capsys.readouterr().err
+        demo.main(['--model', 'exakt'])
+    assert 'did you mean exact?' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
