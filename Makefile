@@ -83,7 +83,6 @@ reports:
 	run benchmarks.named_failures $(ARGS)
 	run benchmarks.fuzz $(ARGS)
 	run benchmarks.landing $(ARGS)
-	run benchmarks.rest $(ARGS)
 	run benchmarks.stacks $(ARGS)
 	run benchmarks.frontier $(ARGS)
 	run benchmarks.native $(ARGS)

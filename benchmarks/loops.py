@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Boxes that rest, slide and fall, a step at a time: by `PatchForces`, and by MuJoCo's own contact.
+"""Boxes that rest and fall, a step at a time: by `PatchForces`, and by MuJoCo's own contact.
 
 `Ours` asks for contacts at a rate, gets the answers late, and asks for the forces at every step.
 `Theirs` runs the same boxes by MuJoCo. Both get the same outside forces.
@@ -22,7 +22,7 @@ import mujoco
 import numpy as np
 
 from box_contact_ros import Body, ContactSolver, PatchForces
-from box_contact_ros.scene.laws import GRAVITY
+from box_contact_ros.scene.laws import FRICTION, GRAVITY
 from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 
 # MuJoCo would write warnings to a file MUJOCO_LOG.TXT in the working directory.
@@ -39,13 +39,13 @@ Wrenches = Callable[[float, 'Boxes', np.ndarray, np.ndarray], np.ndarray]
 
 @dataclass
 class Boxes:
-    """Boxes of a scene, a row each: full extents, mass (0: fixed, or moved by its velocity)."""
+    """Boxes of a scene, a row each: full extents, mass (0: fixed)."""
 
     size: np.ndarray  # (n, 3) [m]
     mass: np.ndarray  # (n,) [kg]
     pose: np.ndarray  # (n, 7) of the boxes' centres
     centre: np.ndarray  # (n, 3) of mass, in the box's own frame [m]
-    velocity: np.ndarray  # (n, 6) of the centre of mass
+    velocity: np.ndarray  # (n, 6) of the centre of mass, zero at first
 
     @classmethod
     def of(cls, rows: Sequence[tuple]) -> Boxes:
@@ -76,7 +76,6 @@ class Scene:
     name: str
     boxes: Boxes
     seconds: float = 5.0
-    friction: float = 0.5
     act: Wrenches | None = None
 
 
@@ -141,8 +140,7 @@ class Ours:
         self.solver = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
         self.forces = PatchForces(
             [Body(mass=m, inertia=i, centre=c)
-             for m, i, c in zip(boxes.mass, boxes.inertia, boxes.centre)],
-            friction=scene.friction)
+             for m, i, c in zip(boxes.mass, boxes.inertia, boxes.centre)])
         self.tick, self.spent = 0, 0.0
         self.answers: deque = deque()
         self.pairs = np.empty((0, 2), dtype=np.int64)
@@ -182,55 +180,36 @@ class Theirs:
         spec.option.timestep = step
         spec.memory = 2**28
         self.free = boxes.mass > 0
-        self.moves = self.free | boxes.velocity.any(axis=1)
-        for k in range(len(boxes.mass)):
+        for k, free in enumerate(self.free):
             x, y, z, qx, qy, qz, qw = boxes.pose[k]
             body = spec.worldbody.add_body(pos=(x, y, z), quat=(qw, qx, qy, qz))
-            if self.moves[k]:
+            if free:
                 body.add_freejoint()
                 body.explicitinertial = True
-                body.mass = boxes.mass[k] or 1e3 * boxes.mass.max()
-                body.inertia = boxes.inertia[k] if self.free[k] else np.full(3, body.mass)
+                body.mass, body.inertia = boxes.mass[k], boxes.inertia[k]
                 body.ipos = boxes.centre[k]
-                body.gravcomp = float(not self.free[k])
             body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=0.5 * boxes.size[k],
-                          friction=(scene.friction, 0.005, 0.0001))
+                          friction=(FRICTION, 0.005, 0.0001))
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         self.tick, self.spent = 0, 0.0
-        self.bodies = 1 + np.flatnonzero(self.moves)
-        self._put_velocity(self.moves)
-
-    def _put_velocity(self, rows: np.ndarray) -> None:
-        boxes = self.boxes
-        arm = np.einsum('nij,nj->ni', rotation_matrix(boxes.pose[:, 3:]), boxes.centre)
-        linear = boxes.velocity[:, :3] - np.cross(boxes.velocity[:, 3:], arm)
-        local = np.einsum('nji,nj->ni', rotation_matrix(boxes.pose[:, 3:]), boxes.velocity[:, 3:])
-        both = np.hstack([linear, local])
-        which = rows[self.moves]
-        self.data.qvel.reshape(-1, 6)[which] = both[self.moves][which]
+        self.bodies = 1 + np.flatnonzero(self.free)
 
     def step(self) -> None:
         """Advance all boxes by a step."""
-        boxes, h = self.boxes, self.step_size
+        boxes, free = self.boxes, self.free
         if self.scene.act:
-            push = self.scene.act(self.tick * h, boxes, boxes.pose, boxes.velocity)
-            self.data.xfrc_applied[self.bodies] = np.where(
-                self.free[self.moves, None], push[self.moves], 0.0)
-        driven = self.moves & ~self.free
-        if driven.any():
-            self._put_velocity(driven)
+            push = self.scene.act(self.tick * self.step_size, boxes, boxes.pose, boxes.velocity)
+            self.data.xfrc_applied[self.bodies] = push[free]
         start = time.perf_counter()
         mujoco.mj_step(self.model, self.data)
         self.spent += time.perf_counter() - start
-        q = self.data.qpos.reshape(-1, 7)
-        boxes.pose[self.moves] = q[:, [0, 1, 2, 4, 5, 6, 3]]
+        boxes.pose[free] = self.data.qpos.reshape(-1, 7)[:, [0, 1, 2, 4, 5, 6, 3]]
         v = self.data.qvel.reshape(-1, 6)
-        rotation = rotation_matrix(boxes.pose[self.moves, 3:])
+        rotation = rotation_matrix(boxes.pose[free, 3:])
         spin = np.einsum('nij,nj->ni', rotation, v[:, 3:])
-        arm = np.einsum('nij,nj->ni', rotation, boxes.centre[self.moves])
-        new = np.hstack([v[:, :3] + np.cross(spin, arm), spin])
-        boxes.velocity[self.free] = new[self.free[self.moves]]
+        arm = np.einsum('nij,nj->ni', rotation, boxes.centre[free])
+        boxes.velocity[free] = np.hstack([v[:, :3] + np.cross(spin, arm), spin])
         self.tick += 1
 
 

@@ -1,13 +1,47 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Real pallets by `PatchForces`: what stays in its place."""
+"""The two loops against closed forms; what comes to rest, and which boxes stay in their places."""
 from __future__ import annotations
 
+import csv
+from functools import partial
+from pathlib import Path
+
+import numpy as np
 import pytest
 
-from benchmarks.loops import TIMINGS
-from benchmarks.stacks import ORDERS, sideways, stays
+pytest.importorskip('mujoco')
+
+from benchmarks import stacks
+from benchmarks.loops import MUJOCO, TIMINGS, Boxes, Scene, Timing, corner_speeds, steps
+from benchmarks.stacks import ORDERS, off_centre, ratio, run, sideways, slope, stays
+from box_contact_ros.scene.laws import GRAVITY
+
+
+@pytest.mark.parametrize('timing', [None, TIMINGS[0]])
+def test_a_free_box_turns_about_its_centre_of_mass(timing: Timing | None) -> None:
+    """It falls, and a torque turns it about its z axis by ½·α·t² from its corners' rest."""
+    boxes = Boxes.of([((1.0, 2.0, 1.0), 12.0, (0, 0, 9), (0, 0, 0, 1), (0.3, 0.0, 0.0))])
+    torque = np.array([[0.0, 0, 0, 0, 0, 20.0]])
+    for _ in steps(Scene('spin', boxes, seconds=0.5, act=lambda *_: torque), timing):
+        pass
+    spin = 20.0 / boxes.inertia[0, 2] * 0.5
+    assert boxes.velocity[0] == pytest.approx([0, 0, -0.5 * GRAVITY, 0, 0, spin], abs=2e-3)
+    angle = 0.25 * spin
+    assert boxes.pose[0, :2] == pytest.approx(
+        [0.3 - 0.3 * np.cos(angle), -0.3 * np.sin(angle)], abs=2e-3)
+    assert corner_speeds(boxes).max() == pytest.approx(
+        np.hypot(0.5 * GRAVITY, spin * np.hypot(0.8, 1.0)), rel=1e-3)
+
+
+@pytest.mark.parametrize('timing', TIMINGS, ids=str)
+@pytest.mark.parametrize('make', [partial(slope, 'plate'), partial(slope, 'tall'),
+                                  partial(ratio, 10.0), partial(off_centre, 0.45)])
+def test_loads_come_to_rest_at_every_timing(make: partial[Scene], timing: Timing) -> None:
+    """Also with answers that come late: below the angle of friction, 10 on 1, off the centre."""
+    outcome = run(make, timing)
+    assert outcome.rest < 3.0 and outcome.moved < 10.0 and outcome.turned < 0.5
 
 
 @pytest.mark.parametrize('order', ORDERS)
@@ -19,3 +53,16 @@ def test_real_pallets_stand(order: str) -> None:
 def test_a_push_topples_boxes() -> None:
     """Boxes that are pushed by 0.3 of their weight do not all stay."""
     assert not stays(lambda: sideways(ORDERS[0], 0.3), TIMINGS[0]).all()
+
+
+def test_the_program(monkeypatch: pytest.MonkeyPatch, tmp_path: Path,
+                     capsys: pytest.CaptureFixture[str]) -> None:
+    """A scene that does not come to rest: status 1, its speed in bold, and a line on stderr."""
+    falls = partial(Scene, 'falls', Boxes.of([((1.0, 1.0, 1.0), 1.0, (0, 0, 0))]), 0.2)
+    monkeypatch.setattr(stacks, 'SCENES', (falls,))
+    monkeypatch.setattr(stacks, 'ORDERS', ())
+    assert stacks.main(['--out', str(tmp_path)]) == 1
+    assert 'stacks: falls does not come to rest' in capsys.readouterr().err
+    assert '| falls | **' in (tmp_path / 'stacks.md').read_text()
+    with (tmp_path / 'stacks.csv').open() as file:
+        assert [row['way'] for row in csv.DictReader(file)] == [*map(str, TIMINGS), MUJOCO]
