@@ -51,7 +51,6 @@ from .trials import (
     FrontierRow,
     Plan,
     measure_all,
-    rounds_of,
 )
 
 TIMED_SETS = {**SETS, 'just apart': apart}
@@ -83,7 +82,9 @@ def measure_core(seed: int, plan: Plan) -> list[FrontierRow]:
 
 def by_exact(row: FrontierRow, rows: Iterable[FrontierRow]) -> list[float]:
     """Return a call and a pair in a batch relative to `exact`: medians of the rounds' ratios."""
-    return by_round(row.rounds, rounds_of('exact', row, rows)).tolist()
+    exact = next(each for each in rows if (each.name, each.set, each.instruction_set)
+                 == ('exact', row.set, row.instruction_set))
+    return by_round(row.rounds, exact.rounds).tolist()
 
 
 def odd_answers(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> Iterator[str]:

@@ -347,4 +347,4 @@ LOADS: dict[str, Generator] = {
 }
 """Loads on what they stand on: more sets of `accuracy` and `native`."""
 FLUSH: dict[str, Generator] = {'aligned flush stacks': flush_stacks}
-"""One more set of `speed` and `native`: the slowest for most ways to the overlap."""
+"""One more set of `native`: the slowest for most ways to the overlap."""

@@ -1,31 +1,31 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Program `speed`: calls, batches, threads and the first contact of our models, from Python.
+"""Program `speed`: calls with cold caches, threads and the first contact, from Python.
 
-`python -m benchmarks.speed` writes speed.md, speed.csv and speed_cold.csv. Each instruction set of
-the machine is measured in a subprocess, on one pinned core. The contestants take turns, so a
-disturbance hits all of them, and the figures to read are ratios to MuJoCo's signed distance. Calls
-with cold caches, two threads and the start of a new process follow.
+`python -m benchmarks.speed` writes speed.md and speed_cold.csv. The contestants of the cold calls
+take turns on one pinned core, so a disturbance hits all of them, and the figures to read are ratios
+to MuJoCo's signed distance. Two threads and the start of a new process follow. `frontier` has the
+calls one after another, and the batches, of each instruction set.
 """
 from __future__ import annotations
 
 import math
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from box_contact_ros.core import instruction_sets, native
+from box_contact_ros.core import native
 
 from . import output
 from .arguments import report_parser
-from .contestant import CORE_MODELS, Contestant, in_subprocess, ours
+from .contestant import CORE_MODELS, Contestant, ours
 from .engines import installed
 from .output import markdown_table, number
-from .pose_sets import FLUSH, SETS, drawn
+from .pose_sets import SETS, drawn
 from .timing import (
     after_warm_up,
     by_round,
@@ -34,10 +34,10 @@ from .timing import (
     pinned,
     usable_cores,
 )
-from .trials import FULL, LONGEST_RUN, QUICK, FrontierRow, Plan, measure_all, rounds_of
 
 UNIT = 'MuJoCo mj_geomDistance'  # the contestant whose single call is the unit of all ratios
 PACKAGES = ('numpy', 'mujoco')
+ROUNDS, QUICK_ROUNDS = 20, 2  # of batches
 BATCH, QUICK_BATCH = 100_000, 1_000
 """Pairs of a batch that threads share: at 20,000, waking a second core takes a tenth."""
 STARTS, QUICK_STARTS = 20, 2  # new processes
@@ -60,12 +60,6 @@ class ColdRow:
     megabytes: float  # that the work touches
     call_p50: float  # [ns]
     call_by_unit: float  # relative to the unit's call on the same pair; NaN: no MuJoCo
-
-
-def measure_core(seed: int, plan: Plan) -> list[FrontierRow]:
-    """Measure the unit and the models in C++, by the instruction set of this process."""
-    with pinned({usable_cores()[-1]}):
-        return measure_all(contestants(), SETS | FLUSH, seed=seed, plan=plan)
 
 
 def contestants() -> list[Contestant]:
@@ -128,24 +122,6 @@ def measure_starts(count: int) -> list[float]:
     return times[1:]
 
 
-def relative(row: FrontierRow, rows: Sequence[FrontierRow]) -> list[float]:
-    """Return a call and a pair in a batch relative to the unit's call: medians of rounds' ratios.
-
-    NaN where MuJoCo is not installed.
-    """
-    return by_round(row.rounds, rounds_of(UNIT, row, rows)[:, :1]).tolist()
-
-
-def table(rows: Sequence[FrontierRow], instruction_set: str) -> str:
-    """Return the times with one instruction set."""
-    return markdown_table(
-        ['', 'set', 'call p50 [ns]', 'p99 [ns]', 'relative to mj_geomDistance', 'batch [ns]',
-         'relative to mj_geomDistance'],
-        [[row.name, row.set, *map(number, row.single[:2]), number(relative(row, rows)[0]),
-          number(row.batch), number(relative(row, rows)[1])]
-         for row in rows if row.instruction_set == instruction_set], words=2)
-
-
 def threads_table(threads: Mapping[str, tuple[list[float], list[float]]]) -> str:
     """Return the times of batches that threads share, and what the second thread gains.
 
@@ -165,39 +141,24 @@ def cold_table(rows: Sequence[ColdRow]) -> str:
                  for m in TOUCHED)] for name in dict.fromkeys(row.name for row in rows)])
 
 
-def csv_rows(rows: Sequence[FrontierRow]) -> Iterator[dict[str, object]]:
-    """Yield a row for each contestant and set; times [ns]."""
-    for row in rows:
-        yield {'name': row.name, 'set': row.set, 'instruction_set': row.instruction_set,
-               **dict(zip(('call_p50', 'call_p99', 'call_max'), row.single)),
-               'batch_p50': row.batch,
-               **dict(zip(('call_by_unit', 'batch_by_unit'), relative(row, rows)))}
-
-
 def main(args: Sequence[str] | None = None) -> int:
     """Measure, print, write."""
     parser = report_parser('speed', __doc__, quick='few calls and rounds, to try it out', seed=1,
-                           out='speed.md, speed.csv, speed_cold.csv')
+                           out='speed.md, speed_cold.csv')
     options = parser.parse_args(args)
     folder, machine = output.results_folder(parser, options), output.machine(native, PACKAGES)
-    plan, pairs, count = ((QUICK, QUICK_BATCH, QUICK_STARTS) if options.quick
-                          else (FULL, BATCH, STARTS))
-    rows = [row for name in reversed(instruction_sets()) for row in in_subprocess(
-        measure_core, options.seed, plan, patience=LONGEST_RUN, instruction_set=name)]
-    cold = in_subprocess(measure_cold, options.seed, QUICK_COLD_CALLS if options.quick
-                         else COLD_CALLS, patience=LONGEST_RUN)
-    threads = {model: measure_threads(model, pairs, plan.rounds) for model in CORE_MODELS}
-    starts = measure_starts(count)
+    calls, rounds, pairs, count = (
+        (QUICK_COLD_CALLS, QUICK_ROUNDS, QUICK_BATCH, QUICK_STARTS) if options.quick
+        else (COLD_CALLS, ROUNDS, BATCH, STARTS))
+    cold = measure_cold(options.seed, calls)
+    threads = {model: measure_threads(model, pairs, rounds) for model in CORE_MODELS}
     text = output.page(
         'benchmarks/pages/speed', command=output.command_line('benchmarks.speed', args),
-        machine=machine, rounds=plan.rounds, calls=plan.timed_pairs, batch=plan.batch_pairs,
-        shared_batch=pairs, threads=threads_table(threads), starts=count,
-        start=1e-9 * float(np.median(starts)), cold=cold_table(cold), cold_set=COLD_SET,
-        tables='\n\n'.join(f'## {name}\n\n{table(rows, name)}'
-                           for name in dict.fromkeys(row.instruction_set for row in rows)))
+        machine=machine, cold=cold_table(cold), cold_set=COLD_SET, shared_batch=pairs,
+        threads=threads_table(threads), starts=count,
+        start=1e-9 * float(np.median(measure_starts(count))))
     print(text)
     (folder / 'speed.md').write_text(text, encoding='utf-8')
-    output.write_csv(folder / 'speed.csv', csv_rows(rows), about=machine)
     output.write_csv(folder / 'speed_cold.csv', map(asdict, cold), about=machine)
     return 0
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -98,12 +98,6 @@ class FrontierRow:
     def errors(self) -> SetErrors:
         """Return the errors of the best choice."""
         return self.choices[self.best]
-
-
-def rounds_of(name: str, like: FrontierRow, rows: Iterable[FrontierRow]) -> np.ndarray:
-    """Return the rounds of a contestant on the set and in the run of another's row; NaN: none."""
-    return next((row.rounds for row in rows if (row.name, row.set, row.instruction_set)
-                 == (name, like.set, like.instruction_set)), np.full((1, 2), math.nan))
 
 
 def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.ndarray,
