@@ -1,11 +1,11 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Landings by the way of contact and force: whether the container comes to rest, and how flat.
+"""Landings by the way of contact: whether the container comes to rest, and how flat.
 
 It runs a grid of 36 landings by every way (some by a sample), rate and latency. It also lands other
 loads and stacks, with an expected outcome (`landing_ways`). It writes landing.csv
-(a row per landing), landing.md (tables) and landing.png (one landing, four ways). The exit status
+(a row per landing), landing.md (tables) and landing.png (one landing, two ways). The exit status
 is 1 if patches of `exact`, the default, do not do all that is expected. Misses of `mlp` are printed
 and counted on the page.
 """
@@ -32,15 +32,14 @@ from box_contact_ros.solver.pose import rotation_matrix
 
 from . import output
 from .arguments import report_parser
+from .engines import mujoco_engines
 from .landing_ways import (
     ADDED,
-    MUJOCO,
     WATCHED,
     WAYS,
     HeldLimits,
     Landed,
     LoopTiming,
-    MujocoSource,
     PlannedLanding,
     aimed,
     grid,
@@ -53,7 +52,7 @@ QUICK = 10
 SHOWN = 17
 """The landing that is drawn: sway of 1.25°, tilt of 3°, 0.6 m of overhang."""
 PACKAGES = ('numpy', 'mujoco')  # whose versions are named
-PATCHES = ('exact', 'mlp')
+PATCHES = tuple(name for name, way in WAYS.items() if way.model)
 """Ways that have the limits of patches on the grid."""
 GATED = 'exact'
 """The way that has to do all that is expected: the default model."""
@@ -94,7 +93,7 @@ def landings(ways: Sequence[str], timings: Sequence[LoopTiming], planned: Sequen
     for name in ways:
         way = WAYS[name]
         for timing in way.timings(timings):
-            for landing in [*of_grid[::max(1, way.every // step)], *(added if way.added else ())]:
+            for landing in [*of_grid[::max(1, way.every // step)], *added]:
                 yield name, timing, landing
 
 
@@ -104,8 +103,8 @@ def csv_row(outcome: Outcome) -> dict[str, object]:
     SI units; angles of scenarios in degrees, their columns begin with case_.
     """
     way, timing, planned, result = outcome
-    return {'way': way, 'law': WAYS[way].law, 'contacts': WAYS[way].contacts,
-            **timing._asdict(), 'landing': planned.name,
+    return {'way': way, 'contacts': WAYS[way].contacts, **timing._asdict(),
+            'landing': planned.name,
             **{f'case_{name}': value for name, value in asdict(planned.scenario).items()},
             'at_rest': int(result.at_rest), 'as_expected': int(outcome.as_expected),
             **asdict(result)}
@@ -149,20 +148,19 @@ def grid_table(outcomes: Sequence[Outcome]) -> str:
                 getattr(result, figure) for result in manifold)
             figures.append(f'**{text}**' if is_worse else text)
         settled = sum(not math.isnan(result.settled) for result in results)
-        rows.append([way.law, way.contacts,
-                     *((f'{timing.rate_hz:g}', f'{1e3 * timing.latency:g}') if way.law != MUJOCO
+        rows.append([way.contacts,
+                     *((f'{timing.rate_hz:g}', f'{1e3 * timing.latency:g}') if way.model
                        else ('–', '–')), f'{settled} of {len(results)}',
                      f'{sum(result.at_rest for result in results)} of {len(results)}',
                      f'{sum(outcome.as_expected for outcome in landed)} of {len(results)}'
                      if name in PATCHES else '–', *figures])
-    return output.markdown_table(['law', 'contacts', 'rate [Hz]', 'latency [ms]', 'settle',
-                                  'at rest', 'within limits', *SHOWN_WORST], rows, words=2)
+    return output.markdown_table(['contacts', 'rate [Hz]', 'latency [ms]', 'settle', 'at rest',
+                                  'within limits', *SHOWN_WORST], rows)
 
 
 def added_table(outcomes: Sequence[Outcome]) -> str:
     """Return a row per added landing: what was expected, and what each way did."""
-    ways = [name for name in WAYS if WAYS[name].added
-            and any(outcome.way == name for outcome in outcomes)]
+    ways = [name for name in WAYS if any(outcome.way == name for outcome in outcomes)]
     shown = {'corner_speed': 1e3, 'static_tilt': 180.0 / math.pi, 'depth': 100.0}
     added = {outcome.planned.name: outcome.planned for outcome in outcomes
              if not outcome.planned.of_grid}
@@ -193,8 +191,7 @@ def page(outcomes: Sequence[Outcome], command: str) -> str:
 
 # --- picture --------------------------------------------------------------------------------------
 
-SHOWN_WAYS = {'exact': 'patch', 'point': 'point law', 'mujoco-deepest': 'deepest point',
-              'manifold': "MuJoCo's manifold"}
+SHOWN_WAYS = {'exact': 'one patch', 'manifold': "MuJoCo's manifold"}
 SHOWN_TIMING = LoopTiming(200.0, 0.002)
 EXAGGERATION = 15.0  # of the tilt: a third of a degree would not be seen
 LATEST = 1.0  # so long are contacts shown [s]
@@ -202,8 +199,8 @@ COLOURS = {'load': '#9aa7b5', 'stack': '#d9dde2', 'contact': '#d1495b', 'speed':
 
 
 def draw(path: Path, scenario: CraneScenario) -> None:
-    """Draw one landing by four ways: the load from its end, and the speed of its fastest corner."""
-    figure, axes = output.subplots(2, len(SHOWN_WAYS), (8.0, 4.6), sharey='row')
+    """Draw one landing by two ways: the load from its end, and the speed of its fastest corner."""
+    figure, axes = output.subplots(2, len(SHOWN_WAYS), (6.4, 4.6), sharey='row')
     for (side, speed), (way, title) in zip(axes.T, SHOWN_WAYS.items()):
         record = WAYS[way].run(scenario, SHOWN_TIMING)
         result = record.judge()
@@ -239,8 +236,9 @@ def _draw_from_the_end(axis: Any, way: str, record: LandingRecord) -> None:
     for corners, colour in ((stack, 'stack'), (load, 'load')):
         axis.fill(*corners.T, facecolor=COLOURS[colour], edgecolor='black', linewidth=0.8)
     if way == 'manifold':
-        points = MujocoSource(scenario.size, scenario.stack_size, 'mean').manifold(
-            pose, scenario.stack_pose)[0]
+        mujoco = mujoco_engines.collision('', mujoco_engines.box_geoms, '')
+        ask = mujoco.boxes(np.array(scenario.size), np.array(scenario.stack_size))
+        points = mujoco.read(ask(*mujoco.at(pose, scenario.stack_pose))).points
     else:
         first = len(record.poses) - round(LATEST * record.rate_hz)
         points = np.array([point for tick, point in record.points.items() if tick >= first])

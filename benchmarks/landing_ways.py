@@ -3,18 +3,17 @@
 
 """Which landings are run, what is measured of each, and by which ways of contact and force.
 
-A `Way` is a law and what gives its contacts. Patches ask this package's models. Engines give a
-point, so theirs go to the point law, which knows the load's footprint. MuJoCo's own manifold is the
-reference to reach: forces of several points, implicit, within the simulator, at every physics step.
+This package's models give patches, whose forces are those of `PatchForces`. MuJoCo's own manifold
+is the reference to reach: forces of several points, implicit, within the simulator, at every
+physics step.
 
 `ADDED` are landings outside the grid, each with what it is expected to do.
 """
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from itertools import product
 from typing import Any, NamedTuple, Self
 
@@ -28,24 +27,15 @@ from box_contact_ros.demo.landing import (
     ClosedLoop,
     Landing,
     LandingRecord,
-    LoadForces,
-    MakeLaw,
 )
 from box_contact_ros.scene.laws import FRICTION
 from box_contact_ros.scene.scene_solver import CONTAINER
-from box_contact_ros.solver.contact import Contact
 from box_contact_ros.solver.contact_solver import ContactSolver
-
-from .point_law import PointLaw
 
 WATCHED, WINDOW = 15.0, 5.0
 """Time that is judged after the first touch, and its last part [s]: longer than in the demo."""
 
 # --- one landing ----------------------------------------------------------------------------------
-
-ContactSource = Callable[[np.ndarray, np.ndarray], Contact]
-"""From pose_a and pose_b (7,) to their contact."""
-
 
 def solvers(scenario: CraneScenario, model: str) -> list[ContactSolver]:
     """Return a solver of that model for each box of the stack."""
@@ -53,18 +43,17 @@ def solvers(scenario: CraneScenario, model: str) -> list[ContactSolver]:
             for _, size in scenario.stack_boxes.values()]
 
 
-def land(scenario: CraneScenario, sources: Sequence[ContactSource], *, rate_hz: float = 200.0,
-         latency: float = 0.0, law: MakeLaw = LoadForces) -> LandingRecord:
+def land(scenario: CraneScenario, solvers: Sequence[ContactSolver], *, rate_hz: float = 200.0,
+         latency: float = 0.0) -> LandingRecord:
     """Run one landing with contacts that act `latency` [s] after they were asked for.
 
-    sources: for each box of the stack, such as `solvers`. ValueError: a contact lacks what the law
-    needs.
+    solvers: for each box of the stack.
     """
-    loop = ClosedLoop(scenario, rate_hz, law=law, watched=WATCHED, window=WINDOW)
+    loop = ClosedLoop(scenario, rate_hz, watched=WATCHED, window=WINDOW)
     while not loop.record.ended:
         state = loop.ask()
-        loop.answer(state, {name: source(state.pose, pose) for (name, (pose, _)), source in zip(
-            scenario.stack_boxes.items(), sources)}, latency=latency)
+        loop.answer(state, {name: solver(state.pose, pose) for (name, (pose, _)), solver in zip(
+            scenario.stack_boxes.items(), solvers)}, latency=latency)
         loop.step()
     return loop.record
 
@@ -271,12 +260,6 @@ weight rests on a strip of three fifths. The other end is bare, so it cannot lie
 
 # --- ways -----------------------------------------------------------------------------------------
 
-PATCH, POINT, MUJOCO = 'patch', 'point', 'MuJoCo'
-SAMPLE = 5
-"""Ways that are not compared at length run one of so many landings. Prime to three: every third
-landing of the grid has the same overhang."""
-
-
 class LoopTiming(NamedTuple):
     """Ticks a second, and the time [s] from asking for contacts to their force."""
 
@@ -285,73 +268,23 @@ class LoopTiming(NamedTuple):
 
 
 class Way(NamedTuple):
-    """A law and what gives its contacts."""
+    """What gives the contacts."""
 
-    law: str
     contacts: str
-    sources: Callable[[CraneScenario], Sequence[ContactSource]] = lambda _: ()
-    """What gives the contacts, for each box of the stack; nothing for MuJoCo, in the simulator."""
-    every: int = SAMPLE  # one of so many landings of the grid is run
-
-    @property
-    def added(self) -> bool:
-        """Return whether the added landings are run too."""
-        return self.law != POINT
+    model: str | None  # None: MuJoCo, in the simulator
+    every: int = 1
+    """One of so many landings of the grid is run. Prime to three: every third landing has the same
+    overhang."""
 
     def timings(self, timings: Sequence[LoopTiming]) -> list[LoopTiming]:
-        """Return those at which it is run: all, the least latency of a baseline, one of MuJoCo."""
-        least = min(timing.latency for timing in timings)
-        return (list(timings[-1:]) if self.law == MUJOCO else
-                [timing for timing in timings if self.law == PATCH or timing.latency == least])
+        """Return those at which it is run: all of a model, one of MuJoCo."""
+        return list(timings if self.model else timings[-1:])
 
     def run(self, scenario: CraneScenario, timing: LoopTiming) -> LandingRecord:
         """Run one landing."""
-        if self.law == MUJOCO:
+        if self.model is None:
             return own_contact(scenario, timing.rate_hz)
-        law = (LoadForces if self.law == PATCH
-               else partial(PointLaw.at_rate, size=scenario.size))
-        return land(scenario, self.sources(scenario), law=law, **timing._asdict())
-
-
-class MujocoSource:
-    """One point of the contacts of two boxes that `mj_collision` finds."""
-
-    def __init__(self, size_a: Sequence[float], size_b: Sequence[float], choice: str) -> None:
-        """Make the two boxes; `choice` is the point: 'mean', or that of the 'deepest' contact."""
-        spec = mujoco.MjSpec()
-        for size in (size_a, size_b):
-            body = spec.worldbody.add_body()
-            body.add_freejoint()
-            body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=np.array(size) / 2.0)
-        self._model = spec.compile()
-        self._data, self._choice = mujoco.MjData(self._model), choice
-
-    def __call__(self, pose_a: np.ndarray, pose_b: np.ndarray) -> Contact:
-        """Return the contact, without a patch; its depth is the deepest one's."""
-        points, normals, depths = self.manifold(pose_a, pose_b)
-        nothing = np.full((3, 3), math.nan)
-        if not len(points):
-            return Contact(False, math.nan, nothing[0], nothing[0], 0.0, nothing)
-        deepest = int(np.argmax(depths))
-        point = points.mean(axis=0) if self._choice == 'mean' else points[deepest]
-        return Contact(True, -float(depths[deepest]), normals[deepest], point, math.nan, nothing)
-
-    def manifold(self, pose_a: np.ndarray, pose_b: np.ndarray,
-                 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return points (n, 3), normals (n, 3) from A to B and depths (n,) of all contacts."""
-        # MuJoCo's quaternions are w x y z.
-        self._data.qpos = np.array([pose_a, pose_b])[:, [0, 1, 2, 6, 3, 4, 5]].ravel()
-        mujoco.mj_kinematics(self._model, self._data)
-        mujoco.mj_collision(self._model, self._data)
-        contacts = self._data.contact
-        # A frame's first row is the normal, from the geom of lower number to the other.
-        return np.array(contacts.pos), np.array(contacts.frame)[:, :3], -np.array(contacts.dist)
-
-
-def mujoco_sources(scenario: CraneScenario, choice: str) -> list[MujocoSource]:
-    """Return what makes one point of MuJoCo's contacts, for each box of the stack."""
-    return [MujocoSource(scenario.size, size, choice)
-            for _, size in scenario.stack_boxes.values()]
+        return land(scenario, solvers(scenario, self.model), **timing._asdict())
 
 
 def own_contact(scenario: CraneScenario, rate_hz: float) -> LandingRecord:
@@ -383,18 +316,6 @@ def own_force(crane: Crane) -> np.ndarray:
     return total
 
 
-def _of_model(model: str) -> Callable[[CraneScenario], Sequence[ContactSource]]:
-    return partial(solvers, model=model)
-
-
-WAYS = {
-    'exact': Way(PATCH, 'exact', _of_model('exact'), every=1),
-    'mlp': Way(PATCH, 'mlp', _of_model('mlp')),
-    'manifold': Way(MUJOCO, 'its manifold, in the simulator', every=1),
-    'point': Way(POINT, 'exact', _of_model('exact')),
-    'mujoco-mean': Way(POINT, 'MuJoCo, mean point', partial(mujoco_sources, choice='mean')),
-    'mujoco-deepest': Way(POINT, 'MuJoCo, deepest point',
-                          partial(mujoco_sources, choice='deepest')),
-    'soup': Way(POINT, 'soup-8', _of_model('soup-8'), every=13),
-}
+WAYS = {'exact': Way('exact', 'exact'), 'mlp': Way('mlp', 'mlp', every=5),
+        'manifold': Way("MuJoCo's manifold, in the simulator", None)}
 """By name: the ways that the table has."""

@@ -13,7 +13,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 pytest.importorskip('mujoco')
@@ -26,13 +25,11 @@ from benchmarks.landing_ways import (
     HeldLimits,
     Landed,
     LoopTiming,
-    MujocoSource,
     PlannedLanding,
     aimed,
     grid,
 )
 from box_contact_ros.demo.crane import CraneScenario
-from box_contact_ros.solver.contact_solver import ContactSolver
 
 RESTS = Landed(settled=1.0, corner_speed=1e-4, rope_tension=0.0, force_worst=1e-9,
                static_tilt=1e-4, depth=1e-3, gap=0.0)
@@ -84,31 +81,6 @@ def test_other_loads_and_stacks_do_what_is_expected(planned):
     assert outcome.as_expected, f'\n{outcome.result}'
 
 
-@pytest.mark.parametrize('rate_hz', [200.0, 1000.0])
-def test_the_deepest_point_does_not_land(rate_hz):
-    """The deepest contact of MuJoCo jumps between corners, metres a tick, and the load rattles."""
-    planned = landing.aim(grid()[HANGING_OVER])
-    result = landing.run('mujoco-deepest', LoopTiming(rate_hz, 0.0), planned).result
-    assert math.isnan(result.settled) and not result.limits['force'][0]
-    assert result.corner_speed > 0.04 and result.point_step > 5.0
-
-
-def test_one_point_of_mujocos_contacts():
-    """A container on its like, 5 mm deep: mean and deepest point lie on the faces' patch."""
-    size = (12.192, 2.438, 2.591)
-    below = np.array([0.0, 0, 0, 0, 0, 0, 1])
-    above = np.array([0.3, 0.1, size[2] - 0.005, 0, 0, 0, 1])
-    exact = ContactSolver(size, size, model='exact')(above, below)
-    mean = MujocoSource(size, size, 'mean')(above, below)
-    assert mean.point == pytest.approx(exact.point, abs=1e-6)
-    assert mean.separation == pytest.approx(exact.separation)
-    for choice in ('mean', 'deepest'):
-        source = MujocoSource(size, size, choice)
-        assert source(above, below).normal == pytest.approx([0, 0, -1])
-        assert math.isnan(source(above, below).volume)
-        assert not source(above + [0, 0, 1, 0, 0, 0, 0], below).colliding
-
-
 def test_mujocos_own_contact_carries_the_load():
     """The force is the weight, upward, and the load lies flat."""
     scenario = aimed(WELL_AIMED.scenario, WELL_AIMED.overhang)
@@ -126,13 +98,13 @@ def test_a_run_writes_table_and_rows(tmp_path, monkeypatch, capsys):
     assert landing.main(['--quick', '--ways', 'exact', 'manifold', '--out', str(tmp_path)]) == 0
     page = (tmp_path / 'landing.md').read_text()
     assert '**2 of 2** landings by patches' in page
-    assert '| patch | exact | 200 | 2 | 1 of 1 | 1 of 1 | 1 of 1 |' in page
+    assert '| exact | 200 | 2 | 1 of 1 | 1 of 1 | 1 of 1 |' in page
     with (tmp_path / 'landing.csv').open() as file:
         rows = list(csv.DictReader(file))
     assert [(row['way'], row['as_expected']) for row in rows] == [
         ('exact', '1'), ('exact', '1'), ('manifold', '1'), ('manifold', '1')]
     assert (tmp_path / 'landing.png').stat().st_size > 10_000
-    assert '| patch | exact | 200 | 2 | 1 of 1 | 1 of 1 |' in capsys.readouterr().out
+    assert '| exact | 200 | 2 | 1 of 1 | 1 of 1 |' in capsys.readouterr().out
 
 
 def test_held_patches_have_limits_of_their_own():
@@ -148,7 +120,7 @@ def test_held_patches_have_limits_of_their_own():
                     still, **{'static_tilt': math.radians(0.003), field: factor * limit})
                 for way, planned, expected in (('exact', of_grid, met), ('mlp', of_grid, met),
                                                ('exact', added, result.at_rest),
-                                               ('point', of_grid, result.at_rest)):
+                                               ('manifold', of_grid, result.at_rest)):
                     outcome = landing.Outcome(way, timing, planned, result)
                     assert outcome.as_expected is expected
 
@@ -160,21 +132,20 @@ def test_figures_worse_than_the_manifolds_are_bold():
     ours = dataclasses.replace(manifold, corner_speed=5e-5, static_tilt=2e-4)
     table = landing.grid_table([
         landing.Outcome(way, timing, planned, result)
-        for way, result in (('exact', ours), ('manifold', manifold), ('point', Landed()))])
+        for way, result in (('exact', ours), ('manifold', manifold), ('mlp', Landed()))])
     assert table.splitlines()[2:] == [
-        '| patch | exact | 200 | 2 | 1 of 1 | 1 of 1 | 0 of 1 | 1 | 0.05 | 1e-06 | 1e-09 | '
+        '| exact | 200 | 2 | 1 of 1 | 1 of 1 | 0 of 1 | 1 | 0.05 | 1e-06 | 1e-09 | '
         '**0.011** | 0.1 | 1 | – |',
-        '| MuJoCo | its manifold, in the simulator | – | – | 1 of 1 | 1 of 1 | – | 1 | 0.1 | 1e-06 '
-        '| 1e-09 | 0.0057 | 0.1 | 1 | – |',
-        '| point | exact | 200 | 2 | 0 of 1 | 0 of 1 | – | never | – | – | – | – | – | – | – |']
+        "| MuJoCo's manifold, in the simulator | – | – | 1 of 1 | 1 of 1 | – | 1 | 0.1 | "
+        '1e-06 | 1e-09 | 0.0057 | 0.1 | 1 | – |',
+        '| mlp | 200 | 2 | 0 of 1 | 0 of 1 | 0 of 1 | never | – | – | – | – | – | – | – |']
 
 
 def test_each_way_has_its_timings():
-    """All of them, one for MuJoCo within the simulator, and the least latency for baselines."""
+    """All of them, and one for MuJoCo within the simulator."""
     timings = [LoopTiming(rate, latency) for rate in (50.0, 200.0) for latency in (0.002, 0.005)]
     assert WAYS['exact'].timings(timings) == timings
     assert WAYS['manifold'].timings(timings) == timings[-1:]
-    assert WAYS['soup'].timings(timings) == timings[::2]
 
 
 @pytest.mark.parametrize(('way', 'status'), [('exact', 1), ('mlp', 0)])
