@@ -14,7 +14,7 @@ from ..errors import degrees_between, distances
 from ..pose_sets import CUBE, Pairs
 from . import dataset
 from .dataset import Placements
-from .models import EXPERTS, committee, continuous, weights_path
+from .models import EXPERTS, committee, weights_path
 
 COUNT = 20_000  # placements of each kind
 SEED = 37  # other placements than any training's
@@ -25,7 +25,7 @@ def placements(step: int) -> dict[str, Placements]:
     """Return placements by kind of contact, new ones for every network."""
     rng = np.random.default_rng(SEED)
     kinds = zip(EXPERTS, (*dataset.GENERATORS, dataset.face_face_candidates))
-    return {kind: dataset.touching(rng, COUNT // step, CUBE, candidates)
+    return {kind: dataset.touching(rng, COUNT // step, candidates)
             for kind, candidates in kinds}
 
 
@@ -43,8 +43,7 @@ def section(step: int) -> str:
     """Return the section: errors by model and kind, and how often the classifier is wrong."""
     kinds = placements(step)
     rows = []
-    for model in (ours('paper'), *(ours(one, name=one.name)
-                                   for one in (committee(), continuous()))):
+    for model in (ours('paper'), ours(committee(), name='paper-committee')):
         row: list[object] = [f'`{model.name}`']
         for some in kinds.values():
             point, normal = errors(model, some)

@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The data of the paper's section 3: pairs of boxes that just touch, and where they do.
+"""The data of the paper's section 3: pairs of cubes that just touch, and where they do.
 
 1. Placements. The first box stays at the origin. Its trihedron is its faces +x, +y, +z. The second
    box's trihedron is its faces −x, −y, −z, with the corner (−, −, −) and 7 vertices. Roll, pitch
@@ -17,17 +17,14 @@
 2. Patterns. Inputs are the second box's offset t [m], and its roll, pitch and yaw [rad], in the
    first box's frame: R = Rz(yaw) Ry(pitch) Rx(roll). Outputs are azimuth and elevation [rad] of the
    impact point's direction from the first box's centre, then of the normal.
-   - `paper`: folded into the network's domain, or left as drawn. The fold is
-     `features.to_octant`: t ≥ 0, angles in [−π/2, π/2].
-   - `committee`: for cubes, folded like `paper`. Each expert has placements of one kind. The third
-     kind is face-face: see `face_face_candidates`. The classifier has all three kinds, and an
-     output for each: 1 for the kind of the placement, 0 for the others.
-   - `by_subset`: for cubes. Either the features that meet, by SAT, choose the subset, and the fold
-     `features.to_features` brings them to the reference features. Or the signs of the three angles
-     choose it, and patterns are left as drawn.
+   - `paper`: folded into the network's domain, or left as drawn. The fold is `models.to_octant`:
+     t ≥ 0, angles in [−π/2, π/2].
+   - `by_signs`: left as drawn. The signs of the three angles choose the subset.
+   - `committee`: folded like `paper`. Each expert has placements of one kind. The third kind is
+     face-face: see `face_face_candidates`. The classifier has all three kinds, and an output for
+     each: 1 for the kind of the placement, 0 for the others.
 
-Everything is drawn from one seed, every set from a stream of its own. So any set can be made
-without the others.
+Everything is drawn from one seed, every set from a stream of its own.
 """
 from __future__ import annotations
 
@@ -41,27 +38,22 @@ import numpy as np
 
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.paper import TouchingPairs, euler_angles
+from box_contact_ros.solver.paper import euler_angles
 from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 
 from ..pose_sets import CUBE, turns
-from .features import to_features, to_octant
-from .models import EXPERTS, SUBSETS
+from .models import EXPERTS, to_octant
 
 SETS = ('training', 'cross-validation', 'external')
 PAPER_COUNTS = (8000, 5000, 75000)  # patterns per set, with discontinuities
 CONTINUOUS_COUNTS = (10000, 6000, 50000)  # patterns per set and subset, without discontinuities
-SIGNS = {''.join(signs): number for number, signs in enumerate(product('+-', repeat=3))}
-"""Subsets by the signs of roll, pitch and yaw, with their numbers."""
 Kept = float | Sequence[float]  # share of placements as written, of all sets or of each
-NO_FOLD, OCTANT, FEATURES = 'as drawn', 'to the octant', 'to reference features'
-"""Ways into a network's domain."""
 
 INPUTS = ('t_x', 't_y', 't_z', 'roll', 'pitch', 'yaw')
 OUTPUTS = ('point azimuth', 'point elevation', 'normal azimuth', 'normal elevation')
 
 INTERPENETRATION = 1e-12
-"""Depth, as a fraction of the largest extent, from which on boxes interpenetrate. Rounding gives a
+"""Depth, as a fraction of the edge, from which on cubes interpenetrate. Rounding gives a
 placement made to touch a depth of some 1e-16. Of the random placements that overlap, one in 1e11
 would be let through."""
 
@@ -76,13 +68,13 @@ AXES_IN_TURN = 0.5 * np.array([[0.0, 0, 0, 2], [1, 1, 1, 1], [-1, -1, -1, 1]])
 PRESSED = 1e-3  # depth [m] at which the middle of two faces' overlap is measured
 
 CHUNK = 1 << 15  # candidates drawn at a time
+_THIRDS = np.full(3, 1.0 / 3.0)
 
 
 @dataclass(frozen=True)
 class Placements:
-    """n pairs of boxes of the same size that just touch, in the first box's frame."""
+    """n pairs of cubes of edge 2 that just touch, in the first one's frame."""
 
-    size: tuple[float, float, float]  # full extents of either box [m]
     inputs: np.ndarray  # (n, 6) of the second box: t [m]; roll, pitch, yaw [rad]
     point: np.ndarray  # (n, 3) impact point [m]
     normal: np.ndarray  # (n, 3) unit normal, out of the first box
@@ -101,7 +93,7 @@ class Placements:
         return len(self.inputs)
 
     def __getitem__(self, rows: np.ndarray | slice) -> Placements:
-        return Placements(self.size, self.inputs[rows], self.point[rows], self.normal[rows])
+        return Placements(self.inputs[rows], self.point[rows], self.normal[rows])
 
 
 @dataclass(frozen=True)
@@ -117,8 +109,8 @@ class Patterns:
 
 
 def _joined(parts: Sequence[Placements]) -> Placements:
-    return Placements(parts[0].size, *(np.concatenate([getattr(part, name) for part in parts])
-                                       for name in ('inputs', 'point', 'normal')))
+    return Placements(*(np.concatenate([getattr(part, name) for part in parts])
+                        for name in ('inputs', 'point', 'normal')))
 
 
 def quaternion_from_euler(angles: np.ndarray) -> np.ndarray:
@@ -138,35 +130,31 @@ def _angles(rng: np.random.Generator, count: int) -> np.ndarray:
     return rng.uniform(-0.5 * np.pi, 0.5 * np.pi, (count, 3))
 
 
-def vertex_face_candidates(rng: np.random.Generator, count: int, half: np.ndarray) -> Placements:
+def vertex_face_candidates(rng: np.random.Generator, count: int) -> Placements:
     """Put a vertex of the second trihedron on a random point of the first; most interpenetrate."""
-    area = np.prod(half) / half
-    face = rng.choice(3, count, p=area / area.sum())
-    point = rng.uniform(-half, half, (count, 3))
-    rows = np.arange(count)
-    point[rows, face] = half[face]
+    face = rng.choice(3, count, p=_THIRDS)
+    point = rng.uniform(-1.0, 1.0, (count, 3))
+    point[np.arange(count), face] = 1.0
     # The bits of 0 … 6 are the seven vertices; 7 would be (+, +, +), which is on none of its faces.
     bits = rng.integers(0, 7, count)[:, None] >> np.arange(3) & 1
-    vertex = np.where(bits == 1, half, -half)
-    inputs, _ = _placed(point, vertex, _angles(rng, count))
-    return Placements(tuple((2.0 * half).tolist()), inputs, point, np.eye(3)[face])
+    inputs, _ = _placed(point, 2.0 * bits - 1.0, _angles(rng, count))
+    return Placements(inputs, point, np.eye(3)[face])
 
 
-def edge_edge_candidates(rng: np.random.Generator, count: int, half: np.ndarray) -> Placements:
+def edge_edge_candidates(rng: np.random.Generator, count: int) -> Placements:
     """Put a random point of the second trihedron's edges on one of the first's."""
-    point, along_a = _edge_points(rng, count, half)
-    on_b, along_b = _edge_points(rng, count, half)
+    point, along_a = _edge_points(rng, count)
+    on_b, along_b = _edge_points(rng, count)
     inputs, rotation = _placed(point, -on_b, _angles(rng, count))
     normal = np.cross(np.eye(3)[along_a], rotation[np.arange(count), :, along_b])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     normal *= np.where(np.sum(normal * inputs[:, :3], axis=1) < 0.0, -1.0, 1.0)[:, None]
-    return Placements(tuple((2.0 * half).tolist()), inputs, point, normal)
+    return Placements(inputs, point, normal)
 
 
-def _edge_points(rng: np.random.Generator, count: int, half: np.ndarray,
-                 ) -> tuple[np.ndarray, np.ndarray]:
+def _edge_points(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Points (count, 3) on the 9 edges of the faces +x, +y, +z, and their edges' axes (count,)."""
-    axis = rng.choice(3, count, p=half / half.sum())
+    axis = rng.choice(3, count, p=_THIRDS)
     # Three of the four edges along an axis belong to the trihedron: not the one at (−, −).
     at = rng.integers(1, 4, count)
     rows = np.arange(count)
@@ -174,7 +162,7 @@ def _edge_points(rng: np.random.Generator, count: int, half: np.ndarray,
     point[rows, axis] = rng.uniform(-1.0, 1.0, count)
     point[rows, (axis + 1) % 3] = np.where(at & 1, 1.0, -1.0)
     point[rows, (axis + 2) % 3] = np.where(at & 2, 1.0, -1.0)
-    return point * half, axis
+    return point, axis
 
 
 def _placed(point: np.ndarray, on_b: np.ndarray, angles: np.ndarray,
@@ -185,8 +173,8 @@ def _placed(point: np.ndarray, on_b: np.ndarray, angles: np.ndarray,
     return np.concatenate([offset, angles], axis=1), rotation
 
 
-def face_face_candidates(rng: np.random.Generator, count: int, half: np.ndarray) -> Placements:
-    """Lay a face of the second trihedron on one of the first's, tilted by up to TILT; for cubes.
+def face_face_candidates(rng: np.random.Generator, count: int) -> Placements:
+    """Lay a face of the second trihedron on one of the first's, tilted by up to TILT.
 
     Spin and place are uniform, of faces that overlap. The impact point is the middle of the faces'
     overlap without the tilt. Where they do not meet, the normal is NaN.
@@ -196,45 +184,42 @@ def face_face_candidates(rng: np.random.Generator, count: int, half: np.ndarray)
     flat = quaternion_multiply(turns(normal, rng.uniform(-np.pi, np.pi, count)),
                                AXES_IN_TURN[rng.integers(0, 3, count)])
     # B's axis that lies along A's is any: its face −j on A's face +i.
-    offset = half * rng.uniform(-2.5, 2.5, (count, 3))
-    offset[rows, axis] = 2.0 * half[axis] - PRESSED
-    size = tuple((2.0 * half).tolist())
-    met = ContactSolver(size, size, model='exact').batch(
+    offset = rng.uniform(-2.5, 2.5, (count, 3))
+    offset[rows, axis] = 2.0 - PRESSED
+    met = ContactSolver(CUBE, CUBE, model='exact').batch(
         np.tile([0.0, 0, 0, 0, 0, 0, 1], (count, 1)), np.concatenate([offset, flat], axis=1))
-    point = np.where(normal == 1.0, half, met.point)
+    point = np.where(normal == 1.0, 1.0, met.point)
     across = np.cross(normal, rng.normal(size=(count, 3)))
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     tilted = quaternion_multiply(turns(across, rng.uniform(-TILT, TILT, count)), flat)
     inputs = np.concatenate([offset, euler_angles(rotation_matrix(tilted))], axis=1)
-    found = query(Placements(size, inputs, point, normal))
+    found = query(Placements(inputs, point, normal))
     inputs[:, :3] -= found.separation[:, None] * found.normal
     # Adjacent faces do not meet, nor those that the tilt has parted or made an edge meet.
-    after = query(Placements(size, inputs, point, normal))
-    meet = (met.colliding & (after.separation <= INTERPENETRATION * max(size))
+    after = query(Placements(inputs, point, normal))
+    meet = (met.colliding & (after.separation <= INTERPENETRATION * CUBE[0])
             & (np.sum(after.normal * normal, axis=1) > math.cos(2.0 * TILT)))
-    return Placements(size, inputs, point, np.where(meet[:, None], normal, np.nan))
+    return Placements(inputs, point, np.where(meet[:, None], normal, np.nan))
 
 
 GENERATORS = (vertex_face_candidates, edge_edge_candidates)
 
 
-def touching(rng: np.random.Generator, count: int, size: Sequence[float],
-             candidates: Callable[[np.random.Generator, int, np.ndarray], Placements],
-             *, as_written: bool = False) -> Placements:
+def touching(rng: np.random.Generator, count: int,
+             candidates: Callable[[np.random.Generator, int], Placements], *,
+             as_written: bool = False) -> Placements:
     """Return `count` placements of a kind; `as_written`: also those that interpenetrate."""
-    half = 0.5 * np.asarray(size, dtype=np.float64)
     found: list[Placements] = []
     while sum(map(len, found)) < count:
-        drawn = candidates(rng, CHUNK, half)
+        drawn = candidates(rng, CHUNK)
         wanted = np.isfinite(drawn.normal).all(axis=1)
         if not as_written:
-            wanted &= query(drawn).separation >= -INTERPENETRATION * max(size)
+            wanted &= query(drawn).separation >= -INTERPENETRATION * CUBE[0]
         found.append(drawn[wanted])
     return _joined(found)[:count]
 
 
-def mixed(rng: np.random.Generator, count: int, size: Sequence[float], kept: float = 0.0,
-          ) -> Placements:
+def mixed(rng: np.random.Generator, count: int, kept: float = 0.0) -> Placements:
     """Return `count` placements in random order, half of them of each kind.
 
     kept: share that is placed as written. In the rest, boxes that interpenetrate are dropped.
@@ -243,50 +228,28 @@ def mixed(rng: np.random.Generator, count: int, size: Sequence[float], kept: flo
     parts = []
     for wanted, candidates in zip((count - edges, edges), GENERATORS):
         written = round(kept * wanted)
-        parts += [touching(rng, some, size, candidates, as_written=as_written) for some, as_written
+        parts += [touching(rng, some, candidates, as_written=as_written) for some, as_written
                   in ((written, True), (wanted - written, False)) if some]
     return _joined(parts)[rng.permutation(count)]
 
 
 def query(placements: Placements) -> Contacts:
     """Return the contacts of every placement, with a normal of those apart too."""
-    solver = ContactSolver(placements.size, placements.size, margin=math.inf)
+    solver = ContactSolver(CUBE, CUBE, margin=math.inf)
     return solver.batch(*as_poses(placements.inputs), patch=False)
 
 
-@dataclass(frozen=True)
-class Folded:
-    """n placements in a network's domain."""
-
-    inputs: np.ndarray  # (n, 6) t [m]; roll, pitch, yaw [rad]
-    point: np.ndarray  # (n, 3) impact point [m]
-    normal: np.ndarray  # (n, 3)
-    subset: np.ndarray
-    """(n,) number of `SUBSETS` after FEATURES, of `SIGNS` after NO_FOLD, else −1."""
-
-    def patterns(self, rows: np.ndarray | slice = slice(None)) -> Patterns:
-        """Return the inputs and outputs of some rows."""
-        return Patterns(self.inputs[rows], np.concatenate(
-            [spherical(self.point[rows]), spherical(self.normal[rows])], axis=1))
+def as_drawn(placements: Placements) -> Patterns:
+    """Return placements as patterns."""
+    return Patterns(placements.inputs, np.concatenate(
+        [spherical(placements.point), spherical(placements.normal)], axis=1))
 
 
-def fold(placements: Placements, how: str) -> Folded:
-    """Bring placements into a network's domain by NO_FOLD, OCTANT or FEATURES."""
-    subset = np.full(len(placements), -1)
-    if how == NO_FOLD:  # inputs are as drawn, zeros keep the signs that tell azimuths ±π apart
-        subset = (placements.inputs[:, 3:] < 0.0) @ (4, 2, 1)
-        return Folded(placements.inputs, placements.point, placements.normal, subset)
-    offset, rotation = placements.inputs[:, :3], placements.rotation
-    if how == OCTANT:
-        folds = to_octant(offset, rotation)
-    elif len(set(placements.size)) == 1:
-        sat = query(placements)
-        folds, subset = to_features(TouchingPairs(
-            np.zeros(len(placements), bool), sat.axis, sat.normal, offset, rotation))
-    else:
-        raise ValueError(f'features are folded for cubes, not for {placements.size}')
-    return Folded(folds.inputs, folds.folded(placements.point), folds.folded(placements.normal),
-                  subset)
+def folded(placements: Placements) -> Patterns:
+    """Return placements, folded to the octant, as patterns."""
+    folds = to_octant(placements.inputs[:, :3], placements.rotation)
+    return as_drawn(Placements(folds.inputs, folds.folded(placements.point),
+                               folds.folded(placements.normal)))
 
 
 def spherical(direction: np.ndarray) -> np.ndarray:
@@ -300,82 +263,75 @@ def spherical(direction: np.ndarray) -> np.ndarray:
     return np.column_stack([np.where(pole, 0.0, np.arctan2(y, x)), np.arctan2(z, across)])
 
 
-def _streams(seed: int, counts: Sequence[int], sets: Sequence[str], kept: Kept = 0.0,
+def _streams(seed: int, counts: Sequence[int], kept: Kept = 0.0,
              ) -> Iterator[tuple[str, int, float, np.random.Generator]]:
-    """Yield name, number of patterns, share kept and random stream of the sets asked for."""
+    """Yield name, number of patterns, share kept and random stream of the sets."""
     shares = np.broadcast_to(kept, len(SETS)).tolist()
     for number, name in enumerate(SETS):
-        if name in sets:
-            yield name, counts[number], shares[number], np.random.default_rng([seed, number])
+        yield name, counts[number], shares[number], np.random.default_rng([seed, number])
 
 
-def paper(seed: int, *, size: Sequence[float] = CUBE, counts: Sequence[int] = PAPER_COUNTS,
-          folded_in: bool = True, sets: Sequence[str] = SETS, kept: Kept = 0.0,
-          ) -> dict[str, Patterns]:
-    """Return the sets with discontinuities, for two boxes of full extents `size` [m].
+def paper(seed: int, *, counts: Sequence[int] = PAPER_COUNTS, folded_in: bool = True,
+          kept: Kept = 0.0) -> dict[str, Patterns]:
+    """Return the sets with discontinuities.
 
     `folded_in`: in the domain of `to_octant`, as at inference; otherwise as drawn.
     """
-    how = OCTANT if folded_in else NO_FOLD
-    return {name: fold(mixed(rng, count, size, share), how).patterns()
-            for name, count, share, rng in _streams(seed, counts, sets, kept)}
+    patterns = folded if folded_in else as_drawn
+    return {name: patterns(mixed(rng, count, share))
+            for name, count, share, rng in _streams(seed, counts, kept)}
 
 
-def by_subset(seed: int, how: str, *, counts: Sequence[int] = CONTINUOUS_COUNTS,
-              sets: Sequence[str] = SETS, kept: Kept = 0.0) -> dict[str, dict[str, Patterns]]:
-    """Return the sets of each subset of two cubes of edge 2.
+def by_signs(seed: int, *, counts: Sequence[int] = CONTINUOUS_COUNTS, kept: Kept = 0.0,
+             ) -> dict[str, dict[str, Patterns]]:
+    """Return the sets of each subset by the signs of roll, pitch and yaw, such as '++-'.
 
-    how: FEATURES, by the features that meet; NO_FOLD, by the signs of the angles, which are the
-    paper's example of a discontinuity.
+    A change of such a sign is the paper's example of a discontinuity.
     """
-    subsets = SUBSETS if how == FEATURES else SIGNS
+    subsets = list(map(''.join, product('+-', repeat=3)))
     result: dict[str, dict[str, Patterns]] = {subset: {} for subset in subsets}
-    for name, count, share, rng in _streams(seed, counts, sets, kept):
-        found: dict[str, list[Patterns]] = {subset: [] for subset in subsets}
-        # A placement's subset is known after it is drawn. Placements are drawn until the smallest
-        # subset is full; the larger ones are cut to the same number.
+    for name, count, share, rng in _streams(seed, counts, kept):
+        found: dict[str, list[Placements]] = {subset: [] for subset in subsets}
+        # Placements are drawn until the smallest subset is full; the larger ones are cut.
         while min(sum(map(len, parts)) for parts in found.values()) < count:
-            some = fold(mixed(rng, len(subsets) * count, CUBE, share), how)
-            for subset, number in subsets.items():
-                found[subset].append(some.patterns(some.subset == number))
+            some = mixed(rng, len(subsets) * count, share)
+            signs = (some.inputs[:, 3:] < 0.0) @ (4, 2, 1)
+            for number, subset in enumerate(subsets):
+                found[subset].append(some[signs == number])
         for subset, parts in found.items():
-            result[subset][name] = Patterns(np.concatenate([p.inputs for p in parts])[:count],
-                                            np.concatenate([p.outputs for p in parts])[:count])
+            result[subset][name] = as_drawn(_joined(parts)[:count])
     return result
 
 
 def committee(seed: int, *, counts: Sequence[int] = CONTINUOUS_COUNTS,
-              sets: Sequence[str] = SETS) -> dict[str, dict[str, Patterns]]:
-    """Return the sets of the classifier and of each expert, for two cubes of edge 2.
+              ) -> dict[str, dict[str, Patterns]]:
+    """Return the sets of the classifier and of each expert.
 
     The classifier's patterns are a third of each kind, and none of an expert's.
     """
     kinds = dict(zip(EXPERTS, (*GENERATORS, face_face_candidates)))
     result: dict[str, dict[str, Patterns]] = {'classifier': {}, **{kind: {} for kind in kinds}}
-    for name, count, _, rng in _streams(seed, counts, sets):
+    for name, count, _, rng in _streams(seed, counts):
         share, inputs = -(-count // len(kinds)), []
         for kind, candidates in kinds.items():
-            some = fold(touching(rng, count + share, CUBE, candidates), OCTANT)
-            result[kind][name] = some.patterns(slice(count))
-            inputs.append(some.inputs[count:])
+            some = touching(rng, count + share, candidates)
+            result[kind][name] = folded(some[:count])
+            inputs.append(folded(some[count:]).inputs)
         order = rng.permutation(len(kinds) * share)[:count]
         result['classifier'][name] = Patterns(
             np.concatenate(inputs)[order], np.repeat(np.eye(len(kinds)), share, axis=0)[order])
     return result
 
 
-def of_card(card: Mapping[str, Any], sets: Sequence[str] = SETS,
-            ) -> dict[str, dict[str, Patterns]]:
+def of_card(card: Mapping[str, Any]) -> dict[str, dict[str, Patterns]]:
     """Return the sets a model card speaks of, made again: per network, per set."""
     data = card['data']
     counts = [data['counts'][name] for name in SETS]
     kept = data.get('kept', 0.0)
     if card['model'] == 'paper-committee':
-        return committee(card['seed'], counts=counts, sets=sets)
+        return committee(card['seed'], counts=counts)
     if card['model'] == 'paper-continuous':
-        how = FEATURES if data['folded_in'] else NO_FOLD
-        return by_subset(card['seed'], how, counts=counts, sets=sets, kept=kept)
+        return by_signs(card['seed'], counts=counts, kept=kept)
     seeds = {f'seed_{seed}': seed for seed in data.get('seeds', ())} or {'contact': card['seed']}
-    return {network: paper(seed, size=card['sizes'][0], counts=counts, sets=sets,
-                           folded_in=data['folded_in'], kept=kept)
+    return {network: paper(seed, counts=counts, folded_in=data['folded_in'], kept=kept)
             for network, seed in seeds.items()}

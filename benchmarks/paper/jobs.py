@@ -47,7 +47,6 @@ class PaperJob:
 
     name: str  # of the file, without its ending
     model: str  # the model that it serves
-    size: tuple[float, float, float]  # full extents [m] of either box
     settings: PaperSettings
     recipe: str = _FOLDED  # the data in words, for the model card
     counts: tuple[int, int, int] = dataset.PAPER_COUNTS
@@ -69,25 +68,19 @@ class PaperJob:
 _JUMPS = PaperSettings((6, 20, 18, 4), networks=96, epochs=300, rate=0.05, initial=0.7)
 _EXPERTS = replace(_JUMPS, networks=24)
 _TABLE_1 = replace(_JUMPS, networks=16, wrap=False)  # of each seed, or subset
-_SMOOTH = PaperSettings((6, 20, 17, 4), networks=24, epochs=1000, rate=0.2)
 
 JOBS = {
-    'paper': PaperJob('paper', 'paper', CUBE, _JUMPS),
-    'paper-continuous': PaperJob(
-        'paper-continuous', 'paper-continuous', CUBE, _SMOOTH,
-        _DRAWN + 'Split by the winning axis of SAT (a face of the first box: vertex_face; an edge '
-        'pair: edge_edge), which is also what the features are folded by (cube symmetries).',
-        dataset.CONTINUOUS_COUNTS),
-    'paper-committee': PaperJob('paper-committee', 'paper-committee', CUBE, _EXPERTS, _COMMITTEE,
+    'paper': PaperJob('paper', 'paper', _JUMPS),
+    'paper-committee': PaperJob('paper-committee', 'paper-committee', _EXPERTS, _COMMITTEE,
                                 dataset.CONTINUOUS_COUNTS),
     **{job.name: job for job in (
-        PaperJob('table-1-as-written', 'paper', CUBE, _TABLE_1, _AS_WRITTEN, folded_in=False,
+        PaperJob('table-1-as-written', 'paper', _TABLE_1, _AS_WRITTEN, folded_in=False,
                  kept=1.0, seeds=SEEDS),
-        PaperJob('table-1-mixture', 'paper', CUBE, _TABLE_1, _MIXTURE, folded_in=False,
+        PaperJob('table-1-mixture', 'paper', _TABLE_1, _MIXTURE, folded_in=False,
                  kept=MIXTURE, seeds=SEEDS),
-        PaperJob('table-1-dropped', 'paper', CUBE, replace(_TABLE_1, wrap=True),
+        PaperJob('table-1-dropped', 'paper', replace(_TABLE_1, wrap=True),
                  _DRAWN + 'Patterns as drawn.', folded_in=False, seeds=SEEDS),
-        PaperJob('table-2-by-signs', 'paper-continuous', CUBE,
+        PaperJob('table-2-by-signs', 'paper-continuous',
                  replace(_TABLE_1, widths=(6, 20, 17, 4), batch=200, rate=0.1),
                  _MIXTURE + 'Split by the signs of roll, pitch and yaw.',
                  dataset.CONTINUOUS_COUNTS, folded_in=False, kept=MIXTURE))},
@@ -98,7 +91,7 @@ def train_paper(job: PaperJob, *, seed: int, commit: str, folder: Path) -> dict[
     """Make the data, train, write the weights file; return its model card."""
     card: dict[str, Any] = {
         'name': job.name, 'model': job.model, 'architecture': {},
-        'sizes': [list(job.size), list(job.size)],
+        'sizes': [list(CUBE), list(CUBE)],
         'data': {'recipe': job.recipe, 'counts': dict(zip(dataset.SETS, job.counts)),
                  'folded_in': job.folded_in, 'seeds': list(job.seeds),
                  'kept': job.kept, 'wrap': job.settings.wrap},

@@ -1,18 +1,15 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The paper's other networks as models for cubes: `ContactSolver(…, model=continuous())`.
+"""The committee of the paper's section 7 as a model for cubes: `ContactSolver(…, committee())`.
 
-- `paper-continuous`: one network 6-20-17-4 for each subset without discontinuities. The features
-  that meet, by SAT, choose the network.
-- `paper-committee`: section 7. An expert 6-20-18-4 for each kind of contact, and a classifier
-  6-20-18-3, which has learnt to tell the kinds apart and weights the experts' answers.
-
-Model `paper` is the package's own.
+There is an expert 6-20-18-4 for each kind of contact. A classifier 6-20-18-3 has learnt to tell the
+kinds apart, and weights the experts' answers. Model `paper` is the package's own.
 """
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,13 +20,12 @@ from box_contact_ros.solver.paper import (
     TouchingPairs,
     directions,
     forward,
+    network_inputs,
+    octant_signs,
 )
 from box_contact_ros.solver.weights_file import load_weights
 
-from .features import EDGE_EDGE, VERTEX_FACE, to_features, to_octant
-
 EXPERTS = ('vertex', 'edge', 'face')  # of the committee, in the order of the classifier's outputs
-SUBSETS = {'vertex_face': VERTEX_FACE, 'edge_edge': EDGE_EDGE}
 
 
 def weights_path(name: str) -> Path:
@@ -38,21 +34,24 @@ def weights_path(name: str) -> Path:
     return here if here.exists() else resource_path('weights', here.name)
 
 
-class Continuous(Paper):
-    """One network for each subset without discontinuities."""
+class Folds(NamedTuple):
+    """n pairs, folded by the boxes' symmetries as model `paper` folds them: t' = M t, R' = M R N.
 
-    name = 'paper-continuous'
-    networks = dict.fromkeys(SUBSETS, OUTPUTS)
+    M and N are diagonal, of signs; t' ≥ 0, and roll, pitch and yaw of R' are in [−π/2, π/2].
+    """
 
-    def answer(self, pairs: TouchingPairs) -> tuple[np.ndarray, np.ndarray]:
-        """Return directions (n, 3) to the impact point and of the normal, first box's frame."""
-        fold, subset = to_features(pairs)
-        point, normal = np.empty((2, len(subset), 3))
-        for network, number in SUBSETS.items():
-            rows = subset == number
-            point[rows], normal[rows] = directions(
-                forward(self._networks[network], fold.inputs[rows]))
-        return fold.unfolded(point), fold.unfolded(normal)
+    signs: np.ndarray  # (n, 3) diagonal of M
+    inputs: np.ndarray  # (n, 6) of a network: t', and roll, pitch and yaw of R'
+
+    def folded(self, vectors: np.ndarray) -> np.ndarray:
+        """Return points or directions (n, 3) of the first box's frame, folded; or unfolded."""
+        return self.signs * vectors
+
+
+def to_octant(offset: np.ndarray, rotation: np.ndarray) -> Folds:
+    """Fold n boxes of any shape, at offsets t (n, 3), turned by R (n, 3, 3)."""
+    m, n = octant_signs(offset, rotation)
+    return Folds(m, network_inputs(m * offset, m[:, :, None] * rotation * n[:, None]))
 
 
 class Committee(Paper):
@@ -77,13 +76,8 @@ class Committee(Paper):
             normal = normal / length
         alone = (length[:, 0] == 0.0) | ~point.any(axis=1)
         likeliest = said[classes.argmax(axis=1), :, np.arange(len(classes))]
-        return (fold.unfolded(np.where(alone[:, None], likeliest[:, 0], point)),
-                fold.unfolded(np.where(alone[:, None], likeliest[:, 1], normal)))
-
-
-def continuous() -> Continuous:
-    """Return model `paper-continuous` with the weights of the checkout."""
-    return Continuous(load_weights(weights_path('paper-continuous')))
+        return (fold.folded(np.where(alone[:, None], likeliest[:, 0], point)),
+                fold.folded(np.where(alone[:, None], likeliest[:, 1], normal)))
 
 
 def committee() -> Committee:

@@ -172,7 +172,7 @@ def searches(*, seed: int, count: int, quick: bool) -> list[Search]:
     counts, subset_counts = ((QUICK_COUNTS,) * 2 if quick else
                              (dataset.PAPER_COUNTS, dataset.CONTINUOUS_COUNTS))
     whole = dataset.paper(seed, counts=counts, folded_in=False, kept=MIXTURE)
-    subsets = dataset.by_subset(seed, dataset.NO_FOLD, counts=subset_counts, kept=MIXTURE)
+    subsets = dataset.by_signs(seed, counts=subset_counts, kept=MIXTURE)
     return [Search(name, JOBS[job], sets, seed=seed, count=count // 2, quick=quick)
             for name, job, sets in (
                 ('with discontinuities', 'table-1-mixture', whole),

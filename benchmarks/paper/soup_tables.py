@@ -9,7 +9,6 @@ garbage collection off. Like the paper's gprof, they leave out what other progra
 """
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +27,6 @@ from ..errors import degrees_between, distances
 from ..pose_sets import CUBE, Pairs, at_depth, drawn, on_cube, stacks
 from ..timing import cpu_milliseconds, no_garbage_collection, pinned, usable_cores
 from .dataset import as_poses
-from .models import continuous
 from .tree import count_tests, tree
 
 PAPER = {8: (1.10, 11233, 11.52), 10: (1.47, 14323, 15.47), 12: (1.85, 17911, 19.2),
@@ -37,8 +35,6 @@ PAPER = {8: (1.10, 11233, 11.52), 10: (1.47, 14323, 15.47), 12: (1.85, 17911, 19
 """The paper's figures by N: Table 3's mean time [ms]; Table 4's largest number of tests, and its
 time [ms]."""
 PAPER_NETWORK = 0.5  # the paper's time of its network [ms]
-ALSO = (1, 2, 4, 32, 64)  # divisions at which only the accuracy is measured, on touching boxes
-
 OVERLAP = 1e-3
 """Depth [m] of touching and near-parallel cubes of edge 2 where the accuracy is measured. At exact
 touch the soup finds nothing in a part of the patterns."""
@@ -68,7 +64,7 @@ QUICK = {'as written': Counts(60, 0, 300), 'touching': Counts(60, 20),
 REGIMES = tuple(FULL)
 
 Row = dict[str, Any]
-"""A row of paper_soup.csv by column; of an N or a model that is not timed, it has no times."""
+"""A row of paper_soup.csv by column; that of the network has other columns."""
 
 
 class SoupErrors(NamedTuple):
@@ -84,14 +80,14 @@ class SoupResult:
     """All that is measured."""
 
     soups: Mapping[tuple[str, int], Row]  # by regime and N
-    networks: Mapping[str, Row]  # on the touching patterns that the soup's accuracy is measured on
+    network: Row  # of `paper`, on the touching patterns that the soup's accuracy is measured on
     exact: float  # time of a pair in a batch of model `exact` [ms]
     counts: Mapping[str, Counts]
 
     @property
     def rows(self) -> list[Row]:
         """Return the rows of paper_soup.csv."""
-        return [*self.soups.values(), *self.networks.values()]
+        return [*self.soups.values(), self.network]
 
 
 def search(first: fcl.CollisionObject, second: fcl.CollisionObject) -> None:
@@ -175,22 +171,6 @@ def judge_network(model: Contestant, patterns: Pairs, exact: Contacts) -> Row:
             'normal_error_mean_deg': float(degrees_between(found.normal, exact.normal).mean())}
 
 
-def crossing(errors: Mapping[int, float], level: float) -> float:
-    """Return the N at which the error falls to `level`.
-
-    The line between those measured is straight on log-log paper. The N is 0 if the error is below
-    from the first on, infinite if it never is.
-    """
-    divisions = sorted(errors)
-    if errors[divisions[0]] <= level:
-        return 0.0
-    for low, high in zip(divisions, divisions[1:]):
-        if errors[high] <= level:
-            share = math.log(errors[low] / level) / math.log(errors[low] / errors[high])
-            return low * (high / low)**share
-    return math.inf
-
-
 def measure(written: np.ndarray, touching: np.ndarray, *, quick: bool = False) -> SoupResult:
     """Time and judge every N on every regime; external sets (n, 6), as written and touching."""
     counts = QUICK if quick else FULL
@@ -209,18 +189,16 @@ def measure(written: np.ndarray, touching: np.ndarray, *, quick: bool = False) -
     truth = {name: pairs.contacts() for name, pairs in judged.items()}
     soups: dict[tuple[str, int], Row] = {}
     work = len(PAPER) * sum(c.timed + c.judged for c in counts.values())
-    work += len(ALSO) * counts['touching'].judged
     with (pinned({usable_cores()[-1]}), no_garbage_collection(),
           tqdm(total=work, unit='pattern', disable=None) as bar):
-        for divisions in (*PAPER, *ALSO):
-            for regime in REGIMES if divisions in PAPER else ['touching']:
+        for divisions in PAPER:
+            for regime in REGIMES:
                 bar.set_description(f'soup, N = {divisions}, {regime}')
                 row: Row = {'model': 'soup', 'divisions': divisions,
-                            'triangles': 12 * divisions**2, 'regime': regime}
-                if divisions in PAPER:
-                    row |= time_soup(divisions, patterns[regime], bar)
-                    row['mean_tests'] = float(count_tests(
-                        tree(divisions), patterns[regime].rows(slice(COUNTED))).mean())
+                            'triangles': 12 * divisions**2, 'regime': regime,
+                            **time_soup(divisions, patterns[regime], bar),
+                            'mean_tests': float(count_tests(tree(divisions), patterns[
+                                regime].rows(slice(COUNTED))).mean())}
                 if counts[regime].sieved:
                     row |= most_tests(divisions, sieved)
                 if regime in judged:
@@ -233,10 +211,9 @@ def measure(written: np.ndarray, touching: np.ndarray, *, quick: bool = False) -
                         'depth_error_mean_m': float(errors.depth.mean())}
                     bar.update(len(judged[regime].size))
                 soups[regime, divisions] = row
-        networks = {model.name: judge_network(model, judged['touching'], truth['touching'])
-                    for model in (ours('paper'), ours(continuous(), name='paper-continuous'))}
+        network = judge_network(ours('paper'), judged['touching'], truth['touching'])
         exact = time_batch(ours('exact'), judged['touching'])
-    return SoupResult(soups=soups, networks=networks, exact=exact, counts=counts)
+    return SoupResult(soups=soups, network=network, exact=exact, counts=counts)
 
 
 def _cell(value: float) -> str:
@@ -266,16 +243,15 @@ def share_as_written(result: SoupResult, divisions: int) -> float:
 
 
 def table_of_errors(result: SoupResult) -> str:
-    """Return errors by N and regime, then the networks'."""
+    """Return errors by N and regime, then the network's."""
     def cell(row: Row, column: str, unit: float, digits: int = 0) -> str:
         return f'{unit * row[column]:.{digits}f}' if column in row else ''
 
     head, regimes = ['N', 'misses at exact touch'], REGIMES[1:]
     for regime in regimes:
         head += [f'{regime}: point, mean', 'max', 'normal, mean', 'depth, mean']
-    found = {str(n): [result.soups.get((regime, n), {}) for regime in regimes]
-             for n in sorted({n for _, n in result.soups})}
-    found |= {f'`{name}`': [row, {}] for name, row in result.networks.items()}
+    found = {str(n): [result.soups[regime, n] for regime in regimes] for n in PAPER}
+    found['`paper`'] = [result.network, {}]
     lines = []
     for label, (touching, parallel) in found.items():
         line = [label, f'{100 * touching["misses"] / touching["touching"]:.0f} %'
@@ -288,26 +264,6 @@ def table_of_errors(result: SoupResult) -> str:
     return output.markdown_table(head, lines, words=0)
 
 
-def _touching_errors(result: SoupResult) -> dict[int, float]:
-    """Return the mean point error on touching cubes [m], by N."""
-    return {n: row['point_error_mean_m'] for (regime, n), row in sorted(result.soups.items())
-            if regime == 'touching'}
-
-
-def equal_at(result: SoupResult) -> dict[str, float]:
-    """Return, by network, the N at which the soup's mean point error equals its."""
-    errors = _touching_errors(result)
-    return {name: crossing(errors, row['point_error_mean_m'])
-            for name, row in result.networks.items()}
-
-
-def in_words(divisions: float) -> str:
-    """Return a `crossing` in words."""
-    if divisions == 0.0:
-        return f'below N = {min(ALSO)}'
-    return f'N ≈ {divisions:.0f}' if math.isfinite(divisions) else f'beyond N = {max(ALSO)}'
-
-
 def section_3(result: SoupResult) -> str:
     """Return Table 3, mean times by N and regime, with its notes."""
     columns = ('alone_mean_ms', 'step_mean_ms')
@@ -316,7 +272,7 @@ def section_3(result: SoupResult) -> str:
     table = _with_growth(head, [
         [n, 12 * n**2, PAPER[n][0], *(result.soups[regime, n][column] for regime in REGIMES
                                       for column in columns)] for n in PAPER])
-    network = result.networks['paper']['batch_mean_ms']
+    network = result.network['batch_mean_ms']
     ends = min(PAPER), max(PAPER)
     return output.page(
         'benchmarks/paper/pages/table_3', counts=result.counts, table=table, low=ends[0],
@@ -349,9 +305,10 @@ def section_errors(result: SoupResult) -> str:
 
 def section_figure_10(result: SoupResult) -> str:
     """Return Figure 10's caption."""
-    return output.page('benchmarks/paper/pages/figure_10', equal='; '.join(
-        f"`{name}`'s ({1e3 * result.networks[name]['point_error_mean_m']:.0f} mm) at {in_words(n)}"
-        for name, n in equal_at(result).items()))
+    coarsest = result.soups['touching', min(PAPER)]
+    return output.page('benchmarks/paper/pages/figure_10', low=min(PAPER),
+                       error=1e3 * result.network['point_error_mean_m'],
+                       soup=1e3 * coarsest['point_error_mean_m'])
 
 
 SECTIONS = {3: section_3, 4: section_4, 10: section_figure_10}
@@ -363,7 +320,7 @@ def draw_figure_10(result: SoupResult, path: Path) -> None:
     figure, ((axes,),) = output.subplots(1, 1, (7.0, 4.8))
     divisions = list(PAPER)
     rows = [result.soups['as written', n] for n in divisions]
-    network = result.networks['paper']['batch_mean_ms']
+    network = result.network['batch_mean_ms']
     for who, colour, lines in (
             ('paper', '0.55', ([PAPER[n][2] for n in divisions], [PAPER[n][0] for n in divisions],
                                PAPER_NETWORK)),

@@ -19,7 +19,7 @@ from box_contact_ros.solver.weights_file import Weights, load_weights
 from .. import output
 from . import committee, dataset
 from .dataset import SETS, Patterns
-from .errors import PARTS, errors_of, figures, figures_by_part, predict
+from .errors import errors_of, figures, predict
 from .models import weights_path
 
 PAPER = {
@@ -32,8 +32,8 @@ PAPER = {
 TABLE_1 = {'as written': 'table-1-as-written', 'mixture': 'table-1-mixture',
            'dropped': 'table-1-dropped'}
 """Files of Table 1's networks, one network a seed, by what the table calls them."""
-TABLE_2 = {'by signs': 'table-2-by-signs', 'by features': 'paper-continuous'}
-"""Files of Table 2's networks, one network a subset."""
+TABLE_2 = 'table-2-by-signs'
+"""File of Table 2's networks, one network a subset."""
 SHOWN = 150  # patterns in Figure 9
 
 Errors = dict[str, np.ndarray]  # errors (n, 4) [rad] by set
@@ -63,17 +63,13 @@ def _number(value: float) -> str:
     return f'{round(value, 4) + 0.0:.4f}'
 
 
-def beside_paper(number: int, columns: Mapping[str, Errors]) -> str:
-    """Return one of the paper's tables: its figures and ours, per set."""
-    rows = []
-    for figure, theirs in PAPER[number].items():
-        row = [figure]
-        for name, their in zip(SETS, theirs):
-            row += [_number(their), *[_number(figures(errors[name])[figure])
-                                      for errors in columns.values()]]
-        rows.append(row)
+def table_2(found: Errors) -> str:
+    """Return Table 2: the paper's figures and ours, per set."""
+    rows = [[figure, *[_number(value) for name, their in zip(SETS, theirs)
+                       for value in (their, figures(found[name])[figure])]]
+            for figure, theirs in PAPER[2].items()]
     return output.markdown_table(
-        ['', *[f'{name}, {who}' for name in SETS for who in ('paper', *columns)]], rows)
+        ['', *[f'{name}, {who}' for name in SETS for who in ('paper', 'by signs')]], rows)
 
 
 Trainings = Mapping[str, Sequence[Errors]]  # errors of each seed by the name of the variant
@@ -109,26 +105,13 @@ def spread_of_outputs(seeds: Sequence[Errors]) -> float:
     return float(mae.max() / mae.min())
 
 
-def by_part(columns: Mapping[str, Errors]) -> str:
-    """Return our figures on all sets, for all outputs, the point's and the normal's."""
-    rows = []
-    for title, errors in columns.items():
-        for name in SETS:
-            parts = figures_by_part(errors[name]).values()
-            rows.append([title, name, f'{len(errors[name]):,}',
-                         *[_number(value) for part in parts for value in part.values()]])
-    return output.markdown_table(
-        ['', 'set', 'patterns', *[f'{figure}, {part}' for part in PARTS for figure in PAPER[1]]],
-        rows)
-
-
 def _page(name: str, **values: object) -> str:
     return output.page(f'benchmarks/paper/pages/{name}', **values)
 
 
 def sections_1_and_2(tables: Collection[int], step: int) -> list[str]:
     """Return Tables 1 and 2, those of them that were chosen, and their notes."""
-    sections, detail = [], {}
+    sections = []
     if 1 in tables:
         found = {title: list(evaluate(name, step).values()) for title, name in TABLE_1.items()}
         card = with_sets(TABLE_1['mixture'])[0].card
@@ -138,19 +121,16 @@ def sections_1_and_2(tables: Collection[int], step: int) -> list[str]:
                               inside=100 * shares[0], beyond=100 * shares[2],
                               spread=spread_of_outputs(found['mixture']),
                               starts=card['training']['seed_1']['starts']))
-        detail['paper'] = evaluate('paper', step)['contact']
     if 2 in tables:
-        pooled = {title: {name: np.concatenate([errors[name] for errors in
-                                                evaluate(file, step).values()]) for name in SETS}
-                  for title, file in TABLE_2.items()}
-        above = [100.0 * (figures(pooled['by signs'][name])[figure] / theirs[place] - 1.0)
+        subsets = evaluate(TABLE_2, step).values()
+        pooled = {name: np.concatenate([errors[name] for errors in subsets]) for name in SETS}
+        above = [100.0 * (figures(pooled[name])[figure] / theirs[place] - 1.0)
                  for figure, theirs in PAPER[2].items() if figure != 'ME'
                  for place, name in enumerate(SETS)]
-        sections.append(_page('table_2', table=beside_paper(2, pooled), least=min(above),
-                              most=max(above)))
+        sections.append(_page('table_2', table=table_2(pooled), least=min(above), most=max(above)))
     if 1 in tables:
         sections.append(committee.section(step))
-    return [*sections, _page('tables_1_2', by_part=by_part(detail))]
+    return [*sections, _page('tables_1_2')]
 
 
 def draw_figure_9(path: Path) -> None:

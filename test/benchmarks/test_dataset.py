@@ -10,39 +10,26 @@ import pytest
 from poses import IDENTITY
 
 from benchmarks.paper import dataset
-from benchmarks.paper.dataset import (
-    FEATURES,
-    GENERATORS,
-    NO_FOLD,
-    OCTANT,
-    Placements,
-)
-from benchmarks.paper.features import to_features, to_octant
-from benchmarks.paper.models import EXPERTS, SUBSETS
-from benchmarks.pose_sets import CONTAINER, CUBE
+from benchmarks.paper.dataset import GENERATORS, Placements
+from benchmarks.paper.models import EXPERTS, to_octant
+from benchmarks.pose_sets import CUBE
 from box_contact_ros import ContactSolver
-from box_contact_ros.solver.paper import TouchingPairs
 from box_contact_ros.solver.pose import rotation_matrix
 
 COUNT = 4000
 SMALL = (300, 200, 400)
 
 
-def draw(size=CUBE, kinds=GENERATORS, count=COUNT, seed=11) -> Placements:
+def draw(kinds=GENERATORS, count=COUNT, seed=11) -> Placements:
     """`count` placements of every kind, one kind after the other."""
     rng = np.random.default_rng(seed)
-    parts = [dataset.touching(rng, count, size, kind) for kind in kinds]
-    return Placements(parts[0].size, *(np.concatenate([getattr(part, name) for part in parts])
-                                       for name in ('inputs', 'point', 'normal')))
-
-
-@pytest.fixture(scope='module', params=[CUBE, CONTAINER], ids=['cube', 'container'])
-def placements(request: pytest.FixtureRequest) -> Placements:
-    return draw(request.param)
+    parts = [dataset.touching(rng, count, kind) for kind in kinds]
+    return Placements(*(np.concatenate([getattr(part, name) for part in parts])
+                        for name in ('inputs', 'point', 'normal')))
 
 
 @pytest.fixture(scope='module')
-def cubes() -> Placements:
+def placements() -> Placements:
     return draw()
 
 
@@ -57,9 +44,8 @@ def in_second_box(placements: Placements) -> np.ndarray:
 
 def test_points_lie_on_both_trihedra(placements: Placements) -> None:
     """On a face +x, +y or +z of the first box and a face −x, −y or −z of the second."""
-    half = 0.5 * np.array(placements.size)
     for point, side in ((placements.point, 1.0), (in_second_box(placements), -1.0)):
-        relative = side * point / half
+        relative = side * point
         assert np.all(np.abs(relative) <= 1.0 + 1e-12)
         assert np.all(np.abs(relative.max(axis=1) - 1.0) <= 1e-12)
 
@@ -77,15 +63,13 @@ def test_every_face_vertex_and_edge_occurs() -> None:
 
 
 def test_placements_against_the_oracle() -> None:
-    """In 60 digits: the same separation and normal, for both kinds and both sizes."""
-    for size in (CUBE, CONTAINER):
-        some = draw(size, count=20)
-        a = oracle.make_box(IDENTITY, size)
-        for pose, normal in zip(some.pose, some.normal):
-            gaps = oracle.axis_gaps(a, oracle.make_box(pose, size))
-            _, axis, gap = max(gaps, key=lambda entry: entry[2])
-            assert abs(float(gap)) <= 1e-14 * max(size)
-            assert float(np.dot(oracle.as_array(axis), normal)) == pytest.approx(1.0, abs=1e-12)
+    """In 60 digits: the same separation and normal, for both kinds."""
+    some, a = draw(count=20), oracle.make_box(IDENTITY, CUBE)
+    for pose, normal in zip(some.pose, some.normal):
+        gaps = oracle.axis_gaps(a, oracle.make_box(pose, CUBE))
+        _, axis, gap = max(gaps, key=lambda entry: entry[2])
+        assert abs(float(gap)) <= 1e-14 * max(CUBE)
+        assert float(np.dot(oracle.as_array(axis), normal)) == pytest.approx(1.0, abs=1e-12)
 
 
 def test_impact_point_is_what_the_solver_calls_the_point(placements: Placements) -> None:
@@ -93,18 +77,18 @@ def test_impact_point_is_what_the_solver_calls_the_point(placements: Placements)
 
     Where features are nearly parallel the overlap grows along them, so 1 % may be farther off.
     """
-    solver = ContactSolver(placements.size, placements.size, model='exact')
+    solver = ContactSolver(CUBE, CUBE, model='exact')
     found = solver.batch(np.tile(IDENTITY, (len(placements), 1)), placements.pose)
     touch = found.colliding
     assert touch.mean() > 0.9  # the rest is apart by its rounding
-    off = np.linalg.norm(found.point - placements.point, axis=1)[touch] / max(placements.size)
+    off = np.linalg.norm(found.point - placements.point, axis=1)[touch] / max(CUBE)
     assert np.quantile(off, 0.99) < 1e-6
 
 
 @pytest.mark.parametrize('kind', GENERATORS)
 def test_placements_as_written_interpenetrate(kind) -> None:
     """As the paper writes it: some are deep; the point is on both cubes; no normal is missing."""
-    kept = dataset.touching(np.random.default_rng(2), COUNT, CUBE, kind, as_written=True)
+    kept = dataset.touching(np.random.default_rng(2), COUNT, kind, as_written=True)
     assert (dataset.query(kept).separation < -0.1).mean() > 0.3
     assert np.isfinite(kept.normal).all()
     for point in (kept.point, in_second_box(kept)):
@@ -114,7 +98,7 @@ def test_placements_as_written_interpenetrate(kind) -> None:
 def test_a_mixture_has_its_share_of_each_kind() -> None:
     """Of placements as written some do not interpenetrate, so fewer than the share are deep."""
     def deep(**how) -> float:
-        some = dataset.mixed(np.random.default_rng(3), COUNT, CUBE, **how)
+        some = dataset.mixed(np.random.default_rng(3), COUNT, **how)
         assert len(some) == COUNT
         return float((dataset.query(some).separation < -1e-9).mean())
 
@@ -124,7 +108,7 @@ def test_a_mixture_has_its_share_of_each_kind() -> None:
 
 def test_faces_lie_on_faces() -> None:
     """Tilted by up to TILT, they touch; the point is the middle of the overlap, on both faces."""
-    laid = dataset.touching(np.random.default_rng(2), 500, CUBE, dataset.face_face_candidates)
+    laid = dataset.touching(np.random.default_rng(2), 500, dataset.face_face_candidates)
     assert np.abs(dataset.query(laid).separation).max() < 1e-12
     turn = rotation_matrix(laid.pose[:, 3:])
     level = np.abs(np.einsum('nij,ni->nj', turn, laid.normal)).max(axis=1)
@@ -162,82 +146,28 @@ def direction(angles: np.ndarray) -> np.ndarray:
                             np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
 
 
-@pytest.mark.parametrize('how', [NO_FOLD, OCTANT, FEATURES])
-def test_folded_boxes_touch_where_the_folded_label_says(how: str, cubes: Placements) -> None:
+@pytest.mark.parametrize('is_folded', [False, True])
+def test_folded_boxes_touch_where_the_folded_label_says(is_folded: bool,
+                                                        placements: Placements) -> None:
     """What a network is taught is a touching pose with its right answer."""
-    result = dataset.fold(cubes, how)
-    patterns = result.patterns()
-    again = Placements(CUBE, patterns.inputs, result.point, result.normal)
+    patterns = (dataset.folded if is_folded else dataset.as_drawn)(placements)
+    folds = to_octant(placements.inputs[:, :3], placements.rotation)
+    again = Placements(patterns.inputs, *(folds.folded(part) if is_folded else part
+                                          for part in (placements.point, placements.normal)))
     sat = dataset.query(again)
     assert np.abs(sat.separation).max() < 1e-11
     assert np.sum(sat.normal * again.normal, axis=1).min() > 1.0 - 1e-9
-    for point in (result.point, in_second_box(again)):
+    for point in (again.point, in_second_box(again)):
         np.testing.assert_allclose(np.abs(point).max(axis=1), 1.0, atol=1e-11)
-    assert np.all(result.point.max(axis=1) > 1.0 - 1e-12)  # on a face +x, +y or +z
-    length = np.linalg.norm(result.point, axis=1, keepdims=True)
-    np.testing.assert_allclose(direction(patterns.outputs[:, :2]) * length, result.point,
+    assert np.all(again.point.max(axis=1) > 1.0 - 1e-12)  # on a face +x, +y or +z
+    length = np.linalg.norm(again.point, axis=1, keepdims=True)
+    np.testing.assert_allclose(direction(patterns.outputs[:, :2]) * length, again.point,
                                atol=1e-12)
-    np.testing.assert_allclose(direction(patterns.outputs[:, 2:]), result.normal, atol=1e-12)
-
-
-def test_reference_features(cubes: Placements) -> None:
-    """vertex_face: on face +x. edge_edge: on the edge along z at (+, +); normals across."""
-    result = dataset.fold(cubes, FEATURES)
-    face = result.subset == SUBSETS['vertex_face']
-    np.testing.assert_array_equal(result.normal[face], np.tile([1.0, 0.0, 0.0], (face.sum(), 1)))
-    np.testing.assert_allclose(result.point[face, 0], 1.0, atol=1e-12)
-    assert np.all(np.abs(result.point[~face, :2] - 1.0) < 1e-12)
-    n = result.normal[~face]
-    assert np.all(np.abs(n[:, 2]) < 1e-12) and np.all(n[:, 0] >= n[:, 1] - 1e-12)
-    assert np.all(n[:, 1] >= -1e-12)
-
-
-def test_labels_unfold(cubes: Placements) -> None:
-    """Label → folded → unfolded is the label, by the maps that the solver uses."""
-    sat = dataset.query(cubes)
-    results = {how: dataset.fold(cubes, how) for how in (OCTANT, FEATURES)}
-    for how, result in results.items():
-        pairs = TouchingPairs(sat.axis < 0, sat.axis, sat.normal, cubes.inputs[:, :3],
-                              cubes.rotation)
-        folds = to_octant(*pairs[3:]) if how == OCTANT else to_features(pairs)[0]
-        for found, label in ((result.point, cubes.point), (result.normal, cubes.normal)):
-            np.testing.assert_allclose(folds.unfolded(found), label, rtol=0, atol=1e-15)
-            np.testing.assert_allclose(folds.folded(label), found, rtol=0, atol=1e-15)
-        np.testing.assert_array_equal(folds.offset, result.inputs[:, :3])
-        turn = rotation_matrix(dataset.as_poses(result.inputs)[1][:, 3:])
-        np.testing.assert_allclose(folds.rotation, turn, atol=1e-12)
-
-
-# --- subsets --------------------------------------------------------------------------------------
-
-
-def test_subset_depends_on_the_pose_only(cubes: Placements) -> None:
-    """The same poses with other labels, or in another order, fall in the same subsets."""
-    result = dataset.fold(cubes, FEATURES)
-    rng = np.random.default_rng(0)
-    order = rng.permutation(len(cubes))
-    blind = dataset.fold(Placements(CUBE, cubes.inputs[order], np.full_like(cubes.point, np.nan),
-                                    rng.normal(size=cubes.normal.shape)), FEATURES)
-    np.testing.assert_array_equal(blind.subset, result.subset[order])
-    np.testing.assert_array_equal(blind.inputs, result.inputs[order])
-
-
-def test_subset_is_what_the_oracle_says() -> None:
-    """A face axis of the first box wins, or an edge pair, in 60 digits."""
-    some = draw(count=20, seed=5)
-    subset = dataset.fold(some, FEATURES).subset
-    assert set(subset) == {0, 1}
-    a = oracle.make_box(IDENTITY, CUBE)
-    for pose, number in zip(some.pose, subset):
-        gaps = oracle.axis_gaps(a, oracle.make_box(pose, CUBE))
-        axis = max(gaps, key=lambda entry: entry[2])[0]
-        assert (axis < 3) == (number == SUBSETS['vertex_face'])
-        assert axis < 3 or axis >= 6
-
-
-def test_features_are_for_cubes() -> None:
-    with pytest.raises(ValueError, match='for cubes, not for'):
-        dataset.fold(draw(CONTAINER, count=5), FEATURES)
+    np.testing.assert_allclose(direction(patterns.outputs[:, 2:]), again.normal, atol=1e-12)
+    if is_folded:  # twice is back
+        np.testing.assert_array_equal(folds.folded(again.point), placements.point)
+        assert (patterns.inputs[:, :3] >= 0.0).all()
+        assert (np.abs(patterns.inputs[:, 3:]) <= 0.5 * np.pi + 1e-12).all()
 
 
 # --- sets -----------------------------------------------------------------------------------------
@@ -257,17 +187,8 @@ def test_paper_sets() -> None:
         assert np.all(np.abs(patterns.outputs) <= np.pi * np.array([1.0, 0.5, 1.0, 0.5]) + 1e-12)
 
 
-def test_continuous_sets() -> None:
-    """The paper's sizes per subset, all patterns distinct."""
-    made = dataset.by_subset(1, FEATURES)
-    assert set(made) == {'vertex_face', 'edge_edge'}
-    for sets in made.values():
-        assert [len(sets[name]) for name in dataset.SETS] == [10000, 6000, 50000]
-        assert len(np.unique(all_inputs(sets), axis=0)) == 66000
-
-
 def test_sets_by_signs_have_the_signs_of_their_names() -> None:
-    made = dataset.by_subset(1, NO_FOLD, counts=SMALL, kept=0.5)
+    made = dataset.by_signs(1, counts=SMALL, kept=0.5)
     assert len(made) == 8
     for signs, sets in made.items():
         assert [len(sets[name]) for name in dataset.SETS] == list(SMALL)
@@ -276,16 +197,12 @@ def test_sets_by_signs_have_the_signs_of_their_names() -> None:
 
 
 def test_sets_come_from_the_seed_alone() -> None:
-    """Again the same; each set without the others; another seed, nothing in common."""
+    """Again the same; another seed, nothing in common."""
     for make in (lambda *a, **k: {'paper': dataset.paper(*a, **k)},
-                 lambda seed, **k: dataset.by_subset(seed, FEATURES, **k)):
+                 dataset.by_signs):
         first, again = make(7, counts=SMALL), make(7, counts=SMALL)
-        alone = make(7, counts=SMALL, sets=('external',))
         other = make(8, counts=SMALL)
         for subset, sets in first.items():
-            assert list(alone[subset]) == ['external']
-            np.testing.assert_array_equal(sets['external'].inputs,
-                                          alone[subset]['external'].inputs)
             for name, patterns in sets.items():
                 np.testing.assert_array_equal(patterns.inputs, again[subset][name].inputs)
                 np.testing.assert_array_equal(patterns.outputs, again[subset][name].outputs)

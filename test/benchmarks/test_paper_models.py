@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Models `paper-continuous` and `paper-committee`: errors, and what chooses among networks."""
+"""Model `paper-committee`: its errors, and what weights its experts."""
 from __future__ import annotations
 
 from pathlib import Path
@@ -11,49 +11,31 @@ import poses
 import pytest
 from test_paper import touching
 
-from benchmarks.paper.models import Committee, committee, continuous, weights_path
+from benchmarks.paper.models import Committee, committee, weights_path
 from benchmarks.weights import save_weights
 from box_contact_ros import ContactSolver
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.paper import Paper
-from box_contact_ros.solver.pose import rotation_matrix
 from box_contact_ros.solver.weights_file import WeightsError, load_weights
 
 EXACT = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
-MODELS = {'continuous': (continuous, 0.008, 0.15), 'committee': (committee, 0.55, 10.0)}
-"""Bounds of the mean point error [m] and of the mean normal error [deg]. The weights reach 0.006 m
-and 0.11°, 0.49 m and 6.4°."""
-
-
 def solver_of(model: Paper) -> ContactSolver:
     return ContactSolver(poses.CUBE, poses.CUBE, model=model)
 
 
-@pytest.mark.parametrize('name', MODELS)
-def test_error_on_touching_boxes(name: str) -> None:
-    """Against `exact`; rows are as single calls."""
-    make, metres, degrees = MODELS[name]
-    solver = solver_of(make())
+def test_error_on_touching_boxes() -> None:
+    """Mean errors against `exact`: 0.49 m and 6.4° are reached; rows are as single calls."""
+    solver = solver_of(committee())
     a, b = touching(np.array(poses.CUBE), depth=1e-9)
     truth, found = EXACT.batch(a, b), solver.batch(a, b)
     cosine = np.clip(np.sum(found.normal * truth.normal, axis=1), -1, 1)
-    assert np.linalg.norm(found.point - truth.point, axis=1).mean() < metres
-    assert np.degrees(np.arccos(cosine)).mean() < degrees
+    assert np.linalg.norm(found.point - truth.point, axis=1).mean() < 0.55
+    assert np.degrees(np.arccos(cosine)).mean() < 10.0
     assert np.array_equal(found.separation, truth.separation)
     for row in range(0, len(a), 50):
         one = solver(a[row], b[row])
         assert np.array_equal(one.point, found.point[row])
         assert np.array_equal(one.normal, found.normal[row])
-
-
-def test_continuous_covers_both_subsets() -> None:
-    """The sweep above reaches faces of A, faces of B and edges."""
-    a, b = touching(np.array(poses.CUBE), n=500)
-    normals = EXACT.batch(a, b).normal
-    cosines = [np.einsum('nij,ni->nj', rotation_matrix(p[:, 3:]), normals) for p in (a, b)]
-    face = [np.abs(cosine).max(axis=1) > 1 - 1e-9 for cosine in cosines]
-    shares = face[0].mean(), face[1].mean(), (~(face[0] | face[1])).mean()
-    assert min(shares) > 0.1
 
 
 def test_a_committee_is_the_weighted_mean_of_its_experts(tmp_path: Path) -> None:
@@ -82,8 +64,8 @@ def test_a_committee_is_the_weighted_mean_of_its_experts(tmp_path: Path) -> None
     assert answer(-5.0, -3.0, -4.0) == pytest.approx([0.0, 1.0, 0.0], abs=1e-6)
 
 
-def test_they_are_for_cubes_and_need_their_networks() -> None:
+def test_it_is_for_cubes_and_needs_its_networks() -> None:
     with pytest.raises(ValueError, match='are for two cubes of one size, not for 1 × 2 × 3 m'):
-        ContactSolver((1, 2, 3), (1, 2, 3), model=continuous())
+        ContactSolver((1, 2, 3), (1, 2, 3), model=committee())
     with pytest.raises(WeightsError, match="has no network 'classifier'"):
         Committee(load_weights(resource_path('weights', 'paper.safetensors')))

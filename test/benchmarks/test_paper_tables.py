@@ -27,7 +27,7 @@ from box_contact_ros.soup import soup
 
 @pytest.fixture
 def small(monkeypatch):
-    """Two N of the tables and two beside them, on 150 patterns."""
+    """Two N of the tables, on 150 patterns."""
     sets = {name: {'seed_1': dataset.paper(5, counts=(10, 10, 150), folded_in=False,
                                            kept=JOBS[name].kept)}
             for name in tables.TABLE_1.values()}
@@ -35,7 +35,6 @@ def small(monkeypatch):
                         lambda name: (load_weights(weights_path(name)), sets[name]))
     few = {n: soup_tables.PAPER[n] for n in (8, 10)}
     monkeypatch.setattr(soup_tables, 'PAPER', few)
-    monkeypatch.setattr(soup_tables, 'ALSO', (2, 32))
     return sets[tables.TABLE_1['dropped']]['seed_1']['external'].inputs
 
 
@@ -134,7 +133,7 @@ def test_a_committee_is_judged_by_the_labels() -> None:
     some = committee.placements(100)['vertex']
     point, normal = committee.errors(ours('exact'), some)
     assert point < 0.1 and normal < 0.01
-    moved = dataset.Placements(some.size, some.inputs, some.point + [0.0, 0.0, 0.02], some.normal)
+    moved = dataset.Placements(some.inputs, some.point + [0.0, 0.0, 0.02], some.normal)
     assert committee.errors(ours('exact'), moved)[0] == pytest.approx(20.0, abs=0.1)
 
 
@@ -200,7 +199,7 @@ def test_the_share_that_the_times_suggest() -> None:
     """Half of the patterns take 300 tests and half 100, the longest 1,000: its share is a half."""
     rows = {('as written', 8): {'most_tests': 1000, 'mean_tests': 300.0},
             ('touching', 8): {'mean_tests': 300.0 - 2 * (300.0 - 1000 * 1.10 / 11.52)}}
-    result = soup_tables.SoupResult(soups=rows, networks={}, exact=0.0, counts={})
+    result = soup_tables.SoupResult(soups=rows, network={}, exact=0.0, counts={})
     assert soup_tables.share_as_written(result, 8) == pytest.approx(0.5)
 
 
@@ -229,4 +228,4 @@ def test_all_is_written(small, tmp_path, capsys):
              if (row['divisions'], row['regime']) == ('8', 'as written'))
     assert f'| {most:,} |' in page
     assert '11,233' in page and '36.77' not in page  # the paper's, of the N that were run
-    assert {row['model'] for row in rows} == {'soup', 'paper', 'paper-continuous'}
+    assert {row['model'] for row in rows} == {'soup', 'paper'}

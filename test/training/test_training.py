@@ -125,7 +125,7 @@ def test_quick_training(quick: Path, job: PaperJob) -> None:
     weights = load_weights(quick / f'{job.name}.safetensors')
     card = weights.card
     assert (card['seed'], card['model'], card['name']) == (3, job.model, job.name)
-    assert card['sizes'] == [list(job.size)] * 2
+    assert card['sizes'] == [[2.0, 2.0, 2.0]] * 2
     for name, sets in dataset.of_card(card).items():
         external = sets['external']
         assert len(external) == train.QUICK_COUNTS[2]
