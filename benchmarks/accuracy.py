@@ -40,7 +40,6 @@ from .pose_sets import LOADS, SETS, Pairs, drawn
 
 PAIRS, QUICK_PAIRS = 100_000, 5_000
 CLASSES = ('vertex-face', 'edge-edge', 'edge-face', 'face-face')
-WINNERS = ('face axis', 'edge axis')
 SHOWN = (1e-6, 10.0)  # errors that are drawn to scale [%]; others are at the edge
 MARKS = {'o': 'half of the pairs', '|': '99 %', 'D': 'worst pair'}
 """What is drawn of a set."""
@@ -50,16 +49,15 @@ FACE_LIKE = math.cos(math.radians(6.0))
 """Cosine of the angle to a face's normal up to which an edge pair's axis stands for the face."""
 
 
-def classify(pairs: Pairs) -> tuple[np.ndarray, np.ndarray]:
-    """Return indices (n,) into CLASSES and into WINNERS of pairs that touch: see the module."""
+def classify(pairs: Pairs) -> np.ndarray:
+    """Return indices (n,) into CLASSES of pairs that touch: see the module."""
     found = pairs.contacts()
-    winners = (found.axis >= 6).astype(np.int64)
     face_normals = np.concatenate([rotation_matrix(pose[:, 3:]) for pose in pairs[:2]], axis=2)
     steepest = np.abs(np.einsum('nik,ni->nk', face_normals, found.normal)).max(axis=1)
     through = _corners_through(pairs, found)
     classes = np.where(through <= 1, 0, np.where(through == 2, 2, 3))
-    classes[(winners == 1) & (steepest < FACE_LIKE)] = 1
-    return classes, winners
+    classes[(found.axis >= 6) & (steepest < FACE_LIKE)] = 1
+    return classes
 
 
 def _corners_through(pairs: Pairs, found: Contacts) -> np.ndarray:
@@ -88,14 +86,6 @@ def _heights(pose: np.ndarray, size: np.ndarray, other: np.ndarray, other_size: 
     return middle[:, :, None] + reach @ CORNERS.T
 
 
-def outside(pairs: Pairs, contacts: Contacts) -> float:
-    """Return the largest distance of a point from a box, of the size, beyond the pressing."""
-    pressed = np.maximum(0.0, DEPTH_FLOOR + contacts.separation / pairs.size)
-    beyond = pairs.beyond(contacts.point) / pairs.size - pressed
-    # A point inside is no distance outside; pairs apart have NaN.
-    return float(np.max(beyond[contacts.colliding], initial=0.0))
-
-
 class Summary(NamedTuple):
     """Errors of some pairs, in %."""
 
@@ -106,11 +96,10 @@ class Summary(NamedTuple):
     worst: float
 
 
-def by_part(errors: np.ndarray, classes: np.ndarray, winners: np.ndarray) -> dict[str, Summary]:
-    """Return errors (n,) of all pairs, per class and per winner; empty parts are left out."""
+def by_part(errors: np.ndarray, classes: np.ndarray) -> dict[str, Summary]:
+    """Return errors (n,) of all pairs and per class; empty parts are left out."""
     rows = {'all': np.ones(len(errors), bool)}
     rows |= {name: classes == k for k, name in enumerate(CLASSES)}
-    rows |= {name: winners == k for k, name in enumerate(WINNERS)}
     parts = {name: errors[chosen] for name, chosen in rows.items() if chosen.any()}
     return {name: Summary(len(part), float(part.mean()), *output.percentiles(part, 50, 99, 100))
             for name, part in parts.items()}
@@ -124,27 +113,25 @@ class AccuracyRow:
     set: str
     errors: Mapping[str, Mapping[str, Summary]]  # by field of `ContactErrors`, then by part
     pairs: int
-    outside: float  # farthest point outside a box, of the size
 
 
 def measure(model: Contestant, name: str, pairs: Pairs, truth: Contacts) -> AccuracyRow | None:
     """Measure a model on a set; None where the model is not for its sizes."""
     try:
-        contacts, _ = model.solve(pairs)
+        contacts = model.solve(pairs)
     except ValueError:
         if model.any_boxes:
             raise
         return None
     both = truth.colliding & contacts.colliding
     touching = pairs.rows(both)
-    classes, winners = classify(touching)
+    classes = classify(touching)
     errors = contact_errors(*(Contacts(*(part[both] for part in answer))
                               for answer in (contacts, truth)), touching.edge)
     return AccuracyRow(
         model=model.name, set=name, pairs=len(both),
-        errors={quantity: by_part(values, classes, winners) for quantity, values
-                in errors._asdict().items() if np.isfinite(values).all()},
-        outside=outside(pairs, contacts))
+        errors={quantity: by_part(values, classes) for quantity, values
+                in errors._asdict().items() if np.isfinite(values).all()})
 
 
 def measure_all(models: Sequence[Contestant], count: int, seed: int) -> list[AccuracyRow]:
@@ -160,50 +147,39 @@ def measure_all(models: Sequence[Contestant], count: int, seed: int) -> list[Acc
 
 
 def error_table(rows: Sequence[AccuracyRow]) -> str:
-    """Return mean/p99/worst of each quantity over whole sets.
-
-    Then comes the farthest point outside a box.
-    """
+    """Return mean/p99/worst of each quantity over whole sets."""
     def cell(row: AccuracyRow, quantity: str) -> str:
         if quantity not in row.errors:
             return ''
         errors = row.errors[quantity]['all']
         return f'{errors.mean:.2g} / {errors.p99:.2g} / {errors.worst:.2g}'
 
-    lines = [[f'{r.model}, {r.set}', *(cell(r, name) for name in ContactErrors._fields),
-              f'{r.outside:.1g}']
-             for r in rows]
-    return markdown_table(['model, set', 'point', 'volume', 'covariance', 'in-plane eigenvalues',
-                           'outside'], lines)
+    return markdown_table(
+        ['model, set', 'point', 'volume', 'covariance', 'in-plane eigenvalues'],
+        [[f'{row.model}, {row.set}', *(cell(row, name) for name in ContactErrors._fields)]
+         for row in rows])
 
 
 def class_table(rows: Sequence[AccuracyRow]) -> str:
-    """Return mean/p99/worst of the point per class and winner, with the share of the pairs."""
+    """Return mean/p99/worst of the point per class, with the share of the pairs."""
     def cell(parts: Mapping[str, Summary], name: str) -> str:
         if name not in parts:
             return '–'
         errors, share = parts[name], 100.0 * parts[name].pairs / parts['all'].pairs
         return f'{errors.mean:.3f}/{errors.p99:.2f}/{errors.worst:.1f} ({share:.0f} %)'
 
-    names = (*CLASSES, *WINNERS)
-    return markdown_table(['model, set', *names], [
-        [f'{row.model}, {row.set}', *(cell(row.errors['point'], name) for name in names)]
+    return markdown_table(['model, set', *CLASSES], [
+        [f'{row.model}, {row.set}', *(cell(row.errors['point'], name) for name in CLASSES)]
         for row in rows])
 
 
 def csv_rows(rows: Sequence[AccuracyRow]) -> Iterator[dict[str, object]]:
-    """Yield a row per model, set, part and quantity: errors in %, differences of the size.
-
-    A row of a whole set's point ends with what is known of the set only.
-    """
+    """Yield a row per model, set, part and quantity: errors in %."""
     for row in rows:
         for quantity, parts in row.errors.items():
             for part, errors in parts.items():
-                line = {'model': row.model, 'set': row.set, 'part': part, 'quantity': quantity,
-                        **errors._asdict()}
-                if part == 'all' and quantity == 'point':
-                    line |= {'outside': row.outside}
-                yield line
+                yield {'model': row.model, 'set': row.set, 'part': part, 'quantity': quantity,
+                       **errors._asdict()}
 
 
 def draw(path: Path, rows: Sequence[AccuracyRow]) -> None:

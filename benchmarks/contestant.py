@@ -11,7 +11,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -54,13 +54,6 @@ def manifold(contacts: Iterable[tuple[ArrayLike, ArrayLike, float]]) -> Manifold
     return Manifold(*map(np.array, columns)) if columns else APART
 
 
-class Solved(NamedTuple):
-    """What a model of this package answers for n pairs, with what a manifold does not hold."""
-
-    contacts: Contacts
-    fallbacks: int  # contacts that the model handed to `exact`
-
-
 class Answer(NamedTuple):
     """One contact of a pair: normal (3,) from A to B and point (3,), NaN if apart."""
 
@@ -86,15 +79,13 @@ class Contestant:
     """Return two poses (7,) in the engine's own form, the arguments of what answers."""
     read: Callable[[Any], Manifold]
     """Return the answer in what a call returned; to be read before the next call."""
-    solve: Callable[[Pairs], Solved] | None = None
+    solve: Callable[[Pairs], Contacts] | None = None
     """Answer for all pairs, with volume and covariance; models of this package have it."""
     prepare_batch: Callable[..., Callable[[], Any]] | None = None
     """Return a call that answers for all pairs at once, not in a loop; takes pairs, `threads`."""
     any_boxes: bool = True  # whether it answers for boxes of any sizes
     causes: Mapping[str, str] = field(default_factory=dict)
     """Why it is 'missed', 'invented' or 'normal' in a report, where that is known."""
-    make: Callable[[], Contestant] | None = None
-    """Makes the contestant again in a subprocess, where another's library may abort."""
 
     def prepare(self, pairs: Pairs) -> list[Callable[[], Any]]:
         """Return a call for each pair, to be timed. ValueError: not for boxes of these sizes."""
@@ -113,9 +104,8 @@ def ours(model: Any, *, weights: str | None = None, name: str = '') -> Contestan
     name = name or (model if isinstance(model, str) else type(model).__name__)
     solver = partial(ContactSolver, model=model, weights=weights)
 
-    def solve(pairs: Pairs) -> Solved:
-        made = solver(pairs.size_a[0], pairs.size_b[0])
-        return Solved(pairs.contacts(made), made.fallbacks)
+    def solve(pairs: Pairs) -> Contacts:
+        return pairs.contacts(solver(pairs.size_a[0], pairs.size_b[0]))
 
     def prepare_batch(pairs: Pairs, threads: int = 1) -> Callable[[], Any]:
         a, b, size_a, size_b = pairs
@@ -222,26 +212,6 @@ def in_subprocess(work: Callable[..., Any], *arguments: Any, patience: float,
 
 def _answer_to(pipe: Any, work: Callable[..., Any], *arguments: Any) -> None:
     pipe.send(work(*arguments))
-
-
-def part_by_part(work: Callable[..., dict[str, Any]], make: Callable[[], Contestant],
-                 parts: Mapping[str, Any], *arguments: Any, patience: float) -> dict[str, Any]:
-    """Return what `work` returns by part for a contestant in a subprocess.
-
-    Where the contestant ends the subprocess, the parts are asked one by one, and what ended the
-    subprocess is the answer, a string.
-    """
-    try:
-        return in_subprocess(_work_with, work, make, parts, *arguments, patience=patience)
-    except RuntimeError as error:
-        if len(parts) == 1:
-            return {name: str(error) for name in parts}
-    return {name: answer for part in parts.items() for name, answer in part_by_part(
-        work, make, dict([part]), *arguments, patience=patience).items()}
-
-
-def _work_with(work: Callable[..., Any], make: Callable[[], Contestant], *arguments: Any) -> Any:
-    return work(replace(make(), make=make), *arguments)
 
 
 def wxyz(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, ...]:

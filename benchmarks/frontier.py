@@ -11,7 +11,7 @@ subprocess. Times are read as ratios within a run; the machine is named.
 Errors are against model `exact`. Those of points are in % of the smaller box's longest edge, per
 contact class; those of normals in degrees. Verdicts that differ are contacts missed and contacts
 invented. An engine that returns several points is entered with the best of the ways to make one of
-them. Other engines are judged in subprocesses, where an abort is a finding.
+them.
 """
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from box_contact_ros.core import instruction_sets, native
 from box_contact_ros.solver.mlp import GROUP, load_mlp
 
 from . import output
-from .accuracy import CLASSES, WINNERS, Summary
+from .accuracy import CLASSES, Summary
 from .arguments import report_parser
 from .contestant import (
     CORE_MODELS,
@@ -92,16 +92,15 @@ def odd_answers(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> I
     def oddness(row: FrontierRow, what: str) -> float:
         errors = row.errors
         return {'missed': errors.missed, 'invented': errors.invented,
-                'normal': 0.0 if math.isnan(errors.normal[1]) else errors.normal[1],
-                'exceptions': math.inf if row.failure else row.exceptions}[what]
+                'normal': 0.0 if math.isnan(errors.normal[1]) else errors.normal[1]}[what]
 
     for engine in engines:
         mine = [row for row in rows if row.name == engine.name]
-        for what in ('missed', 'invented', 'normal', 'exceptions'):
+        for what in ('missed', 'invented', 'normal'):
             worst = max(mine, key=lambda row: oddness(row, what))
             amount = oddness(worst, what)
             if amount > (ODD_NORMAL if what == 'normal' else 0.0):
-                yield (f'{engine.name}, {worst.set}: {worst.failure or f"{what} {amount:.3g}"}'
+                yield (f'{engine.name}, {worst.set}: {what} {amount:.3g}'
                        f'{"°" if what == "normal" else ""}. '
                        f'{engine.causes.get(what) or "Cause unknown."}')
 
@@ -128,13 +127,11 @@ def in_short(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> str:
                 number(max(normals, default=math.nan)),
                 f'{sum(row.errors.missed for row in mine.values())} of '
                 f'{sum(row.judged for row in mine.values()):,}',
-                sum(row.errors.invented for row in mine.values()),
-                f'{sum(row.exceptions for row in mine.values())} / '
-                f'{sum(bool(row.failure) for row in mine.values())}'])
+                sum(row.errors.invented for row in mine.values())])
     return markdown_table(
         ['', 'single call, p50 / p99 [µs]', 'batch [ns per pair]', 'best point',
-         'point error p99, containers [%]', 'stacks [%]', 'normal, worst [°]', 'missed', 'invented',
-         'exceptions / aborts'], lines)
+         'point error p99, containers [%]', 'stacks [%]', 'normal, worst [°]', 'missed',
+         'invented'], lines)
 
 
 def sizes_table(rows: Sequence[FrontierRow]) -> str:
@@ -217,8 +214,6 @@ def csv_rows(rows: Sequence[FrontierRow], contestants: Sequence[Contestant],
         for choice, errors in row.choices.items():
             nothing = {'all': Summary(0, *[math.nan] * 4)}
             for label, point in (errors.points or nothing).items():
-                if label in WINNERS:
-                    continue
                 yield {
                     'contestant': row.name, 'set': row.set, 'point': choice, 'class': label,
                     'contacts': point.pairs, 'point_p50': point.p50, 'point_p99': point.p99,
@@ -228,8 +223,7 @@ def csv_rows(rows: Sequence[FrontierRow], contestants: Sequence[Contestant],
                     **dict(zip(('call_by_exact', 'batch_by_exact'), by_exact(row, rows))),
                     'judged': row.judged, 'normal_p99': errors.normal[0],
                     'normal_worst': errors.normal[1], 'missed': errors.missed,
-                    'invented': errors.invented, 'exceptions': row.exceptions,
-                    'failure': row.failure, **here[packages[row.name]],
+                    'invented': errors.invented, **here[packages[row.name]],
                     'instruction_set': row.instruction_set}
 
 

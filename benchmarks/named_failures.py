@@ -22,7 +22,7 @@ from box_contact_ros.core import native
 
 from . import output
 from .arguments import report_parser
-from .contestant import Contestant, Manifold, ours, packages_of, part_by_part
+from .contestant import Contestant, Manifold, ours, packages_of
 from .engines import installed
 from .judge import PRESSED, judge, two_touches
 from .pose_sets import Pairs
@@ -31,7 +31,6 @@ from .stability import GATED, MODELS
 FILE = Path(__file__).with_suffix('.yaml')
 SINGLE = 1e-6  # error that float32 costs, of the size
 PREFERENCE = 0.06  # share of the depth by which engines may prefer a face to an edge, 5 % usually
-PATIENCE = 180.0  # for an engine's answers in a subprocess [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,22 +101,8 @@ def fault(one: NamedFailure, found: Manifold, bound: float) -> str:
 def replay(engine: Contestant, failures: Mapping[str, NamedFailure], bounds: Mapping[str, float],
            ) -> dict[str, str]:
     """Return by id what is wrong with an engine's answer, '' if nothing."""
-    found = {}
-    for name, one in failures.items():
-        try:
-            answer = engine.read(engine.prepare(one.pairs)[0]())
-            found[name] = fault(one, answer, bounds[name])
-        except Exception as error:  # of any library; what it raised is the finding
-            found[name] = f'raised {type(error).__name__}'
-    return found
-
-
-def replay_apart(engine: Contestant, failures: Mapping[str, NamedFailure]) -> dict[str, str]:
-    """Do as `replay`, with the bounds of other engines, in a subprocess if it is another's."""
-    bounds = {name: one.lenience for name, one in failures.items()}
-    if engine.make is None:
-        return replay(engine, failures, bounds)
-    return part_by_part(replay, engine.make, failures, bounds, patience=PATIENCE)
+    return {name: fault(one, engine.read(engine.prepare(one.pairs)[0]()), bounds[name])
+            for name, one in failures.items()}
 
 
 def table(failures: Mapping[str, NamedFailure], found: Mapping[str, Mapping[str, str]]) -> str:
@@ -138,7 +123,8 @@ def main(args: Sequence[str] | None = None) -> int:
     folder, failures = output.results_folder(parser, options), load()
     rivals, missing = ([], []) if options.quick else installed()
     engines = [*map(ours, MODELS), *rivals]
-    found = {engine.name: replay_apart(engine, failures) for engine in engines}
+    bounds = {name: one.lenience for name, one in failures.items()}
+    found = {engine.name: replay(engine, failures, bounds) for engine in engines}
     passed = '; '.join(f'{name} {sum(not fault for fault in faults.values())}'
                        for name, faults in found.items())
     text = output.page(

@@ -14,7 +14,7 @@ import numpy as np
 from box_contact_ros.core import native
 
 from .accuracy import Summary, by_part, classify
-from .contestant import APART, Contestant, chosen, part_by_part
+from .contestant import Contestant, chosen
 from .errors import degrees_between, point_errors
 from .output import percentiles
 from .pose_sets import Generator, Pairs, drawn
@@ -25,7 +25,6 @@ FEW_PAIRS = 17
 a median is the time of one pair, not between two that may differ tenfold."""
 LEAST_PAIRS = 10  # pairs judged, whatever they take
 ROUND_SECONDS = 0.025  # least time of a round's single calls; a round ends with its last pair
-PATIENCE = 120.0  # for an engine's answers in a subprocess [s]
 LONGEST_RUN = 3600.0  # of a subprocess with one instruction set [s]
 VERDICT = 1e-9
 """Least gap or depth, of the size, at which verdicts and normals are judged. At exact touch both
@@ -43,13 +42,10 @@ class Plan:
     as others, so the median of a round that ends by the clock depends on how many it reached."""
     seconds: float  # that a contestant has on a set to be judged
     rounds: int
-    subprocesses: bool  # whether engines are judged in subprocesses, so that an abort is a finding
 
 
-FULL = Plan(batch_pairs=20_000, single_pairs=1_000, timed_pairs=200, seconds=1.0, rounds=20,
-            subprocesses=True)
-QUICK = Plan(batch_pairs=1_000, single_pairs=40, timed_pairs=10, seconds=0.05, rounds=2,
-             subprocesses=False)
+FULL = Plan(batch_pairs=20_000, single_pairs=1_000, timed_pairs=200, seconds=1.0, rounds=20)
+QUICK = Plan(batch_pairs=1_000, single_pairs=40, timed_pairs=10, seconds=0.05, rounds=2)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +65,6 @@ class Answers:
     colliding: np.ndarray  # (n,)
     normals: np.ndarray  # (n, 3)
     points: dict[str, np.ndarray]  # (n, 3), by choice
-    exceptions: int = 0  # pairs at which the engine raised one; they count as apart
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,8 +80,6 @@ class FrontierRow:
     batch: float  # p50 of a pair in a batch [ns]
     rounds: np.ndarray  # (rounds, 2): the median single call, and a pair in a batch [ns]
     choices: dict[str, SetErrors]  # by the way in which a point was made
-    exceptions: int = 0
-    failure: str = ''  # what ended the engine before its answers, if anything
 
     @property
     def best(self) -> str:
@@ -110,7 +103,7 @@ def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.n
     clear = np.abs(truth.separation) > VERDICT * pairs.size
     rows = np.flatnonzero(both & clear & np.isfinite(normals).all(axis=1))
     angles = degrees_between(normals[rows], truth.normal[rows])
-    return SetErrors(points=by_part(errors, *classify(touching)),
+    return SetErrors(points=by_part(errors, classify(touching)),
                      normal=percentiles(angles, 99, 100),
                      missed=int((truth.colliding & ~colliding & clear).sum()),
                      invented=int((colliding & ~truth.colliding & clear).sum()))
@@ -119,18 +112,14 @@ def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.n
 def ask(engine: Contestant, pairs: Pairs, plan: Plan) -> Answers:
     """Return answers to as many pairs as there is time to ask."""
     if engine.solve and engine.prepare_batch:
-        contacts, _ = engine.solve(pairs)
+        contacts = engine.solve(pairs)
         return Answers(colliding=contacts.colliding, normals=contacts.normal,
                        points={engine.choices[0]: contacts.point})
     pairs = pairs.rows(slice(plan.single_pairs))
-    asked, exceptions, began, step = [], 0, time.monotonic(), _at_once(pairs)
+    asked, began, step = [], time.monotonic(), _at_once(pairs)
     for first in range(0, len(pairs.size), step):
         for call in engine.prepare(pairs.rows(slice(first, first + step))):
-            try:
-                answer = engine.read(call())
-            except Exception:  # of any kind, as the library is a stranger's: it is counted
-                exceptions += 1
-                answer = APART
+            answer = engine.read(call())
             asked.append([chosen(answer, choice) for choice in engine.choices])
         if time.monotonic() - began > plan.seconds and len(asked) >= LEAST_PAIRS:
             break
@@ -138,7 +127,7 @@ def ask(engine: Contestant, pairs: Pairs, plan: Plan) -> Answers:
         colliding=np.array([answers[0].touching for answers in asked]),
         normals=np.array([answers[0].normal for answers in asked]),
         points={choice: np.array([answers[k].point for answers in asked])
-                for k, choice in enumerate(engine.choices)}, exceptions=exceptions)
+                for k, choice in enumerate(engine.choices)})
 
 
 def _at_once(pairs: Pairs) -> int:
@@ -147,17 +136,9 @@ def _at_once(pairs: Pairs) -> int:
     return FEW_PAIRS if len(sizes) > FEW_PAIRS else len(pairs.size)
 
 
-def answers_of(engine: Contestant, sets: Mapping[str, Pairs], plan: Plan,
-               ) -> dict[str, Answers | str]:
-    """Return answers by set, or what ended the engine; sets with boxes not for it are left out."""
-    if engine.make is None or not plan.subprocesses:
-        return _ask_all(engine, sets, plan)
-    few = {name: pairs.rows(slice(plan.single_pairs)) for name, pairs in sets.items()}
-    return part_by_part(_ask_all, engine.make, few, plan, patience=PATIENCE)
-
-
-def _ask_all(engine: Contestant, sets: Mapping[str, Pairs], plan: Plan) -> dict[str, Answers | str]:
-    answers: dict[str, Answers | str] = {}
+def answers_of(engine: Contestant, sets: Mapping[str, Pairs], plan: Plan) -> dict[str, Answers]:
+    """Return answers by set; sets with boxes not for the contestant are left out."""
+    answers = {}
     for name, pairs in sets.items():
         try:
             answers[name] = ask(engine, pairs, plan)
@@ -170,18 +151,14 @@ def _ask_all(engine: Contestant, sets: Mapping[str, Pairs], plan: Plan) -> dict[
 class Trial:
     """A contestant on a set: its answers, and its times, gathered in rounds."""
 
-    def __init__(self, engine: Contestant, name: str, pairs: Pairs, answers: Answers | str,
+    def __init__(self, engine: Contestant, name: str, pairs: Pairs, answers: Answers,
                  plan: Plan) -> None:
-        """Prepare the calls; an engine that failed is not timed."""
+        """Prepare the calls."""
         self.name, self.set = engine.name, name
-        self._pairs, self._failure = pairs, answers if isinstance(answers, str) else ''
-        self._answers = answers if isinstance(answers, Answers) else Answers(
-            colliding=np.zeros(0, bool), normals=np.zeros((0, 3)),
-            points={choice: np.zeros((0, 3)) for choice in engine.choices})
+        self._pairs, self._answers = pairs, answers
         timed = pairs.rows(slice(plan.timed_pairs))
-        works = not self._failure and not self._answers.exceptions
-        self._calls = engine.prepare(timed.rows(slice(_at_once(timed)))) if works else []
-        self._batch = engine.prepare_batch(pairs) if works and engine.prepare_batch else None
+        self._calls = engine.prepare(timed.rows(slice(_at_once(timed))))
+        self._batch = engine.prepare_batch(pairs) if engine.prepare_batch else None
         for call in self._calls:  # what is made at a pair's first call is not timed
             call()
         self._singles: list[np.ndarray] = []
@@ -204,8 +181,7 @@ class Trial:
             batch=float(np.median(self._batches)), rounds=np.column_stack([
                 [percentiles(times, 50)[0] for times in self._singles], self._batches]),
             choices={choice: judge(first, answers.colliding, answers.normals, points)
-                     for choice, points in answers.points.items()},
-            exceptions=answers.exceptions, failure=self._failure)
+                     for choice, points in answers.points.items()})
 
 
 def measure_all(engines: Sequence[Contestant], generators: Mapping[str, Generator], *, seed: int,

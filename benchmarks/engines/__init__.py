@@ -8,7 +8,6 @@ Each `*_engines.py` imports one library and lists its `ENGINES`, functions that 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from importlib import import_module
 
 from ..contestant import Contestant
@@ -24,7 +23,7 @@ def installed(modules: Iterable[str] = tuple(RIVALS)) -> tuple[list[Contestant],
     for module in modules:
         try:
             makers = import_module(f'.{module}_engines', __name__).ENGINES
-            found += [replace(make(), make=make) for make in makers]
+            found += [make() for make in makers]
         except ImportError as error:
             missing.append(f'{error.name or module} is not installed ({RIVALS[module]})')
     return found, missing

@@ -34,7 +34,7 @@ def errors(model: Contestant, some: Placements) -> tuple[float, float]:
     a, b = dataset.as_poses(some.inputs)
     b[:, :3] -= PRESSED * dataset.query(some).normal
     sizes = np.tile(CUBE, (len(a), 1))
-    found, _ = model.solve(Pairs(a, b, sizes, sizes))
+    found = model.solve(Pairs(a, b, sizes, sizes))
     return (1e3 * float(distances(found.point, some.point).mean()),
             float(degrees_between(found.normal, some.normal).mean()))
 

@@ -164,7 +164,7 @@ def time_batch(model: Contestant, patterns: Pairs) -> float:
 
 def judge_network(model: Contestant, patterns: Pairs, exact: Contacts) -> Row:
     """Return a network's row on touching patterns."""
-    found, _ = model.solve(patterns)
+    found = model.solve(patterns)
     return {'model': model.name, 'regime': 'touching',
             'batch_mean_ms': time_batch(model, patterns),
             'point_error_mean_m': float(distances(found.point, exact.point).mean()),

@@ -14,10 +14,10 @@ import pytest
 
 from benchmarks import accuracy, searched
 from benchmarks.accuracy import CLASSES
-from benchmarks.contestant import Solved, ours
+from benchmarks.contestant import ours
 from benchmarks.errors import ContactErrors, contact_errors
 from benchmarks.pose_sets import CUBE, LOADS, SETS, Pairs
-from box_contact_ros import ContactSolver
+from box_contact_ros import Contacts, ContactSolver
 
 
 def on_a_cube(turn: np.ndarray, depth: float = 1e-3) -> Pairs:
@@ -42,9 +42,7 @@ def test_features_that_meet_a_face(turn: np.ndarray, expected: str) -> None:
     pairs = on_a_cube(turn)
     swapped = Pairs(pairs.pose_b, pairs.pose_a, pairs.size_b, pairs.size_a)
     for one in (pairs, swapped):
-        classes, winners = accuracy.classify(one)
-        assert CLASSES[classes[0]] == expected
-        assert winners[0] == 0
+        assert CLASSES[accuracy.classify(one)[0]] == expected
 
 
 def test_crossing_edges() -> None:
@@ -54,8 +52,7 @@ def test_crossing_edges() -> None:
     height = 2.0 * np.sqrt(0.5) * CUBE[2] - 1e-3
     pairs = Pairs(np.concatenate([[0, 0, 0], lower])[None],
                   np.concatenate([[0.1, 0.2, height], upper])[None], size, size)
-    classes, winners = accuracy.classify(pairs)
-    assert CLASSES[classes[0]] == 'edge-edge' and winners[0] == 1
+    assert CLASSES[accuracy.classify(pairs)[0]] == 'edge-edge'
 
 
 # --- rows -----------------------------------------------------------------------------------------
@@ -97,8 +94,6 @@ def test_quick_run(quick: Path) -> None:
         (name, quantity) for name in SETS | LOADS for quantity in ContactErrors._fields]
     for row in rows:
         assert float(row['p99']) <= P99[row['quantity']]
-        if row['quantity'] == 'point':
-            assert float(row['outside']) <= 0.02
 
 
 def test_searched_for_the_worst(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -124,9 +119,9 @@ def test_points_and_depths_of_a_known_contestant_have_known_errors() -> None:
     """Points 1 cm off a cube of 2 m: 0.5 % of its edge, in every class."""
     exact = ours('exact')
 
-    def shifted(pairs: Pairs) -> Solved:
-        contacts = exact.solve(pairs).contacts
-        return Solved(contacts._replace(point=contacts.point + [0.0, 0.01, 0.0]), 7)
+    def shifted(pairs: Pairs) -> Contacts:
+        contacts = exact.solve(pairs)
+        return contacts._replace(point=contacts.point + [0.0, 0.01, 0.0])
 
     pairs = SETS['random cubes'](np.random.default_rng(1), 100)
     row = accuracy.measure(replace(exact, name='mlp', solve=shifted), 'random cubes', pairs,

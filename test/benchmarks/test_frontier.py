@@ -7,15 +7,13 @@ from __future__ import annotations
 import csv
 import dataclasses
 import math
-import os
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from benchmarks import frontier, trials
-from benchmarks.contestant import Contestant, Manifold, chosen, ours
+from benchmarks.contestant import APART, Contestant, Manifold, chosen, ours
 from benchmarks.engines import installed
 from benchmarks.output import read_csv
 from benchmarks.pose_sets import CONTAINER, SETS, Pairs, apart
@@ -109,39 +107,25 @@ def test_boxes_apart(engine: Contestant) -> None:
     assert not touching and np.isnan([normal, point]).all()
 
 
-def aborting() -> Contestant:
-    """Return an engine that aborts on cubes, raises on containers, and answers on others."""
+def test_contacts_that_an_engine_misses_are_odd() -> None:
+    """All of containers and none of cubes; the cause is named where it is known."""
     exact = ours('exact')
-
-    def boxes(p: np.ndarray, q: np.ndarray) -> Callable:
-        if tuple(p) == (2.0, 2.0, 2.0):
-            os.abort()
-
-        def call(pose_a: np.ndarray, pose_b: np.ndarray) -> None:
-            raise RuntimeError('planted')
-
-        return call if p[0] > 10.0 else exact.boxes(p, q)
-
-    return dataclasses.replace(exact, name='aborting', boxes=boxes, prepare_batch=None,
-                               make=aborting)
-
-
-def test_aborts_and_exceptions_are_findings() -> None:
-    sets = {name: SETS[name](np.random.default_rng(1), 30)
-            for name in ('random cubes', 'random sizes', 'containers')}
-    plan, engine, row = dataclasses.replace(trials.QUICK, subprocesses=True), aborting(), {}
-    found = trials.answers_of(engine, sets, plan)
-    for name, pairs in sets.items():
-        trial = trials.Trial(engine, name, pairs, found[name], plan)
-        take_turns([trial.time], plan.rounds)
-        row[name] = trial.row()
-    assert row['random cubes'].failure == 'ended by signal 6'
-    assert (row['random cubes'].judged, row['random sizes'].failure) == (0, '')
-    assert row['random sizes'].errors.points['all'].worst == 0.0
-    assert (row['random sizes'].rounds[:, 0] > 0.0).all() and row['random sizes'].calls > 30
-    assert row['containers'].exceptions == row['containers'].judged > 10
-    missed, failure = frontier.odd_answers(list(row.values()), [engine])
-    assert 'ended by signal 6' in failure and 'containers: missed 30' in missed
+    engine = dataclasses.replace(exact, name='blind', causes={'missed': 'Planted.'}, boxes=lambda
+                                 p, q: (lambda a, b: None) if p[0] > 10.0 else exact.boxes(p, q),
+                                 read=lambda found: exact.read(found) if found else APART,
+                                 prepare_batch=None)
+    rows = []
+    for name in ('random cubes', 'containers'):
+        pairs = SETS[name](np.random.default_rng(1), 30)
+        trial = trials.Trial(engine, name, pairs, trials.ask(engine, pairs, trials.QUICK),
+                             trials.QUICK)
+        take_turns([trial.time], trials.QUICK.rounds)
+        rows.append(trial.row())
+    cubes, containers = rows
+    assert cubes.errors.points['all'].worst == 0.0 and (cubes.rounds[:, 0] > 0.0).all()
+    assert containers.errors.missed == containers.judged > 10 and cubes.calls > 30
+    line, = frontier.odd_answers(rows, [engine])
+    assert line == f'blind, containers: missed {containers.judged}. Planted.'
 
 
 def test_the_centroid_of_a_polygon() -> None:
