@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from box_contact_ros.core import DEPTH_FLOOR, native
+from box_contact_ros.core import DEPTH_FLOOR
 from box_contact_ros.solver.arguments import model_name, within
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.paper import turned
@@ -237,10 +237,10 @@ def main(args: Sequence[str] | None = None) -> int:
     except WeightsError as error:
         print(f'accuracy: {error}', file=sys.stderr)
         return 1
-    output.write_csv(folder / 'accuracy.csv', csv_rows(rows), about=output.machine(native))
+    output.write_csv(folder / 'accuracy.csv', csv_rows(rows), about=output.machine())
     (folder / 'accuracy.md').write_text(output.page(
         'benchmarks/pages/accuracy', command=output.command_line('benchmarks.accuracy', args),
-        machine=output.machine(native), seed=options.seed,
+        machine=output.machine(), seed=options.seed,
         error_table=error_table(rows),
         point_classes=class_table(rows)), encoding='utf-8')
     draw(folder / 'accuracy.png', rows)

@@ -189,7 +189,7 @@ def page(rows: Sequence[FrontierRow], models: Sequence[Contestant], engines: Seq
           if row.instruction_set == native.instruction_set}
     return output.page(
         'benchmarks/pages/frontier', command=command,
-        machine=output.machine(native, packages_of([*models, *engines])),
+        machine=output.machine(packages_of([*models, *engines])),
         skipped=''.join(f'\n\nLeft out: {line}.' for line in missing),
         in_short=in_short(rows, engines), sizes=sizes_table(rows), odd='\n'.join(
             f'{place}. {line}' for place, line in enumerate(odd_answers(rows, engines), start=1)
@@ -208,7 +208,7 @@ def csv_rows(rows: Sequence[FrontierRow], contestants: Sequence[Contestant],
              ) -> Iterator[dict[str, object]]:
     """Yield a row per contestant, set, choice and class; times [ns], errors [%], normals [deg]."""
     packages = {engine.name: engine.package for engine in contestants}
-    here = {package: asdict(output.machine(native, ['numpy', *filter(None, [package])]))
+    here = {package: asdict(output.machine(['numpy', *filter(None, [package])]))
             for package in {*packages.values()}}
     for row in rows:
         for choice, errors in row.choices.items():

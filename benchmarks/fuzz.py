@@ -357,9 +357,9 @@ def main(args: Sequence[str] | None = None) -> int:
         {'class': t.name, 'model': t.model, 'pairs': t.pairs, 'contacts': t.contacts,
          'near_touch': t.near_touch,
          'worst_depth_by_tolerance': t.worst_depth, 'digest': t.digest, **t.faults}
-        for t in tallies], digits=3, about=output.machine(native))
+        for t in tallies], digits=3, about=output.machine())
     broken = sum(tally.faults.total() for tally in tallies)
-    print(f'\n{broken} faults, seed {options.seed}, {output.machine(native)}')
+    print(f'\n{broken} faults, seed {options.seed}, {output.machine()}')
     return int(broken > 0)
 
 

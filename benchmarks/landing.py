@@ -25,7 +25,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from tqdm import tqdm
 
-from box_contact_ros.core import native
 from box_contact_ros.demo.crane import CraneScenario
 from box_contact_ros.demo.landing import CORNER_SPEED_LIMIT, LandingRecord
 from box_contact_ros.solver.pose import rotation_matrix
@@ -184,7 +183,7 @@ def page(outcomes: Sequence[Outcome], command: str) -> str:
     """Return the Markdown page."""
     patches = [outcome for outcome in outcomes if outcome.way in PATCHES]
     return output.page(
-        'benchmarks/pages/landing', command=command, machine=output.machine(native, PACKAGES),
+        'benchmarks/pages/landing', command=command, machine=output.machine(PACKAGES),
         all=len(patches), good=sum(outcome.as_expected for outcome in patches),
         grid=grid_table(outcomes), added=added_table(outcomes))
 
@@ -288,7 +287,7 @@ def main(args: Sequence[str] | None = None) -> int:
     shown, = (landing.scenario for landing in planned if landing.name == f'grid {SHOWN}')
     draw(folder / 'landing.png', shown)
     output.write_csv(folder / 'landing.csv', map(csv_row, outcomes),
-                     about=output.machine(native, PACKAGES))
+                     about=output.machine(PACKAGES))
     command = output.command_line('benchmarks.landing', args)
     (folder / 'landing.md').write_text(page(outcomes, command), encoding='utf-8')
     print(f'{grid_table(outcomes)}\n\n{added_table(outcomes)}')

@@ -18,8 +18,6 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from box_contact_ros.core import native
-
 from . import output
 from .arguments import report_parser
 from .contestant import Contestant, Manifold, ours, packages_of
@@ -130,7 +128,7 @@ def main(args: Sequence[str] | None = None) -> int:
     text = output.page(
         'benchmarks/pages/named_failures',
         command=output.command_line('benchmarks.named_failures', args), count=len(failures),
-        machine=output.machine(native, packages_of(engines)), table=table(failures, found),
+        machine=output.machine(packages_of(engines)), table=table(failures, found),
         passed=passed, skipped=''.join(f'\n\nLeft out: {line}.' for line in missing))
     print(text)
     (folder / 'named_failures.md').write_text(text, encoding='utf-8')

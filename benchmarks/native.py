@@ -28,7 +28,7 @@ from box_contact_ros.core import FORCE, instruction_sets, native
 
 from . import output
 from .arguments import report_parser
-from .output import markdown_table, number, percentiles
+from .output import markdown_table, percentiles
 from .pose_sets import FLUSH, LOADS, SETS, Pairs, drawn
 from .timing import by_round, pinned, usable_cores
 
@@ -219,25 +219,6 @@ def sets_table(by_set: Mapping[str, OnSet]) -> str:
         for name in next(iter(by_set.values()))])
 
 
-def answers_table(by_set: Mapping[str, OnSet]) -> str:
-    """Return how the answers of other engines on all sets differ from those of `exact`."""
-    lines = []
-    for name in next(iter(by_set.values())):
-        if name.startswith(('exact', 'mlp')):
-            continue
-        mine = {of_set: times[name] for of_set, times in by_set.items()}
-        worst = max(mine, key=lambda of_set: np.nan_to_num(mine[of_set].depth_errors[2]))
-        lines.append([
-            name, *[f'{sum(getattr(one, count) for one in mine.values()):,}'
-                    for count in ('judged', 'missed', 'invented')],
-            *['/'.join(map(number, mine[of_set].depth_errors))
-              for of_set in ('containers', 'stacks')],
-            f'{number(mine[worst].depth_errors[2])}, {worst}'])
-    return markdown_table(
-        ['', 'judged', 'missed', 'invented', 'depth error on containers, p50/p99/worst [%]',
-         'on stacks [%]', 'worst of all sets [%]'], lines)
-
-
 def slowest_table(times: Mapping[str, np.ndarray]) -> str:
     """Return a row per set: the times of single contacts, and the slowest by the median of all."""
     of_all = np.concatenate(list(times.values()), axis=1)
@@ -312,15 +293,15 @@ def main(args: Sequence[str] | None = None) -> int:
         if name not in missing)]
     text = output.page(
         'benchmarks/pages/native', command=output.command_line('benchmarks.native', args),
-        machine=output.machine(native), rounds=rounds, calls=calls, pairs=pairs, tables=tables,
+        machine=output.machine(), rounds=rounds, calls=calls, pairs=pairs, tables=tables,
         slowest=slowest_table(contacts[names[-1]]), slowest_set=names[-1], passes=passes,
-        answers=answers_table(found[names[-1]]), code=calls_shown(missing), clear=CLEAR,
+        code=calls_shown(missing),
         engines=', '.join(versions), missing=''.join(
             f'\n\nLeft out: {name.capitalize()} is not installed with its headers '
             f'(`{OPTIONAL[name]}`).' for name in missing))
     (folder / 'native.md').write_text(text, encoding='utf-8')
     output.write_csv(folder / 'native.csv', [*csv_rows(found), *contact_rows(contacts)],
-                     about=output.machine(native))
+                     about=output.machine())
     print(tables)
     return 0
 

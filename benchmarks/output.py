@@ -14,9 +14,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, astuple, dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+
+from box_contact_ros.core import native
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -144,13 +146,6 @@ def percentiles(values: Sequence[float] | np.ndarray, *percents: float) -> tuple
     return tuple(float(value) for value in np.percentile(values, percents))
 
 
-class Core(Protocol):
-    """What the machine's description asks the native core: `box_contact_ros.core.native`."""
-
-    instruction_set: str
-    compiler: str
-
-
 @dataclass(frozen=True, kw_only=True)
 class Machine:
     """What a figure was measured on; `dataclasses.asdict` gives the columns of a CSV file."""
@@ -164,11 +159,11 @@ class Machine:
         return ', '.join(astuple(self))
 
 
-def machine(core: Core, packages: Sequence[str] = ('numpy',)) -> Machine:
-    """Return this machine's description."""
-    compiler = core.compiler
+def machine(packages: Sequence[str] = ('numpy',)) -> Machine:
+    """Return this machine's description, with the versions of packages."""
+    compiler = native.compiler
     return Machine(
-        processor=processor(), instruction_set=core.instruction_set,
+        processor=processor(), instruction_set=native.instruction_set,
         compiler=f'GCC {compiler}' if compiler[:1].isdigit() else compiler,
         versions=versions(packages))
 

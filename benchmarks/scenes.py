@@ -21,7 +21,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from box_contact_ros import Box, ContactSolver, Pair, Scene, SceneSolver, read_scene
-from box_contact_ros.core import native
 from box_contact_ros.scene.scene_solver import EVERY_PAIR
 
 from . import output
@@ -236,7 +235,7 @@ def main(args: Sequence[str] | None = None) -> int:
     parser = report_parser('scenes', __doc__, quick='few boxes and rounds, to try it out',
                            out='scenes.md, scenes.csv')
     options = parser.parse_args(args)
-    folder, machine = output.results_folder(parser, options), output.machine(native, PACKAGES)
+    folder, machine = output.results_folder(parser, options), output.machine(PACKAGES)
     rounds = QUICK_ROUNDS if options.quick else ROUNDS
     grown = grow(QUICK_GROWTH if options.quick else GROWTH, rounds)  # before MuJoCo takes memory
     compared = [

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from box_contact_ros.core import native
 from box_contact_ros.solver.arguments import within
 from box_contact_ros.solver.contact_solver import ContactSolver
 
@@ -109,10 +108,10 @@ def main(args: Sequence[str] | None = None) -> int:
     seconds = 60.0 * minutes / len(sets)
     rows = [search(name, make, [options.seed, place], seconds) for place, (name, make)
             in enumerate(tqdm(sets.items(), desc='searched', unit='set'))]
-    output.write_csv(folder / 'searched.csv', csv_rows(rows, seconds), about=output.machine(native))
+    output.write_csv(folder / 'searched.csv', csv_rows(rows, seconds), about=output.machine())
     (folder / 'searched.md').write_text(output.page(
         'benchmarks/pages/searched', command=output.command_line('benchmarks.searched', args),
-        machine=output.machine(native), seed=options.seed, minutes=minutes, seconds=seconds,
+        machine=output.machine(), seed=options.seed, minutes=minutes, seconds=seconds,
         table=table(rows)), encoding='utf-8')
     print(table(rows))
     return 0

@@ -18,8 +18,6 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from box_contact_ros.core import native
-
 from . import output
 from .arguments import report_parser
 from .contestant import CORE_MODELS, Contestant, ours
@@ -146,7 +144,7 @@ def main(args: Sequence[str] | None = None) -> int:
     parser = report_parser('speed', __doc__, quick='few calls and rounds, to try it out', seed=1,
                            out='speed.md, speed_cold.csv')
     options = parser.parse_args(args)
-    folder, machine = output.results_folder(parser, options), output.machine(native, PACKAGES)
+    folder, machine = output.results_folder(parser, options), output.machine(PACKAGES)
     calls, rounds, pairs, count = (
         (QUICK_COLD_CALLS, QUICK_ROUNDS, QUICK_BATCH, QUICK_STARTS) if options.quick
         else (COLD_CALLS, ROUNDS, BATCH, STARTS))

@@ -18,7 +18,6 @@ from functools import partial
 
 import numpy as np
 
-from box_contact_ros.core import native
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 
@@ -138,7 +137,7 @@ def main(args: Sequence[str] | None = None) -> int:
         solver = ContactSolver((1, 1, 1), (1, 1, 1), model=model)
         rows += [examine(model, family, cases[family], partial(Pairs.contacts, solver=solver))
                  for family in tqdm(families, desc=f'stability, {model}', unit='family')]
-    about = output.machine(native, ('numpy', 'python-fcl'))
+    about = output.machine(('numpy', 'python-fcl'))
     output.write_csv(folder / 'stability.csv', map(asdict, rows), digits=4, about=about)
     by = {model: [row for row in rows if row.model == model] for model in options.models}
     summary = table([over_all(mine) for mine in by.values()])

@@ -24,7 +24,6 @@ from pathlib import Path
 import numpy as np
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.core import native
 from box_contact_ros.scene.laws import GRAVITY
 from box_contact_ros.solver.pose import rotation_matrix
 
@@ -370,7 +369,7 @@ def main(args: Sequence[str] | None = None) -> int:
         [[name, *(f'{value:.3g}' for field in ('deepest', 'moved', 'cost')
                   for way in (ours, MUJOCO) for value in [getattr(ways[way], field)])]
          for name, ways in found.items()])
-    about = output.machine(native, ('numpy', 'mujoco'))
+    about = output.machine(('numpy', 'mujoco'))
     output.write_csv(folder / 'stacks.csv', (
         {'scene': name, 'way': way, **asdict(each)}
         for name, ways in found.items() for way, each in ways.items()), digits=3, about=about)

@@ -11,8 +11,6 @@ import sys
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
-from box_contact_ros.core import native
-
 from .. import output
 from ..arguments import report_parser
 from . import tables
@@ -24,7 +22,7 @@ QUICK = 10  # `--quick` looks at every tenth pattern
 def report(numbers: Collection[int], drawn: Collection[int], folder: Path, *, quick: bool) -> str:
     """Return the page with some of the tables and figures; pictures and CSV go to `folder`."""
     note = f' Quick run: every {QUICK}th pattern only, and fewer for the soup.' if quick else ''
-    sections = [output.page('benchmarks/paper/pages/page', machine=output.machine(native),
+    sections = [output.page('benchmarks/paper/pages/page', machine=output.machine(),
                             note=note)]
     if {1, 2} & set(numbers):
         sections += tables.sections_1_and_2(numbers, QUICK if quick else 1)
@@ -44,7 +42,7 @@ def report(numbers: Collection[int], drawn: Collection[int], folder: Path, *, qu
                              for name in ('as written', 'dropped'))
         result = soup_tables.measure(written, touching, quick=quick)
         output.write_csv(folder / 'paper_soup.csv', result.rows,
-                         about=output.machine(native, ('numpy', 'python-fcl')))
+                         about=output.machine(('numpy', 'python-fcl')))
         if 10 in drawn:
             soup_tables.draw_figure_10(result, folder / 'paper_figure_10.png')
         sections += [section(result) for number, section in soup_tables.SECTIONS.items()

@@ -25,7 +25,6 @@ import numpy as np
 import torch
 from tqdm import tqdm
 
-from box_contact_ros.core import native
 from box_contact_ros.solver.arguments import within
 
 from ..arguments import report_parser
@@ -209,7 +208,7 @@ def write_table(path: Path, results: Sequence[Search]) -> None:
             rows.append({'search': search.name, 'number': entry.pop('number'), **units,
                          'multiply_adds': search.cost(one), **entry, 'rungs': len(scores),
                          **scores[-1]})
-    write_csv(path, rows, about=machine(native, PACKAGES))
+    write_csv(path, rows, about=machine(PACKAGES))
 
 
 def plot(path: Path, results: Sequence[Search]) -> None:
@@ -248,7 +247,7 @@ def main(args: Sequence[str] | None = None) -> int:
         search.run()
     made = (f'Made by `{command_line("benchmarks.paper.search", args)}` in '
             f'{(time.monotonic() - began) / 60.0:.1f} minutes on '
-            f'{machine(native, PACKAGES)}.')
+            f'{machine(PACKAGES)}.')
     text = page('benchmarks/paper/pages/search', made=made,
                 total=sum(len(search.candidates) for search in results), external=' and '.join(
             f'{len(search.sets["external"]):,} patterns' for search in results))

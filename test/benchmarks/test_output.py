@@ -53,17 +53,17 @@ def test_percentiles() -> None:
 
 
 def test_a_machine_names_all_that_a_time_depends_on() -> None:
-    found = output.machine(native, ('numpy', 'no-such-package'))
+    found = output.machine(('numpy', 'no-such-package'))
     assert found.instruction_set == native.instruction_set
     assert native.compiler in found.compiler and f'numpy {np.__version__}' in found.versions
     assert all(value and value in str(found) for value in asdict(found).values())
-    assert str(output.machine(native)) == (
+    assert str(output.machine()) == (
         f'{output.processor()}, {found.instruction_set}, {found.compiler}, {output.versions()}')
 
 
 def test_rows_name_the_machine(tmp_path: Path) -> None:
     """At their end, all its columns."""
-    about = output.machine(native, ('numpy',))
+    about = output.machine(('numpy',))
     output.write_csv(tmp_path / 'a.csv', [{'x': 1}, {'x': 2}], about=about)
     with (tmp_path / 'a.csv').open() as file:
         rows = list(csv.DictReader(file))
