@@ -30,7 +30,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from box_contact_ros.core import FEATURES, OUTPUTS, UNITS_MAX, native
+from box_contact_ros.core import DEPTH_FLOOR, FEATURES, OUTPUTS, UNITS_MAX, native
 from box_contact_ros.solver.arguments import within
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
@@ -40,7 +40,6 @@ from box_contact_ros.solver.weights_file import Network
 
 from . import judge, output
 from .arguments import add_models, report_parser
-from .patches import mlp_faults, patch_faults
 from .pose_sets import (
     CONTAINER,
     HIGH_CUBE,
@@ -59,6 +58,13 @@ MODELS = ('mlp', 'exact')
 ALONE = 50  # one row of so many is asked once more, alone
 UNIT = (1.0, 1.0, 1.0)
 SCALES = (1e-2, 1e4)  # of random weights
+SMOOTH = 2.0**-46
+"""How far below zero an eigenvalue of `mlp` may be [of the trace]: roundings."""
+EXACT = 1e-9
+"""The same of `exact`, whose sums cancel; or SLIVER times size by depth, if that is more."""
+SLIVER = 1e-15
+OUTSIDE = 2.0**-43
+"""How far a point may be outside the bounds, of the size and the coordinates: roundings."""
 
 SWAP, SINGLE = 1 << 20, 1 << 21
 GATES = judge.GATES | {SWAP: 'changed by a swap', SINGLE: 'not its single call'}
@@ -189,6 +195,54 @@ def _brought_together(rng: np.random.Generator, axes: np.ndarray, size_a: np.nda
 def _axes(rng: np.random.Generator, n: int) -> np.ndarray:
     axes = rng.normal(size=(n, 3))
     return axes / np.linalg.norm(axes, axis=1, keepdims=True)
+
+
+# --- faults of volumes and covariances ------------------------------------------------------------
+
+def patch_faults(pairs: Pairs, found: Contacts) -> np.ndarray:
+    """Return sums (n,) of the faults of any model's patches; none where it gives no patch."""
+    faults = np.zeros(len(found.colliding), dtype=np.int64)
+    rows = np.flatnonzero(found.colliding)
+    if not np.isfinite(found.volume[rows]).any():
+        return faults
+    finite = (np.isfinite(found.volume[rows])
+              & np.isfinite(found.covariance[rows]).all(axis=(1, 2)))
+    faults[rows[~finite]] = judge.NOT_FINITE
+    rows = rows[finite]
+    slack = np.maximum(EXACT, SLIVER * _size_by_depth(pairs, found, rows))
+    faults[rows[(_least(found, rows) < -slack) | (found.volume[rows] <= 0.0)]] = judge.NEGATIVE
+    return faults
+
+
+def mlp_faults(pairs: Pairs, found: Contacts) -> np.ndarray:
+    """Return sums (n,) of the faults of the patches of `mlp`.
+
+    Its point is within the bounds of the overlap, and its volume is at most theirs. These bounds
+    are the patch box (core/src/mlp/patch_box.hpp).
+    """
+    rows = np.flatnonzero(found.colliding)
+    axes, middle, half, *_ = native.mlp_inputs(*pairs.rows(rows))
+    off = np.abs(np.einsum('nji,nj->ni', axes, found.point[rows] - middle))
+    reach = pairs.size[rows] + np.abs(found.point[rows]).max(axis=1)
+    within = np.all(off <= half + OUTSIDE * reach[:, None], axis=1)
+    within &= found.volume[rows] <= (1.0 + OUTSIDE) * np.prod(2.0 * half, axis=1)
+    faults = np.zeros(len(found.colliding), dtype=np.int64)
+    faults[rows] = (np.where(within, 0, judge.OUT_OF_BOUNDS)
+                    | np.where(_least(found, rows) >= -SMOOTH, 0, judge.NEGATIVE))
+    return faults
+
+
+def _size_by_depth(pairs: Pairs, found: Contacts, rows: np.ndarray) -> np.ndarray:
+    return 1.0 / np.maximum(DEPTH_FLOOR, -found.separation[rows] / pairs.size[rows])
+
+
+def _least(found: Contacts, rows: np.ndarray) -> np.ndarray:
+    """Return the least eigenvalue of covariances [of their trace]."""
+    covariance = found.covariance[rows]
+    return np.linalg.eigvalsh(covariance)[:, 0] / np.trace(covariance, axis1=1, axis2=2)
+
+
+# --- models and tallies ---------------------------------------------------------------------------
 
 
 class RandomMlp:

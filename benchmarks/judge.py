@@ -44,7 +44,7 @@ GATES = {MISSED: 'missed contact', PHANTOM: 'phantom contact', TOO_DEEP: 'too de
          TOO_SHALLOW: 'too shallow', WRONG_AXIS: 'wrong axis', NOT_UNIT: 'normal not unit',
          OUTSIDE: 'point outside', NOT_FINITE: 'NaN', NEGATIVE: 'negative eigenvalue',
          OUT_OF_BOUNDS: 'outside the bounds of the overlap'}
-"""Faults by bit. `judge` returns sums of them; the last two are those of `patches`."""
+"""Faults by bit. `judge` returns sums of them; the last two are those of `fuzz`."""
 BY_GAP = MISSED | PHANTOM | TOO_DEEP | TOO_SHALLOW | WRONG_AXIS  # what the true gap decides
 PIECE = 2048  # pairs that are judged at a time: their corners fit a processor's caches
 _SIGNS = np.array([[0.5 if k >> c & 1 else -0.5 for c in range(3)] for k in range(8)])

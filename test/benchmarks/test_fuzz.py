@@ -11,7 +11,7 @@ import oracle
 import pytest
 from gmpy2 import mpfr
 
-from benchmarks import fuzz, judge, patches
+from benchmarks import fuzz, judge
 from benchmarks.pose_sets import Pairs
 from box_contact_ros import ContactSolver
 
@@ -70,8 +70,8 @@ def test_found_poses_have_no_variance_below_zero():
     for model in ('exact', 'mlp'):
         found = pairs.contacts(ContactSolver((1, 1, 1), (1, 1, 1), model=model))
         assert found.colliding.all()
-        assert not patches.patch_faults(pairs, found).any()
-    assert not patches.mlp_faults(pairs, found).any()
+        assert not fuzz.patch_faults(pairs, found).any()
+    assert not fuzz.mlp_faults(pairs, found).any()
 
 
 @pytest.mark.parametrize('name', fuzz.CLASSES)
@@ -130,11 +130,11 @@ def test_planted_faults_of_patches_are_found():
     pairs = drawn('container')
     found = pairs.contacts()
     rows = np.flatnonzero(found.colliding)[:3]
-    assert not patches.patch_faults(pairs, found).any()
+    assert not fuzz.patch_faults(pairs, found).any()
     found.covariance[rows[0]] = np.diag([1.0, 1.0, -1e-5])
     found.volume[rows[1]] = 0.0
     found.covariance[rows[2], 1, 1] = np.nan
-    faults = patches.patch_faults(pairs, found)
+    faults = fuzz.patch_faults(pairs, found)
     assert faults[rows].tolist() == [judge.NEGATIVE, judge.NEGATIVE, judge.NOT_FINITE]
     assert np.count_nonzero(faults) == 3
 
@@ -145,22 +145,22 @@ def test_planted_answers_are_outside_their_bounds():
     rows = np.flatnonzero(found.colliding)[:2]
     found.point[rows[0]] += 10.0 * found.separation[rows[0]] * found.normal[rows[0]]
     found.volume[rows[1]] *= 1e3
-    faults = patches.mlp_faults(pairs, found)
+    faults = fuzz.mlp_faults(pairs, found)
     assert (faults[rows] == judge.OUT_OF_BOUNDS).all() and np.count_nonzero(faults) == 2
 
 
 def test_a_covariance_of_mlp_is_judged_to_rounding():
     pairs, found = answered_by_mlp()
     found.covariance[found.colliding] = np.diag([1.0, 1.0, -1e-13])
-    assert (patches.mlp_faults(pairs, found)[found.colliding] == judge.NEGATIVE).all()
-    assert not patches.patch_faults(pairs, found).any()
+    assert (fuzz.mlp_faults(pairs, found)[found.colliding] == judge.NEGATIVE).all()
+    assert not fuzz.patch_faults(pairs, found).any()
 
 
 def answered_by_mlp():
     """Pairs and sound contacts of `mlp`."""
     pairs = drawn('container')
     found = pairs.contacts(ContactSolver((1, 1, 1), (1, 1, 1), model='mlp'))
-    assert found.colliding.sum() > 200 and not patches.mlp_faults(pairs, found).any()
+    assert found.colliding.sum() > 200 and not fuzz.mlp_faults(pairs, found).any()
     return pairs, found
 
 
