@@ -155,7 +155,7 @@ def error_table(rows: Sequence[AccuracyRow]) -> str:
         return f'{errors.mean:.2g} / {errors.p99:.2g} / {errors.worst:.2g}'
 
     return markdown_table(
-        ['model, set', 'point', 'volume', 'covariance', 'in-plane eigenvalues'],
+        ['model, set', *ContactErrors._fields],
         [[f'{row.model}, {row.set}', *(cell(row, name) for name in ContactErrors._fields)]
          for row in rows])
 

@@ -24,8 +24,6 @@ class ContactErrors(NamedTuple):
     """(n,) of the exact volume; NaN from models that give the point alone."""
     covariance: np.ndarray
     """(n,) Frobenius norm, of the exact covariance's trace; NaN like the volume's."""
-    in_plane: np.ndarray
-    """(n,) of either eigenvalue in the plane of the contact, relative; NaN like the volume's."""
 
     def rows(self, chosen: np.ndarray) -> ContactErrors:
         """Return some of the errors."""
@@ -40,10 +38,7 @@ def degrees_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def contact_errors(found: Contacts, truth: Contacts, edge: np.ndarray) -> ContactErrors:
     """Return the errors of n contacts; edge: see `Pairs.edge`. All pairs touch, by both."""
-    exact = _in_plane(truth.covariance, truth.normal)
-    in_plane = np.abs(_in_plane(found.covariance, truth.normal) - exact) / exact
-    return ContactErrors(*map(lengths, departures(found, truth, edge)),
-                         100.0 * in_plane.max(axis=1, initial=0.0))
+    return ContactErrors(*map(lengths, departures(found, truth, edge)))
 
 
 def departures(found: Contacts, truth: Contacts, edge: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -67,16 +62,3 @@ def distances(points: np.ndarray, truth: np.ndarray) -> np.ndarray:
 def lengths(vectors: np.ndarray) -> np.ndarray:
     """Return how long vectors (n, k) are, (n,)."""
     return np.linalg.norm(vectors, axis=1)
-
-
-def _in_plane(covariance: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Return eigenvalues (n, 2), least first, of covariances (n, 3, 3) across normals (n, 3)."""
-    helper = np.eye(3)[np.abs(normal).argmin(axis=1)]
-    x = np.cross(normal, helper)
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
-    axes = np.stack([x, np.cross(normal, x)], axis=1)
-    across = axes @ covariance @ axes.swapaxes(1, 2)
-    xx, yy, xy = across[:, 0, 0], across[:, 1, 1], across[:, 0, 1]
-    largest = 0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy)
-    least = (xx * yy - xy**2) / largest
-    return np.stack([least, largest], axis=1)
