@@ -9,8 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from box_contact_ros.solver.arguments import model_name, program_parser
-from box_contact_ros.solver.checks import short_repr
+from box_contact_ros.solver.arguments import model_name, program_parser, within
 from box_contact_ros.solver.models import MODELS
 
 
@@ -25,7 +24,7 @@ def report_parser(program: str, doc: str | None, *, quick: str = '', seed: int |
     if quick:
         parser.add_argument('--quick', action='store_true', help=quick)
     if seed is not None:
-        parser.add_argument('--seed', type=seed_number, default=seed,
+        parser.add_argument('--seed', type=within(0), default=seed,
                             help='seed of the random numbers (default: %(default)s)')
     if out:
         parser.add_argument('--out', type=Path, metavar='DIR', help=f'folder for {out} (default: '
@@ -37,10 +36,3 @@ def add_models(parser: argparse.ArgumentParser, default: Sequence[str]) -> None:
     """Add the option `--models`."""
     parser.add_argument('--models', nargs='+', type=model_name, default=default, metavar='MODEL',
                         help=f'of {", ".join(MODELS)} (default: {" ".join(default)})')
-
-
-def seed_number(text: str) -> int:
-    """Return a seed of random numbers, as a program's argument: a whole number from 0."""
-    if not text.isascii() or not text.isdecimal() or len(text) > 18:
-        raise argparse.ArgumentTypeError(f'{short_repr(text)} is not a whole number from 0')
-    return int(text)

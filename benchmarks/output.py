@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, astuple, dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -104,19 +104,13 @@ def _cell(value: object, digits: int) -> object:
     return value  # the writer leaves a None empty
 
 
-def figure(size: tuple[float, float], layout: Literal['constrained'] | None = 'constrained',
-           ) -> Figure:
-    """Return an empty figure of a size [inch]; no display is needed."""
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=size, layout=layout, dpi=DPI)
-
-
 def subplots(rows: int, columns: int, size: tuple[float, float], **shared: Any,
              ) -> tuple[Figure, np.ndarray]:
-    """Return a figure of a size [inch], and its axes (rows, columns)."""
-    empty = figure(size)
-    return empty, empty.subplots(rows, columns, squeeze=False, **shared)
+    """Return a figure of a size [inch], and its axes (rows, columns); no display is needed."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout='constrained', dpi=DPI)
+    return figure, figure.subplots(rows, columns, squeeze=False, **shared)
 
 
 def log_errors(axis: Axes, least: float, most: float, zero: str = 'exact (0)',

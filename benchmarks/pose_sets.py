@@ -146,19 +146,15 @@ def onto(place: np.ndarray, turn: np.ndarray, size_a: np.ndarray, size_b: np.nda
 
 
 def stacked(rng: np.random.Generator, size: tuple[float, float, float], tilt: np.ndarray,
-            yaw: np.ndarray, depth: np.ndarray, *, spread: float = 0.98,
-            about: np.ndarray | None = None) -> Pairs:
+            yaw: np.ndarray, depth: np.ndarray) -> Pairs:
     """Draw one box on another of the same size, tilted about a random level axis, turned by yaw.
 
-    Both angles are in [rad]. The box is off the other's middle by up to `spread` of the size.
-    about: keeps the tilt's axis within that angle (n,) [rad] of ±x.
+    Both angles are in [rad]. The box is off the other's middle by up to 0.98 of the size.
     """
     n = len(tilt)
     sizes = np.tile(np.array(size), (n, 1))
-    heading = rng.uniform(-np.pi, np.pi, n) if about is None else (
-        rng.choice([0.0, np.pi], n) + rng.choice([-1.0, 1.0], n) * about)
-    turn = _tilted(heading, tilt, yaw)
-    place = np.concatenate([spread * rng.uniform(-1, 1, (n, 2)) * sizes[:, :2],
+    turn = _tilted(rng.uniform(-np.pi, np.pi, n), tilt, yaw)
+    place = np.concatenate([0.98 * rng.uniform(-1, 1, (n, 2)) * sizes[:, :2],
                             0.98 * sizes[:, 2:]], axis=1)
     return onto(place, turn, sizes, sizes, depth)
 

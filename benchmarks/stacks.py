@@ -348,13 +348,9 @@ def main(args: Sequence[str] | None = None) -> int:
     """Run all scenes, print and write; 1 if one of ours moves with answers at each step."""
     parser = report_parser('stacks', __doc__, out='stacks.md and stacks.csv',
                            quick=f'every {QUICK}th scene')
-    parser.add_argument('--scenes', nargs='+', metavar='WORD', default=[''],
-                        help='run the scenes whose names contain one of these words')
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
     scenes = {scene().name: scene for scene in SCENES[::QUICK if options.quick else 1]}
-    scenes = {name: scene for name, scene in scenes.items()
-              if any(word in name for word in options.scenes)}
     found: dict[str, dict[str, Outcome]] = {}
     for name, make in scenes.items():
         found[name] = {str(timing): run(make, timing) for timing in TIMINGS}

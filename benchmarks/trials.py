@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -23,7 +22,6 @@ from .timing import after_warm_up, each_call, take_turns
 FEW_PAIRS = 17
 """Pairs that are prepared at once where more pairs of sizes than that are among them. Odd, so that
 a median is the time of one pair, not between two that may differ tenfold."""
-LEAST_PAIRS = 10  # pairs judged, whatever they take
 ROUND_SECONDS = 0.025  # least time of a round's single calls; a round ends with its last pair
 LONGEST_RUN = 3600.0  # of a subprocess with one instruction set [s]
 VERDICT = 1e-9
@@ -40,12 +38,11 @@ class Plan:
     timed_pairs: int
     """Pairs that every round times call by call, whatever they take. Some cost fifty times as much
     as others, so the median of a round that ends by the clock depends on how many it reached."""
-    seconds: float  # that a contestant has on a set to be judged
     rounds: int
 
 
-FULL = Plan(batch_pairs=20_000, single_pairs=1_000, timed_pairs=200, seconds=1.0, rounds=20)
-QUICK = Plan(batch_pairs=1_000, single_pairs=40, timed_pairs=10, seconds=0.05, rounds=2)
+FULL = Plan(batch_pairs=20_000, single_pairs=1_000, timed_pairs=200, rounds=20)
+QUICK = Plan(batch_pairs=1_000, single_pairs=40, timed_pairs=10, rounds=2)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,19 +107,17 @@ def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.n
 
 
 def ask(engine: Contestant, pairs: Pairs, plan: Plan) -> Answers:
-    """Return answers to as many pairs as there is time to ask."""
+    """Return answers to the plan's number of pairs."""
     if engine.solve and engine.prepare_batch:
         contacts = engine.solve(pairs)
         return Answers(colliding=contacts.colliding, normals=contacts.normal,
                        points={engine.choices[0]: contacts.point})
     pairs = pairs.rows(slice(plan.single_pairs))
-    asked, began, step = [], time.monotonic(), _at_once(pairs)
+    asked, step = [], _at_once(pairs)
     for first in range(0, len(pairs.size), step):
         for call in engine.prepare(pairs.rows(slice(first, first + step))):
             answer = engine.read(call())
             asked.append([chosen(answer, choice) for choice in engine.choices])
-        if time.monotonic() - began > plan.seconds and len(asked) >= LEAST_PAIRS:
-            break
     return Answers(
         colliding=np.array([answers[0].touching for answers in asked]),
         normals=np.array([answers[0].normal for answers in asked]),

@@ -12,11 +12,13 @@ paper-…, table-1-…       what only the tables of benchmarks.paper need
 from __future__ import annotations
 
 import argparse
+import json
 import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import torch
 
@@ -76,6 +78,11 @@ def _commit() -> str:
     return done.stdout.strip()
 
 
+def _print(path: Path, card: dict[str, Any]) -> None:
+    """Print what a training took, and the errors of its card."""
+    print(f'{path}, {card["training"]["minutes"]} min\n{json.dumps(card["metrics"], indent=1)}')
+
+
 def _train_mlp(options: argparse.Namespace, hidden: tuple[int, int] | None = None) -> None:
     """Train the shipped network, or one of other hidden layers."""
     name = '-'.join((MLP, *map(str, hidden or ())))
@@ -83,7 +90,7 @@ def _train_mlp(options: argparse.Namespace, hidden: tuple[int, int] | None = Non
     path = folder / f'{name}.safetensors'
     card = recipe.train(path, seed=options.seed, commit=_commit(), quick=options.quick,
                         hidden=hidden or recipe.HIDDEN)
-    print(f'{path}, {card["training"]["minutes"]} min\n{recipe.metrics_table(card)}')
+    _print(path, card)
     if hidden is None and options.out is None:
         network = load_weights(path).networks[NETWORK]
         SHIPPED_HEADER.write_text(recipe.header(network.layers), encoding='utf-8')
@@ -103,8 +110,7 @@ def _train_paper(options: argparse.Namespace, job: jobs.PaperJob) -> None:
             job.settings, networks=QUICK_STARTS, epochs=QUICK_EPOCHS))
     folder = options.out or job.folder
     card = jobs.train_paper(job, seed=options.seed, commit=_commit(), folder=folder)
-    print(f'{folder / job.name}.safetensors, {card["training"]["minutes"]} min\n'
-          f'{jobs.metrics_table(card)}')
+    _print(folder / f'{job.name}.safetensors', card)
 
 
 def main(args: Sequence[str] | None = None) -> int:

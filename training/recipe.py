@@ -189,20 +189,3 @@ def measured(path: Path, seed: int, count: int) -> dict[str, Any]:
         found[name] = {quantity: error_summary(values)
                        for quantity, values in errors._asdict().items()}
     return found
-
-
-def metrics_table(card: dict[str, Any]) -> str:
-    """Return the card's metrics for the terminal."""
-    def short_repr(f: dict[str, float]) -> str:
-        return f'{f["mean"]:.5f} / {f["p99"]:.4f} / {f["worst"]:.3f}'
-
-    lines = ["errors against exact, %: mean / p99 / worst; the point's by the smaller box's "
-             "longest edge, the covariance's by its trace"]
-    width = max(map(len, card['metrics']))
-    for name, entry in card['metrics'].items():
-        for quantity, values in entry.items():
-            lines.append(f'{name:<{width}}  {quantity:<10}  {short_repr(values)}')
-    lines.append('all networks, contacts of the training, p99 of point / volume / covariance')
-    lines += ['  '.join(f'{entry["p99"]:.3f}' for entry in summary.values())
-              for summary in card['spread']]
-    return '\n'.join(f'  {line}' for line in lines)

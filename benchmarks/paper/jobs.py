@@ -143,11 +143,3 @@ def _ranges(names: Sequence[str], sets: dict[str, dataset.Patterns], what: str) 
              else 'rad',
              'min': float(min(v[:, k].min() for v in values)),
              'max': float(max(v[:, k].max() for v in values))} for k, name in enumerate(names)]
-
-
-def metrics_table(card: dict[str, Any]) -> str:
-    """Return the card's metrics over all outputs, for the terminal."""
-    return '\n'.join(
-        f'  {network:<12} {name:<17} '
-        + ' '.join(f'{key} {value:+.4f}' for key, value in parts['all'].items())
-        for network, sets in card['metrics'].items() for name, parts in sets.items())

@@ -4,7 +4,6 @@
 """What all reports share: `make reports`, which runs them, and readable numbers."""
 from __future__ import annotations
 
-import argparse
 import importlib.util
 import math
 import os
@@ -16,7 +15,6 @@ from pathlib import Path
 import pytest
 
 from benchmarks import output
-from benchmarks.arguments import seed_number
 
 ROOT = Path(__file__).resolve().parents[2]
 STAND_IN = """#!/bin/sh
@@ -84,10 +82,3 @@ def test_numbers_are_readable() -> None:
     values = (math.nan, 0.0, 1e-9, 0.0123, 1.2345, 98.76, 1234.5)
     assert [output.number(value) for value in values] == [
         '–', '0', '<0.001', '0.0123', '1.23', '98.8', '1,234']
-
-
-def test_seeds_are_whole_numbers():
-    assert seed_number('7') == 7
-    for text in ('-1', '1.5', '²', '9' * 19):
-        with pytest.raises(argparse.ArgumentTypeError, match='not a whole number from 0'):
-            seed_number(text)

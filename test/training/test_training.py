@@ -192,7 +192,7 @@ def test_each_file_has_its_folder() -> None:
     (['mlp', '--scene', 'containers'], '--scene is of paper alone'),
     (['paper', '--scene', 'yard'], "invalid choice: 'yard'"),
     (['papers'], "invalid choice: 'papers'"),
-    (['paper', '--seed', '-1'], "'-1' is not a whole number from 0"),
+    (['paper', '--seed', '-1'], 'must be at least 0, got -1'),
 ])
 def test_refused_arguments(arguments: list[str], message: str,
                            capsys: pytest.CaptureFixture[str]) -> None:
