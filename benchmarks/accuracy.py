@@ -238,11 +238,8 @@ def main(args: Sequence[str] | None = None) -> int:
         print(f'accuracy: {error}', file=sys.stderr)
         return 1
     output.write_csv(folder / 'accuracy.csv', csv_rows(rows), about=output.machine())
-    (folder / 'accuracy.md').write_text(output.page(
-        'benchmarks/pages/accuracy', command=output.command_line('benchmarks.accuracy', args),
-        machine=output.machine(), seed=options.seed,
-        error_table=error_table(rows),
-        point_classes=class_table(rows)), encoding='utf-8')
+    output.write_page(folder, 'accuracy', args, machine=output.machine(), seed=options.seed,
+                      error_table=error_table(rows), point_classes=class_table(rows))
     draw(folder / 'accuracy.png', rows)
     print(error_table(rows), class_table(rows), sep='\n\n')
     return 0

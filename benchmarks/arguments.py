@@ -5,12 +5,10 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from box_contact_ros.solver.arguments import model_name, program_parser, within
-from box_contact_ros.solver.models import MODELS
+from box_contact_ros.solver.arguments import program_parser, within
 
 
 def report_parser(program: str, doc: str | None, *, quick: str = '', seed: int | None = None,
@@ -30,9 +28,3 @@ def report_parser(program: str, doc: str | None, *, quick: str = '', seed: int |
         parser.add_argument('--out', type=Path, metavar='DIR', help=f'folder for {out} (default: '
                             'docs/results, or quick-results with --quick)')
     return parser
-
-
-def add_models(parser: argparse.ArgumentParser, default: Sequence[str]) -> None:
-    """Add the option `--models`."""
-    parser.add_argument('--models', nargs='+', type=model_name, default=default, metavar='MODEL',
-                        help=f'of {", ".join(MODELS)} (default: {" ".join(default)})')

@@ -23,7 +23,6 @@ from inspect import getdoc
 from pathlib import Path
 
 from box_contact_ros.core import instruction_sets, native
-from box_contact_ros.solver.mlp import GROUP, load_mlp
 
 from . import output
 from .accuracy import CLASSES, Summary
@@ -31,7 +30,6 @@ from .arguments import report_parser
 from .contestant import (
     CORE_MODELS,
     MODELS,
-    SIZES_FOLDER,
     Contestant,
     in_subprocess,
     other_networks,
@@ -134,28 +132,6 @@ def in_short(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> str:
          'invented'], lines)
 
 
-def sizes_table(rows: Sequence[FrontierRow]) -> str:
-    """Return the network of `mlp` by size: its times by that of `exact`, and its errors."""
-    by = {(row.name, row.set): row for row in rows if row.instruction_set == native.instruction_set}
-    lines = []
-    for name in SIZES:
-        shown, stack = by[name, 'containers'], by[name, 'stacks']
-        shipped = name == 'mlp'
-        card = (load_mlp() if shipped else load_mlp(str(SIZES_FOLDER / f'{name}.safetensors'))).card
-        units, metrics = card['architecture'][1:3], card['metrics']
-        lines.append([
-            '-'.join(map(str, units)) + (', shipped' if shipped else ''),
-            '-'.join(str(GROUP * -(-unit // GROUP)) for unit in units),
-            *(f'{ratio:.2f}' for ratio in (*by_exact(shown, rows), by_exact(stack, rows)[1])),
-            *(number(row.errors.points['all'].p99) for row in (shown, stack)),
-            *(number(metrics[of_set][quantity]['p99']) for quantity in ('volume', 'covariance')
-              for of_set in ('containers', 'stacks'))])
-    return markdown_table(
-        ['units', 'computed', 'a call', 'batch, containers', 'stacks', 'point p99, containers [%]',
-         'stacks', 'volume p99, containers [%]', 'stacks', 'covariance p99, containers [%]',
-         'stacks'], lines)
-
-
 def calls_table(engines: Iterable[Contestant]) -> str:
     """Return what is called of other engines, and what they return."""
     return markdown_table(['', 'call', 'returns', 'volume or area', 'one point by'], [
@@ -182,16 +158,17 @@ def set_table(rows: Sequence[FrontierRow], name: str) -> str:
          for row in rows if row.set == name])
 
 
-def page(rows: Sequence[FrontierRow], models: Sequence[Contestant], engines: Sequence[Contestant],
-         missing: Sequence[str], command: str, plan: Plan) -> str:
-    """Return the Markdown page."""
+def write_page(folder: Path, args: Sequence[str] | None, rows: Sequence[FrontierRow],
+               models: Sequence[Contestant], engines: Sequence[Contestant],
+               missing: Sequence[str], plan: Plan) -> None:
+    """Write the Markdown page."""
     by = {(row.name, row.set): row for row in rows
           if row.instruction_set == native.instruction_set}
-    return output.page(
-        'benchmarks/pages/frontier', command=command,
+    output.write_page(
+        folder, 'frontier', args,
         machine=output.machine(packages_of([*models, *engines])),
         skipped=''.join(f'\n\nLeft out: {line}.' for line in missing),
-        in_short=in_short(rows, engines), sizes=sizes_table(rows), odd='\n'.join(
+        in_short=in_short(rows, engines), odd='\n'.join(
             f'{place}. {line}' for place, line in enumerate(odd_answers(rows, engines), start=1)
         ) or 'None.',
         single=by_exact(by['mlp', 'containers'], rows)[0],
@@ -279,9 +256,7 @@ def main(args: Sequence[str] | None = None) -> int:
                 rows += in_subprocess(measure_core, options.seed, plan, patience=LONGEST_RUN,
                                       instruction_set=name)
     output.write_csv(folder / 'frontier.csv', csv_rows(rows, [*models, *engines]))
-    command = output.command_line('benchmarks.frontier', args)
-    (folder / 'frontier.md').write_text(page(rows, models, engines, missing, command, plan),
-                                        encoding='utf-8')
+    write_page(folder, args, rows, models, engines, missing, plan)
     draw(folder / 'frontier.png', folder / 'frontier.csv')
     print(in_short(rows, engines))
     return 0

@@ -39,7 +39,7 @@ from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 from box_contact_ros.solver.weights_file import Network
 
 from . import judge, output
-from .arguments import add_models, report_parser
+from .arguments import report_parser
 from .pose_sets import (
     CONTAINER,
     HIGH_CUBE,
@@ -392,7 +392,8 @@ def main(args: Sequence[str] | None = None) -> int:
     parser = report_parser('fuzz', __doc__, quick=f'{QUICK_PAIRS:,} pairs', seed=1, out='the table')
     parser.add_argument('--pairs', type=within(1), default=PAIRS,
                         help='pairs in all (default: %(default)s)')
-    add_models(parser, MODELS)
+    parser.add_argument('--models', nargs='+', choices=MODELS, default=MODELS, metavar='MODEL',
+                        help='of mlp and exact (default: both)')
     parser.add_argument('--random-weights', action='store_true',
                         help=f'mlp has other random weights in each piece of {PIECE:,} pairs; the '
                         'table is fuzz_random_weights.csv')

@@ -11,9 +11,7 @@ and counted on the page.
 """
 from __future__ import annotations
 
-import contextlib
 import math
-import signal
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
@@ -179,15 +177,6 @@ def added_table(outcomes: Sequence[Outcome]) -> str:
     return output.markdown_table(['landing', 'expected', *head], rows, words=2)
 
 
-def page(outcomes: Sequence[Outcome], command: str) -> str:
-    """Return the Markdown page."""
-    patches = [outcome for outcome in outcomes if outcome.way in PATCHES]
-    return output.page(
-        'benchmarks/pages/landing', command=command, machine=output.machine(PACKAGES),
-        all=len(patches), good=sum(outcome.as_expected for outcome in patches),
-        grid=grid_table(outcomes), added=added_table(outcomes))
-
-
 # --- picture --------------------------------------------------------------------------------------
 
 SHOWN_WAYS = {'exact': 'one patch', 'manifold': "MuJoCo's manifold"}
@@ -253,21 +242,6 @@ def _draw_from_the_end(axis: Any, way: str, record: LandingRecord) -> None:
 
 # --- program --------------------------------------------------------------------------------------
 
-
-@contextlib.contextmanager
-def left_when_asked() -> Iterator[None]:
-    """Turn SIGTERM and SIGHUP into SystemExit, so that subprocesses are ended on the way out."""
-    def leave(number: int, _frame: Any) -> None:
-        sys.exit(128 + number)
-
-    before = {number: signal.signal(number, leave) for number in (signal.SIGTERM, signal.SIGHUP)}
-    try:
-        yield
-    finally:
-        for number, earlier in before.items():
-            signal.signal(number, earlier)
-
-
 def main(args: Sequence[str] | None = None) -> int:
     """Run the sweep and write its files; 1 if `GATED` fails an expectation."""
     parser = report_parser(
@@ -279,7 +253,7 @@ def main(args: Sequence[str] | None = None) -> int:
     folder = output.results_folder(parser, options)
     step, timings = (QUICK, [SHOWN_TIMING]) if options.quick else (1, TIMINGS)
     planned = [*grid()[SHOWN % step::step], *(ADDED[::3] if options.quick else ADDED)]
-    with Pool() as pool, left_when_asked():  # workers were started before: SIGTERM ends them
+    with Pool() as pool:
         planned = list(tqdm(pool.imap(aim, planned), 'aiming', len(planned), unit=''))
         jobs = list(landings(options.ways, timings, planned, step=step))
         results = [pool.apply_async(run, job) for job in jobs]
@@ -288,10 +262,13 @@ def main(args: Sequence[str] | None = None) -> int:
     draw(folder / 'landing.png', shown)
     output.write_csv(folder / 'landing.csv', map(csv_row, outcomes),
                      about=output.machine(PACKAGES))
-    command = output.command_line('benchmarks.landing', args)
-    (folder / 'landing.md').write_text(page(outcomes, command), encoding='utf-8')
+    patches = [outcome for outcome in outcomes if outcome.way in PATCHES]
+    output.write_page(
+        folder, 'landing', args, machine=output.machine(PACKAGES), all=len(patches),
+        good=sum(outcome.as_expected for outcome in patches), grid=grid_table(outcomes),
+        added=added_table(outcomes))
     print(f'{grid_table(outcomes)}\n\n{added_table(outcomes)}')
-    missed = [outcome for outcome in outcomes if outcome.way in PATCHES and not outcome.as_expected]
+    missed = [outcome for outcome in patches if not outcome.as_expected]
     for way, timing, landing, _ in missed:
         print(f'landing: {way} at {timing.rate_hz:g} Hz and {1e3 * timing.latency:g} ms, '
               f'{landing.name}: not as expected', file=sys.stderr)

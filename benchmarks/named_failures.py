@@ -125,13 +125,10 @@ def main(args: Sequence[str] | None = None) -> int:
     found = {engine.name: replay(engine, failures, bounds) for engine in engines}
     passed = '; '.join(f'{name} {sum(not fault for fault in faults.values())}'
                        for name, faults in found.items())
-    text = output.page(
-        'benchmarks/pages/named_failures',
-        command=output.command_line('benchmarks.named_failures', args), count=len(failures),
+    print(output.write_page(
+        folder, 'named_failures', args, count=len(failures), passed=passed,
         machine=output.machine(packages_of(engines)), table=table(failures, found),
-        passed=passed, skipped=''.join(f'\n\nLeft out: {line}.' for line in missing))
-    print(text)
-    (folder / 'named_failures.md').write_text(text, encoding='utf-8')
+        skipped=''.join(f'\n\nLeft out: {line}.' for line in missing)))
     return int(any(found[model][report] for model in GATED for report in failures))
 
 

@@ -291,15 +291,12 @@ def main(args: Sequence[str] | None = None) -> int:
     versions = [f'MuJoCo {metadata.version("mujoco")}', *(
         f'{name.capitalize()} {package_config(name, "--modversion")}' for name in OPTIONAL
         if name not in missing)]
-    text = output.page(
-        'benchmarks/pages/native', command=output.command_line('benchmarks.native', args),
-        machine=output.machine(), rounds=rounds, calls=calls, pairs=pairs, tables=tables,
-        slowest=slowest_table(contacts[names[-1]]), slowest_set=names[-1], passes=passes,
-        code=calls_shown(missing),
-        engines=', '.join(versions), missing=''.join(
+    output.write_page(
+        folder, 'native', args, machine=output.machine(), rounds=rounds, calls=calls, pairs=pairs,
+        tables=tables, slowest=slowest_table(contacts[names[-1]]), slowest_set=names[-1],
+        passes=passes, code=calls_shown(missing), engines=', '.join(versions), missing=''.join(
             f'\n\nLeft out: {name.capitalize()} is not installed with its headers '
             f'(`{OPTIONAL[name]}`).' for name in missing))
-    (folder / 'native.md').write_text(text, encoding='utf-8')
     output.write_csv(folder / 'native.csv', [*csv_rows(found), *contact_rows(contacts)],
                      about=output.machine())
     print(tables)

@@ -55,6 +55,17 @@ def page(template: str, **values: object) -> str:
     return (ROOT / f'{template}.md').read_text('utf-8').format(**values)
 
 
+def write_page(folder: Path, name: str, args: Sequence[str] | None, **values: object) -> str:
+    """Write benchmarks/pages/NAME.md, its fields filled in, to a folder; return the text.
+
+    args: as `main` of benchmarks.NAME received them; the page names the command.
+    """
+    command = command_line(f'benchmarks.{name}', args)
+    text = page(f'benchmarks/pages/{name}', command=command, **values)
+    (folder / f'{name}.md').write_text(text, encoding='utf-8')
+    return text
+
+
 def read_csv(path: Path) -> list[dict[str, str]]:
     """Return the rows of a CSV file by column name."""
     with path.open(encoding='utf-8', newline='') as file:

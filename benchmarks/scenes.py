@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from box_contact_ros import Box, ContactSolver, Pair, Scene, SceneSolver, read_scene
+from box_contact_ros import Box, Pair, Scene, SceneSolver, read_scene
 from box_contact_ros.scene.scene_solver import EVERY_PAIR
 
 from . import output
@@ -69,18 +69,29 @@ def bricks(count: int) -> Boxes:
                  np.zeros(count, bool))
 
 
+def packing_plans() -> dict[str, np.ndarray]:
+    """Return the plans (n, 7) of five real orders: lowest corner and size [mm], mass [kg]."""
+    plans = {}
+    for order, plan in json.loads(PLANS.read_text('utf-8')).items():
+        rows = []
+        for entry in plan:
+            item = entry['item']
+            length, width, height = (item[f'{name}/mm'] for name in ('length', 'width', 'height'))
+            across = (width, length) if entry['orientation'] else (length, width)
+            rows.append([*entry['flb_coordinates'], *across, height, item['weight/kg']])
+        plans[order] = np.array(rows)
+    return plans
+
+
 def pallets(copies: int) -> Boxes:
     """Return five packing plans, each `copies` times, on one fixed floor, which is the last box."""
     sizes, places = [], []
-    for order, plan in enumerate(json.loads(PLANS.read_text('utf-8')).values()):
-        for entry in plan:
-            size = np.array([entry['item'][f'{name}/mm'] for name in ('length', 'width', 'height')])
-            size = size[[1, 0, 2]] if entry['orientation'] else size
-            corner = np.array(entry['flb_coordinates'])
-            for copy in range(copies):
-                sizes.append(size)
-                places.append(corner + 0.5 * size + [2000 * copy, 2000 * order, 0])
-    size, place = 1e-3 * np.array(sizes), 1e-3 * np.array(places)
+    for row, plan in enumerate(packing_plans().values()):
+        corner, size, _ = np.split(plan, [3, 6], axis=1)
+        shifts = [[2000.0 * copy, 2000.0 * row, 0.0] for copy in range(copies)]
+        sizes.append(np.repeat(size, copies, axis=0))
+        places.append(((corner + 0.5 * size)[:, None] + shifts).reshape(-1, 3))
+    size, place = 1e-3 * np.concatenate(sizes), 1e-3 * np.concatenate(places)
     size = np.vstack((size, [4.0 * copies + 4.0, 24.0, 1.0]))
     place = np.vstack((place, [0.0, 0.0, -0.5]))
     fixed = np.zeros(len(size), bool)
@@ -144,7 +155,6 @@ class Compared(NamedTuple):
     ratio: float  # median of the rounds' own
     only_ours: int
     only_mujoco: int
-    farthest: float  # |separation| of pairs of which verdicts differ, at most [m]
 
 
 def compare(name: str, boxes: Boxes, rounds: int) -> list[Compared]:
@@ -178,19 +188,8 @@ def compare(name: str, boxes: Boxes, rounds: int) -> list[Compared]:
     theirs = set(map(tuple, engine.pairs().tolist()))
     return [Compared(name, asked, len(boxes.size), len(ours), *(
         float(np.median(times[one])) for one in (asked, 'mujoco')),
-        by_round(times[asked], times['mujoco']), len(ours - theirs), len(theirs - ours),
-        farthest(boxes, places[(rounds - 1) % PLACES], ours ^ theirs)) for asked in solvers]
-
-
-def farthest(boxes: Boxes, place: np.ndarray, pairs: set[tuple[int, ...]]) -> float:
-    """Return the largest |separation| of some pairs; NaN of none."""
-    if not pairs:
-        return np.nan
-    pose = boxes.pose.copy()
-    pose[~boxes.fixed] = place
-    contacts = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(
-        pose, sizes=boxes.size, pairs=np.array(sorted(pairs)))
-    return float(np.abs(contacts.separation).max())
+        by_round(times[asked], times['mujoco']), len(ours - theirs), len(theirs - ours))
+        for asked in solvers]
 
 
 class Grown(NamedTuple):
@@ -241,23 +240,20 @@ def main(args: Sequence[str] | None = None) -> int:
     compared = [
         *compare('brick walls', bricks(QUICK_BRICKS if options.quick else BRICKS), rounds),
         *compare('pallets', pallets(QUICK_COPIES if options.quick else COPIES), rounds)]
-    text = output.page(
-        'benchmarks/pages/scenes', command=output.command_line('benchmarks.scenes', args),
-        machine=machine, rounds=rounds, shake=1e6 * SHAKE,
+    print(output.write_page(
+        folder, 'scenes', args, machine=machine, rounds=rounds, shake=1e6 * SHAKE,
         compared=markdown_table(
             ['scene', 'pairs', 'boxes', 'touching', 'tick [ms]', '`mj_collision` [ms]', 'ratio',
-             'only ours', 'only MuJoCo', 'farthest from touch [nm]'],
+             'only ours', 'only MuJoCo'],
             [[*row[:2], *map('{:,}'.format, row[2:4]), number(row.tick), number(row.mujoco),
-              number(row.ratio), row.only_ours, row.only_mujoco, number(1e9 * row.farthest)]
+              number(row.ratio), row.only_ours, row.only_mujoco]
              for row in compared], words=2),
         grown=markdown_table(
             ['boxes', 'touching', 'tick [ms]', 'per box [ns]', 'broad phase [%]',
              'memory of the process [MiB]', 'file read in [s]'],
             [[*map('{:,}'.format, row[:2]), number(row.tick), number(row.per_box),
               number(100.0 * row.broad_phase), number(row.memory), number(row.reading)]
-             for row in grown], words=0))
-    print(text)
-    (folder / 'scenes.md').write_text(text, encoding='utf-8')
+             for row in grown], words=0)))
     output.write_csv(folder / 'scenes.csv', [row._asdict() for row in (*compared, *grown)],
                      about=machine)
     return 0

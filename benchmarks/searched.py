@@ -109,10 +109,8 @@ def main(args: Sequence[str] | None = None) -> int:
     rows = [search(name, make, [options.seed, place], seconds) for place, (name, make)
             in enumerate(tqdm(sets.items(), desc='searched', unit='set'))]
     output.write_csv(folder / 'searched.csv', csv_rows(rows, seconds), about=output.machine())
-    (folder / 'searched.md').write_text(output.page(
-        'benchmarks/pages/searched', command=output.command_line('benchmarks.searched', args),
-        machine=output.machine(), seed=options.seed, minutes=minutes, seconds=seconds,
-        table=table(rows)), encoding='utf-8')
+    output.write_page(folder, 'searched', args, machine=output.machine(), seed=options.seed,
+                      minutes=minutes, seconds=seconds, table=table(rows))
     print(table(rows))
     return 0
 

@@ -150,13 +150,10 @@ def main(args: Sequence[str] | None = None) -> int:
         else (COLD_CALLS, ROUNDS, BATCH, STARTS))
     cold = measure_cold(options.seed, calls)
     threads = {model: measure_threads(model, pairs, rounds) for model in CORE_MODELS}
-    text = output.page(
-        'benchmarks/pages/speed', command=output.command_line('benchmarks.speed', args),
-        machine=machine, cold=cold_table(cold), cold_set=COLD_SET, shared_batch=pairs,
-        threads=threads_table(threads), starts=count,
-        start=1e-9 * float(np.median(measure_starts(count))))
-    print(text)
-    (folder / 'speed.md').write_text(text, encoding='utf-8')
+    print(output.write_page(
+        folder, 'speed', args, machine=machine, cold=cold_table(cold), cold_set=COLD_SET,
+        shared_batch=pairs, threads=threads_table(threads), starts=count,
+        start=1e-9 * float(np.median(measure_starts(count)))))
     output.write_csv(folder / 'speed_cold.csv', map(asdict, cold), about=machine)
     return 0
 

@@ -22,7 +22,7 @@ from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 
 from . import output
-from .arguments import add_models, report_parser
+from .arguments import report_parser
 from .errors import point_errors
 from .hard_poses import Cases, load
 from .judge import NOT_FINITE, NOT_UNIT, OUTSIDE, judge
@@ -125,7 +125,6 @@ def main(args: Sequence[str] | None = None) -> int:
     """Ask all, print, write; 1 if a gate is broken."""
     parser = report_parser('stability', __doc__, quick=f'every {QUICK}th family',
                            out='stability.md and stability.csv')
-    add_models(parser, MODELS)
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
     cases = load()
@@ -133,22 +132,21 @@ def main(args: Sequence[str] | None = None) -> int:
     from tqdm import tqdm
 
     rows = []
-    for model in options.models:
+    for model in MODELS:
         solver = ContactSolver((1, 1, 1), (1, 1, 1), model=model)
         rows += [examine(model, family, cases[family], partial(Pairs.contacts, solver=solver))
                  for family in tqdm(families, desc=f'stability, {model}', unit='family')]
     about = output.machine(('numpy', 'python-fcl'))
     output.write_csv(folder / 'stability.csv', map(asdict, rows), digits=4, about=about)
-    by = {model: [row for row in rows if row.model == model] for model in options.models}
+    by = {model: [row for row in rows if row.model == model] for model in MODELS}
     summary = table([over_all(mine) for mine in by.values()])
     broken = gates(rows)
-    (folder / 'stability.md').write_text(output.page(
-        'benchmarks/pages/stability', machine=about, summary=summary,
-        shown=options.models[0], families=table(by[options.models[0]]),
-        command=output.command_line('benchmarks.stability', args),
+    output.write_page(
+        folder, 'stability', args, machine=about, summary=summary, shown=MODELS[0],
+        families=table(by[MODELS[0]]),
         verdict=f'Goals missed: {"; ".join(broken)}.' if broken else 'Of `exact` and `mlp`, every '
         'verdict and normal is right. Every point is in both boxes, but some of `mlp` of '
-        f'`{KNOWN[1]}`.'), encoding='utf-8')
+        f'`{KNOWN[1]}`.')
     print(summary)
     for text in broken:
         print(f'stability: gate broken: {text}', file=sys.stderr)

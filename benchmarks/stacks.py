@@ -12,14 +12,12 @@ Lengths in m, masses in kg, times in s.
 """
 from __future__ import annotations
 
-import csv
 import math
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 
@@ -41,8 +39,8 @@ from .loops import (
     steps,
 )
 from .pose_sets import CONTAINER, turned
+from .scenes import packing_plans
 
-PALLETS = Path(__file__).with_name('pallets.csv')
 LOST_SPEED = 100.0  # a run with a faster corner is over [m/s]
 REST_SPEED = 1e-3  # of the fastest corner of a scene at rest [m/s]
 JUDGED = 10  # steps from one judgement to the next
@@ -284,12 +282,8 @@ def supported(boxes: Boxes, margin: float = 0.1) -> list[int]:
 
 def real_pallet(order: str) -> Scene:
     """Return the boxes of a real order that stand, as its packing plan places them."""
-    with PALLETS.open(encoding='utf-8') as file:
-        plan = [row for row in csv.reader(line for line in file if line[0] != '#')
-                if row[0] == order]
-    place, size, mass = np.split(np.array([row[1:] for row in plan], dtype=float), [3, 6], axis=1)
-    rows = [FLOOR] + [(e, m, c) for e, m, c in zip(1e-3 * size, mass[:, 0],
-                                                    1e-3 * (place + 0.5 * size))]
+    corner, size, mass = np.split(packing_plans()[order], [3, 6], axis=1)
+    rows = [FLOOR, *zip(1e-3 * size, mass[:, 0], 1e-3 * (corner + 0.5 * size))]
     boxes = Boxes.of(rows)
     kept = supported(boxes)
     return Scene(f'order {order}, {len(kept) - 1} of {len(rows) - 1} boxes',
@@ -369,10 +363,8 @@ def main(args: Sequence[str] | None = None) -> int:
     output.write_csv(folder / 'stacks.csv', (
         {'scene': name, 'way': way, **asdict(each)}
         for name, ways in found.items() for way, each in ways.items()), digits=3, about=about)
-    (folder / 'stacks.md').write_text(output.page(
-        'benchmarks/pages/stacks', command=output.command_line('benchmarks.stacks', args),
-        machine=about, rest=rest, both=both,
-        pushed=pushed(ORDERS[:1] if options.quick else ORDERS)), encoding='utf-8')
+    output.write_page(folder, 'stacks', args, machine=about, rest=rest, both=both,
+                      pushed=pushed(ORDERS[:1] if options.quick else ORDERS))
     missed = [name for name, ways in found.items() if math.isnan(ways[ours].rest)]
     for name in missed:
         print(f'stacks: {name} does not come to rest', file=sys.stderr)

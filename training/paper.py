@@ -9,6 +9,7 @@ The paper draws boxes that just touch, at any angle to ±90°. A scene asks for 
 """
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -67,9 +68,8 @@ def train(folder: Path, scene: str, output: str, *, seed: int, commit: str,
     networks, epochs: instead of those of `SETTINGS`. Raises ValueError for a scene of other boxes.
     """
     settings = SETTINGS[output]
-    settings = PaperSettings(settings.widths, networks=networks or settings.networks,
-                             epochs=epochs or settings.epochs, rate=settings.rate,
-                             initial=settings.initial, wrap=settings.wrap, seed=seed)
+    settings = replace(settings, networks=networks or settings.networks,
+                       epochs=epochs or settings.epochs, seed=seed)
     streams = [drawn(SCENES[scene], np.random.default_rng([seed, number]), count)
                for number, count in enumerate(counts)]
     sizes = np.concatenate([pairs.size_a for pairs in streams]

@@ -7,11 +7,6 @@ from __future__ import annotations
 import csv
 import dataclasses
 import math
-import os
-import signal
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
@@ -158,25 +153,3 @@ def test_what_is_not_as_expected_is_named(tmp_path, monkeypatch, capsys, way, st
     assert landing.main(['--quick', '--ways', way, '--out', str(tmp_path)]) == status
     assert f'{way} at 200 Hz and 2 ms, grid 17: not as expected' in capsys.readouterr().err
     assert '**0 of 1** landings by patches' in (tmp_path / 'landing.md').read_text()
-
-
-ASKED = """
-import os, signal, time
-from benchmarks.landing import left_when_asked
-from box_contact_ros.node import processes
-
-with left_when_asked():
-    with processes.running(['-c', 'import time; time.sleep(100.0)']) as started:
-        print(started.pid, flush=True)
-        os.kill(os.getpid(), signal.SIGTERM)
-        time.sleep(100.0)
-"""
-
-
-def test_sigterm_ends_what_was_started():
-    """On the way out, with the status that a shell reports."""
-    done = subprocess.run([sys.executable, '-c', ASKED], capture_output=True, text=True, timeout=60,
-                          cwd=Path(__file__).resolve().parents[2])
-    assert done.returncode == 128 + signal.SIGTERM, done.stderr
-    with pytest.raises(ProcessLookupError):
-        os.kill(int(done.stdout), 0)

@@ -16,7 +16,7 @@ pytest.importorskip('matplotlib')
 
 from benchmarks.contestant import ours
 from benchmarks.paper import __main__ as program
-from benchmarks.paper import committee, dataset, rotation, soup_tables, tables, tree
+from benchmarks.paper import dataset, rotation, soup_tables, tables, tree
 from benchmarks.paper.jobs import JOBS
 from benchmarks.paper.models import weights_path
 from benchmarks.pose_sets import at_depth, on_cube
@@ -130,11 +130,11 @@ def test_the_files_of_table_1_are_what_the_page_says(name: str) -> None:
 
 def test_a_committee_is_judged_by_the_labels() -> None:
     """A placement moved away from its label is off by as much; the label's own class is best."""
-    some = committee.placements(100)['vertex']
-    point, normal = committee.errors(ours('exact'), some)
+    some = tables.of_each_kind(100)['vertex']
+    point, normal = tables.model_errors(ours('exact'), some)
     assert point < 0.1 and normal < 0.01
     moved = dataset.Placements(some.inputs, some.point + [0.0, 0.0, 0.02], some.normal)
-    assert committee.errors(ours('exact'), moved)[0] == pytest.approx(20.0, abs=0.1)
+    assert tables.model_errors(ours('exact'), moved)[0] == pytest.approx(20.0, abs=0.1)
 
 
 def test_a_tree_holds_its_triangles() -> None:
