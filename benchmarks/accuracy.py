@@ -32,7 +32,6 @@ from box_contact_ros.solver.pose import rotation_matrix
 from box_contact_ros.solver.weights_file import WeightsError
 
 from . import output
-from .arguments import report_parser
 from .contestant import Contestant, ours
 from .errors import ContactErrors, contact_errors
 from .output import markdown_table
@@ -220,8 +219,9 @@ def model_or_class(text: str) -> Any:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Measure, print, write."""
-    parser = report_parser('accuracy', __doc__, quick=f'{QUICK_PAIRS} pairs of each set', seed=2,
-                           out='accuracy.md, accuracy.csv, accuracy.png')
+    parser = output.report_parser(
+        'accuracy', __doc__, quick=f'{QUICK_PAIRS} pairs of each set', seed=2,
+        out='accuracy.md, accuracy.csv, accuracy.png')
     parser.add_argument('--model', nargs='+', type=model_or_class, default=['mlp'],
                         metavar='MODEL', help='names, or package.module:Class (default: mlp)')
     parser.add_argument('--weights', help='weights file of MLP, default: the shipped one')

@@ -26,7 +26,6 @@ from box_contact_ros.core import instruction_sets, native
 
 from . import output
 from .accuracy import CLASSES, Summary
-from .arguments import report_parser
 from .contestant import (
     CORE_MODELS,
     MODELS,
@@ -241,8 +240,9 @@ def draw(path: Path, table: Path) -> None:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Measure, print, write."""
-    parser = report_parser('frontier', __doc__, quick='few pairs and models, to try it out',
-                           seed=3, out='frontier.md, .csv, .png')
+    parser = output.report_parser(
+        'frontier', __doc__, quick='few pairs and models, to try it out', seed=3,
+        out='frontier.md, .csv, .png')
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
     plan, names = (QUICK, QUICK_MODELS) if options.quick else (FULL, MODELS)

@@ -39,7 +39,6 @@ from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 from box_contact_ros.solver.weights_file import Network
 
 from . import judge, output
-from .arguments import report_parser
 from .pose_sets import (
     CONTAINER,
     HIGH_CUBE,
@@ -389,7 +388,8 @@ def fuzz(total: int, *, seed: int = 1, classes: Sequence[str] = tuple(CLASSES),
 
 def main(args: Sequence[str] | None = None) -> int:
     """Fuzz, print a line per class and model; 1 if a gate is broken."""
-    parser = report_parser('fuzz', __doc__, quick=f'{QUICK_PAIRS:,} pairs', seed=1, out='the table')
+    parser = output.report_parser(
+        'fuzz', __doc__, quick=f'{QUICK_PAIRS:,} pairs', seed=1, out='the table')
     parser.add_argument('--pairs', type=within(1), default=PAIRS,
                         help='pairs in all (default: %(default)s)')
     parser.add_argument('--models', nargs='+', choices=MODELS, default=MODELS, metavar='MODEL',

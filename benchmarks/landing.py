@@ -28,7 +28,6 @@ from box_contact_ros.demo.landing import CORNER_SPEED_LIMIT, LandingRecord
 from box_contact_ros.solver.pose import rotation_matrix
 
 from . import output
-from .arguments import report_parser
 from .engines import mujoco_engines
 from .landing_ways import (
     ADDED,
@@ -244,7 +243,7 @@ def _draw_from_the_end(axis: Any, way: str, record: LandingRecord) -> None:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the sweep and write its files; 1 if `GATED` fails an expectation."""
-    parser = report_parser(
+    parser = output.report_parser(
         'landing', __doc__, out='page, table and picture',
         quick=f'every {QUICK}th landing of the grid, every third of the others, at 200 Hz and 2 ms')
     parser.add_argument('--ways', nargs='+', choices=list(WAYS), default=list(WAYS),

@@ -19,7 +19,6 @@ import numpy as np
 import yaml
 
 from . import output
-from .arguments import report_parser
 from .contestant import Contestant, Manifold, ours, packages_of
 from .engines import installed
 from .judge import PRESSED, judge, two_touches
@@ -115,8 +114,8 @@ def table(failures: Mapping[str, NamedFailure], found: Mapping[str, Mapping[str,
 
 def main(args: Sequence[str] | None = None) -> int:
     """Replay all for models and every other engine, print, write; 1 if a gated model fails one."""
-    parser = report_parser('named_failures', __doc__, quick='the models alone',
-                           out='named_failures.md')
+    parser = output.report_parser(
+        'named_failures', __doc__, quick='the models alone', out='named_failures.md')
     options = parser.parse_args(args)
     folder, failures = output.results_folder(parser, options), load()
     rivals, missing = ([], []) if options.quick else installed()

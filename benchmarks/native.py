@@ -27,7 +27,6 @@ import numpy as np
 from box_contact_ros.core import FORCE, instruction_sets, native
 
 from . import output
-from .arguments import report_parser
 from .output import markdown_table, percentiles
 from .pose_sets import FLUSH, LOADS, SETS, Pairs, drawn
 from .timing import by_round, pinned, usable_cores
@@ -261,8 +260,8 @@ def main(args: Sequence[str] | None = None) -> int:
     """Compile, measure, print, write; 2 where the program cannot be made."""
     from tqdm import tqdm
 
-    parser = report_parser('native', __doc__, quick='few pairs and rounds, to try it out',
-                           out='native.md, native.csv')
+    parser = output.report_parser(
+        'native', __doc__, quick='few pairs and rounds, to try it out', out='native.md, native.csv')
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
     pairs, rounds, calls = ((QUICK_PAIRS, QUICK_ROUNDS, QUICK_CALLS) if options.quick

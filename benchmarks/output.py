@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a report is written with: its folder, tables, CSV files, figures, pages, the machine."""
+"""What all reports share: arguments, folder, tables, CSV files, figures, pages, the machine."""
 from __future__ import annotations
 
 import argparse
@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from box_contact_ros.core import native
+from box_contact_ros.solver.arguments import program_parser, within
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,6 +28,24 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS, QUICK_RESULTS = Path('docs/results'), Path('quick-results')
 DPI = 110  # of pictures
+
+
+def report_parser(program: str, doc: str | None, *, quick: str, seed: int | None = None,
+                  out: str = '') -> argparse.ArgumentParser:
+    """Return the parser of a report, whose help begins with `doc`.
+
+    quick: help of `--quick`; seed: default of `--seed`; out: the files that go to the folder of
+    `--out`. The report has those of the last two that are given.
+    """
+    parser = program_parser(program, doc)
+    parser.add_argument('--quick', action='store_true', help=quick)
+    if seed is not None:
+        parser.add_argument('--seed', type=within(0), default=seed,
+                            help='seed of the random numbers (default: %(default)s)')
+    if out:
+        parser.add_argument('--out', type=Path, metavar='DIR', help=f'folder for {out} (default: '
+                            'docs/results, or quick-results with --quick)')
+    return parser
 
 
 def make_folder(parser: argparse.ArgumentParser, folder: Path) -> Path:

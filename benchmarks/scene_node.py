@@ -34,7 +34,6 @@ from box_contact_ros.node.topics import contact_qos, pose_qos
 from box_contact_ros.scene.scene_solver import ALL_BOXES, POSE_ARRAY
 
 from . import output
-from .arguments import report_parser
 from .output import markdown_table, number
 from .scenes import PLACES, bricks
 
@@ -168,8 +167,9 @@ def cpu_seconds(pid: int) -> float:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Stream, print, write."""
-    parser = report_parser('scene_node', __doc__, quick='two seconds, to try it out',
-                           out='scene_node.md, scene_node.csv')
+    parser = output.report_parser(
+        'scene_node', __doc__, quick='two seconds, to try it out',
+        out='scene_node.md, scene_node.csv')
     parser.add_argument('--echo', type=int, metavar='BYTES', help='run the echo node')
     options = parser.parse_args(args)
     if options.echo is not None:

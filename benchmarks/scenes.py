@@ -24,7 +24,6 @@ from box_contact_ros import Box, Pair, Scene, SceneSolver, read_scene
 from box_contact_ros.scene.scene_solver import EVERY_PAIR
 
 from . import output
-from .arguments import report_parser
 from .output import markdown_table, number
 from .timing import (
     by_round,
@@ -231,8 +230,8 @@ def grow(counts: Sequence[int], rounds: int) -> list[Grown]:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Measure, print, write."""
-    parser = report_parser('scenes', __doc__, quick='few boxes and rounds, to try it out',
-                           out='scenes.md, scenes.csv')
+    parser = output.report_parser(
+        'scenes', __doc__, quick='few boxes and rounds, to try it out', out='scenes.md, scenes.csv')
     options = parser.parse_args(args)
     folder, machine = output.results_folder(parser, options), output.machine(PACKAGES)
     rounds = QUICK_ROUNDS if options.quick else ROUNDS

@@ -20,7 +20,6 @@ from box_contact_ros.solver.arguments import within
 from box_contact_ros.solver.contact_solver import ContactSolver
 
 from . import output
-from .arguments import report_parser
 from .errors import contact_errors
 from .pose_sets import LOADS, SETS, Generator, Pairs
 from .steps import drawn_paths, largest_steps
@@ -97,8 +96,9 @@ def main(args: Sequence[str] | None = None) -> int:
     """Search, print, write."""
     from tqdm import tqdm
 
-    parser = report_parser('searched', __doc__, quick=f'{QUICK_MINUTES:g} minutes per quantity',
-                           seed=2, out='searched.md, searched.csv')
+    parser = output.report_parser(
+        'searched', __doc__, quick=f'{QUICK_MINUTES:g} minutes per quantity', seed=2,
+        out='searched.md, searched.csv')
     parser.add_argument('--minutes', type=within(0.0), default=MINUTES,
                         help='per quantity, shared by all sets (default: %(default)g)')
     options = parser.parse_args(args)

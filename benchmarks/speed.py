@@ -19,7 +19,6 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from . import output
-from .arguments import report_parser
 from .contestant import CORE_MODELS, Contestant, ours
 from .engines import installed
 from .output import markdown_table, number
@@ -141,8 +140,9 @@ def cold_table(rows: Sequence[ColdRow]) -> str:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Measure, print, write."""
-    parser = report_parser('speed', __doc__, quick='few calls and rounds, to try it out', seed=1,
-                           out='speed.md, speed_cold.csv')
+    parser = output.report_parser(
+        'speed', __doc__, quick='few calls and rounds, to try it out', seed=1,
+        out='speed.md, speed_cold.csv')
     options = parser.parse_args(args)
     folder, machine = output.results_folder(parser, options), output.machine(PACKAGES)
     calls, rounds, pairs, count = (

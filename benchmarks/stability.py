@@ -22,7 +22,6 @@ from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 
 from . import output
-from .arguments import report_parser
 from .errors import point_errors
 from .hard_poses import Cases, load
 from .judge import NOT_FINITE, NOT_UNIT, OUTSIDE, judge
@@ -123,8 +122,8 @@ def gates(rows: Sequence[StabilityRow]) -> list[str]:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Ask all, print, write; 1 if a gate is broken."""
-    parser = report_parser('stability', __doc__, quick=f'every {QUICK}th family',
-                           out='stability.md and stability.csv')
+    parser = output.report_parser(
+        'stability', __doc__, quick=f'every {QUICK}th family', out='stability.md and stability.csv')
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
     cases = load()

@@ -26,7 +26,6 @@ from box_contact_ros.scene.laws import GRAVITY
 from box_contact_ros.solver.pose import rotation_matrix
 
 from . import output
-from .arguments import report_parser
 from .loops import (
     FLOOR,
     MUJOCO,
@@ -340,8 +339,8 @@ def pushed(orders: Sequence[str]) -> str:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run all scenes, print and write; 1 if one of ours moves with answers at each step."""
-    parser = report_parser('stacks', __doc__, out='stacks.md and stacks.csv',
-                           quick=f'every {QUICK}th scene')
+    parser = output.report_parser(
+        'stacks', __doc__, out='stacks.md and stacks.csv', quick=f'every {QUICK}th scene')
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
     scenes = {scene().name: scene for scene in SCENES[::QUICK if options.quick else 1]}

@@ -22,9 +22,8 @@ from typing import Any
 
 import torch
 
-from benchmarks.arguments import report_parser
 from benchmarks.contestant import SIZES_FOLDER
-from benchmarks.output import QUICK_RESULTS, make_folder
+from benchmarks.output import QUICK_RESULTS, make_folder, report_parser
 from benchmarks.paper import jobs
 from box_contact_ros.core import UNITS_MAX
 from box_contact_ros.solver.arguments import within

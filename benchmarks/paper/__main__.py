@@ -12,7 +12,6 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from .. import output
-from ..arguments import report_parser
 from . import tables
 
 TABLES, FIGURES = (1, 2, 3, 4), (4, 9, 10)
@@ -53,9 +52,9 @@ def report(numbers: Collection[int], drawn: Collection[int], folder: Path, *, qu
 
 def main(args: Sequence[str] | None = None) -> int:
     """Write the page and its pictures."""
-    parser = report_parser('python -m benchmarks.paper', __doc__, out='page, pictures and CSV',
-                           quick=f'look at every {QUICK}th pattern only, and at fewer for the '
-                           'soup')
+    parser = output.report_parser(
+        'python -m benchmarks.paper', __doc__, out='page, pictures and CSV',
+        quick=f'look at every {QUICK}th pattern only, and at fewer for the soup')
     parser.add_argument('--table', type=int, action='append', choices=TABLES,
                         help='only this table; may be given several times')
     parser.add_argument('--figure', type=int, action='append', choices=FIGURES,

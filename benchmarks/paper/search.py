@@ -27,12 +27,12 @@ from tqdm import tqdm
 
 from box_contact_ros.solver.arguments import within
 
-from ..arguments import report_parser
 from ..output import (
     command_line,
     machine,
     markdown_table,
     page,
+    report_parser,
     results_folder,
     subplots,
     write_csv,
