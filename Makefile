@@ -87,7 +87,6 @@ reports:
 	run benchmarks.frontier $(ARGS)
 	run benchmarks.native $(ARGS)
 	run benchmarks.scenes $(ARGS)
-	run benchmarks.scene_node $(ARGS)
 	run benchmarks.speed $(ARGS)
 	run benchmarks.paper $(ARGS)
 	run benchmarks.paper.search $(ARGS)

@@ -284,6 +284,18 @@ def test_pairs_that_no_list_has(array_client, scene_node):
         assert answer.stale.tolist() == [[1, ALONE]]
 
 
+def test_two_thousand_boxes(array_client, scene_node):
+    """A hundred towers of twenty cubes: every array is answered, with every contact."""
+    rows = [(2.0 * tower, 0, 0.999 * cube, 0, 0, 0, 1) for tower in range(100)
+            for cube in range(20)]
+    boxes = ''.join(f'  b{row}: {{size: [1, 1, 1]}}\n' for row in range(len(rows)))
+    with scene_node(f'poses: array\nboxes:\n{boxes}pairs: all\n', pair_topics=False):
+        array_client.offer_until_answered(*rows)
+        for _ in range(20):
+            stamp = array_client.ask(*rows)
+            assert len(array_client.contacts[stamp].contacts) == 100 * 19
+
+
 def test_bad_arrays_are_refused_and_counted(array_node, array_client):
     """Of a bad pose, the box is not there; another length or frame refuses the whole message."""
     bad = [(math.nan, 0, 0, 0, 0, 0, 1), (0, 0, 1e60, 0, 0, 0, 1), (0, 0, 0, 0, 0, 0, 0)]
