@@ -50,7 +50,7 @@ def test_the_program(tmp_path: Path) -> None:
 @pytest.mark.parametrize(('arguments', 'message'), [
     (['mlp'], 'unrecognized arguments: mlp'),
     (['--candidates', '3'], '--candidates: must be at least 16, got 3'),
-    (['--seed', '-1'], "'-1' is not a whole number from 0"),
+    (['--seed', '-1'], 'must be at least 0, got -1'),
 ])
 def test_refused_arguments(arguments: list[str], message: str,
                            capsys: pytest.CaptureFixture[str]) -> None:
