@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from itertools import groupby, product
 from multiprocessing import Pool
 from pathlib import Path
@@ -68,11 +68,6 @@ class Outcome(NamedTuple):
         held = self.way in PATCHES and self.planned.of_grid
         return self.planned.as_expected(self.result) and (
             not held or HeldLimits.at(self.timing.rate_hz).are_met(self.result))
-
-
-def aim(planned: PlannedLanding) -> PlannedLanding:
-    """Return the landing with its trolley in place."""
-    return replace(planned, scenario=aimed(planned.scenario, planned.overhang))
 
 
 def run(way: str, timing: LoopTiming, planned: PlannedLanding) -> Outcome:
@@ -253,7 +248,7 @@ def main(args: Sequence[str] | None = None) -> int:
     step, timings = (QUICK, [SHOWN_TIMING]) if options.quick else (1, TIMINGS)
     planned = [*grid()[SHOWN % step::step], *(ADDED[::3] if options.quick else ADDED)]
     with Pool() as pool:
-        planned = list(tqdm(pool.imap(aim, planned), 'aiming', len(planned), unit=''))
+        planned = list(tqdm(pool.imap(aimed, planned), 'aiming', len(planned), unit=''))
         jobs = list(landings(options.ways, timings, planned, step=step))
         results = [pool.apply_async(run, job) for job in jobs]
         outcomes = [result.get() for result in tqdm(results, 'landings', unit='')]

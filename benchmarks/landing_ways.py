@@ -80,15 +80,13 @@ class OnCastings(CraneScenario):
         return boxes
 
 
-def aimed(scenario: CraneScenario, overhang: tuple[float, float]) -> CraneScenario:
-    """Return the scenario with its trolley where the swaying load first touches at `overhang`.
-
-    overhang: x, y [m] of the load's centre from the stack's.
+def aimed(planned: PlannedLanding) -> PlannedLanding:
+    """Return the landing with its trolley where the swaying load first touches at its overhang.
 
     Moving the trolley moves the whole motion before the touch, so the trolley is shifted by what
     was missed. It is shifted twice: the first shift may change which corner touches.
     """
-    scenario = replace(scenario, offset=overhang)
+    scenario = replace(planned.scenario, offset=planned.overhang)
     exact = solvers(scenario, 'exact')
     boxes = [pose for pose, _ in scenario.stack_boxes.values()]
     for _ in range(2):
@@ -98,9 +96,9 @@ def aimed(scenario: CraneScenario, overhang: tuple[float, float]) -> CraneScenar
             if crane.time > DURATION:
                 raise ValueError(f'the load never touches: {scenario}')
             crane.step()
-        missed = overhang - crane.load_pose[:2]
+        missed = planned.overhang - crane.load_pose[:2]
         scenario = replace(scenario, offset=tuple(scenario.offset + missed))
-    return scenario
+    return replace(planned, scenario=scenario)
 
 
 # --- what is measured -----------------------------------------------------------------------------

@@ -57,7 +57,6 @@ class Outcome:
     rest: float  # since when all corners are slower than `REST_SPEED` [s]; NaN: never
     end_speed: float  # of the fastest corner at the end [m/s]
     deepest: float  # ever
-    depth: float  # at the end
     moved: float  # the farthest box
     turned: float
     cost: float  # of contacts and forces, a step [µs]
@@ -84,7 +83,7 @@ def run(make: Callable[[], Scene], timing: Timing | None) -> Outcome:
         if not speed < LOST_SPEED:
             break
     way, angle = moved(boxes, start)
-    return Outcome(rest, speed, 1e3 * deepest, 1e3 * depth, way.max(), angle.max(),
+    return Outcome(rest, speed, 1e3 * deepest, way.max(), angle.max(),
                    1e6 * loop.spent / max(1, loop.tick))
 
 

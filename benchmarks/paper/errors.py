@@ -14,9 +14,6 @@ import numpy as np
 from box_contact_ros.solver.paper import forward
 from box_contact_ros.solver.weights_file import Network
 
-PARTS = {'all': slice(0, 4), 'point': slice(0, 2), 'normal': slice(2, 4)}
-"""Outputs that are reported together."""
-
 
 def predict(network: Network, inputs: np.ndarray) -> np.ndarray:
     """Return the outputs (n, outputs) float64 of a network for inputs (n, inputs)."""
@@ -43,8 +40,3 @@ def errors_of(network: Network, inputs: np.ndarray, outputs: np.ndarray, wrap: b
               ) -> np.ndarray:
     """Return the errors (n, outputs) [rad]: prediction minus truth."""
     return difference(predict(network, inputs), outputs, wrap)
-
-
-def figures_by_part(errors: np.ndarray) -> dict[str, dict[str, float]]:
-    """Return `figures` over all four outputs, over the point's and over the normal's."""
-    return {part: figures(errors[:, columns]) for part, columns in PARTS.items()}

@@ -17,7 +17,7 @@ from box_contact_ros.solver.weights_file import Network, load_weights
 from ..pose_sets import CUBE
 from ..weights import save_weights
 from . import dataset
-from .errors import errors_of, figures, figures_by_part
+from .errors import errors_of, figures
 from .fit import PaperSettings, fit
 from .models import EXPERTS
 
@@ -127,10 +127,10 @@ def train_paper(job: PaperJob, *, seed: int, commit: str, folder: Path) -> dict[
 
 
 def _metrics(network: Network, patterns: dataset.Patterns, wrap: bool) -> dict[str, Any]:
-    """Return the errors by part; of the classifier also the share of patterns it puts wrong."""
+    """Return the errors; of the classifier also the share of patterns it puts wrong."""
     errors = errors_of(network, patterns.inputs, patterns.outputs, wrap)
     if errors.shape[1] == len(dataset.OUTPUTS):
-        return figures_by_part(errors)
+        return {'all': figures(errors)}
     answer, truth = errors + patterns.outputs, patterns.outputs
     return {'all': figures(errors),
             'wrong': float(np.mean(answer.argmax(axis=1) != truth.argmax(axis=1)))}

@@ -62,7 +62,7 @@ def test_expectations_are_stated_for_each_landing():
     (HANGING_OVER, 50.0, 0.005), (HANGING_OVER, 1000.0, 0.0), (HANGING_OVER, 1000.0, 0.005)])
 def test_the_hardest_of_the_grid_are_within_the_limits_of_held_patches(number, rate_hz, latency):
     """The patch all but lifts off on one side."""
-    planned = landing.aim(grid()[number])
+    planned = aimed(grid()[number])
     result = landing.run('exact', LoopTiming(rate_hz, latency), planned).result
     assert result.at_rest and HeldLimits.at(rate_hz).are_met(result), f'\n{result}'
     assert result.overhang == pytest.approx(math.hypot(*planned.overhang), abs=0.01)
@@ -72,13 +72,13 @@ def test_the_hardest_of_the_grid_are_within_the_limits_of_held_patches(number, r
 @pytest.mark.parametrize('planned', ADDED, ids=[planned.name for planned in ADDED])
 def test_other_loads_and_stacks_do_what_is_expected(planned):
     """One law, whose constants know the load's mass and inertia and no size."""
-    outcome = landing.run('exact', LoopTiming(200.0, 0.002), landing.aim(planned))
+    outcome = landing.run('exact', LoopTiming(200.0, 0.002), aimed(planned))
     assert outcome.as_expected, f'\n{outcome.result}'
 
 
 def test_mujocos_own_contact_carries_the_load():
     """The force is the weight, upward, and the load lies flat."""
-    scenario = aimed(WELL_AIMED.scenario, WELL_AIMED.overhang)
+    scenario = aimed(WELL_AIMED).scenario
     result = WAYS['manifold'].run(scenario, LoopTiming(200.0, 0.0)).judge()
     assert result.at_rest, f'\n{result}'
     assert result.static_tilt < 1e-5

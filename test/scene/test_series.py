@@ -116,8 +116,7 @@ def crane_series(name: str) -> Series:
     pytest.importorskip('mujoco')
     from benchmarks.landing_ways import aimed, grid, land, solvers
 
-    planned = grid()[LANDED[name]]
-    scenario = aimed(planned.scenario, planned.overhang)
+    scenario = aimed(grid()[LANDED[name]]).scenario
     load = land(scenario, solvers(scenario, 'mlp'), rate_hz=CRANE_RATE, latency=0.002).poses
     n = len(load)
     return Series(Pairs(np.tile(scenario.stack_pose, (n, 1)), np.array(load), np.tile(
