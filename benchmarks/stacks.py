@@ -46,6 +46,7 @@ JUDGED = 10  # steps from one judgement to the next
 PUSHES = (0.15, 0.3)  # on every box of a real pallet [weight]
 PUSHED = 2.0  # how long [s]
 NEAR_MM, NEAR_DEG = 5.0, 0.5  # a box stays that moves and turns less
+FALLEN_DEG = 45.0  # a box that turned more fell
 
 # --- judgement ------------------------------------------------------------------------------------
 
@@ -312,8 +313,13 @@ CONVERGED = Timing(0.0001, 10_000.0, 0.0)
 # --- the report -----------------------------------------------------------------------------------
 
 
-def verdict(outcome: Outcome) -> str:
-    """Return when a scene came to rest [s], or how fast its fastest corner is at the end."""
+def verdict(outcome: Outcome, best: Outcome) -> str:
+    """Return when a scene came to rest [s], the speed of its fastest corner, or that it fell.
+
+    best: with answers at each step of 1 ms, by which boxes of a heap fall as they should.
+    """
+    if outcome.turned > FALLEN_DEG > best.turned:
+        return '**fell**'
     return (f'{outcome.rest:.2f}' if not math.isnan(outcome.rest) else
             f'**{1e3 * outcome.end_speed:.2g} mm/s**')
 
@@ -341,17 +347,18 @@ def main(args: Sequence[str] | None = None) -> int:
     parser = output.report_parser(
         'stacks', __doc__, out='stacks.md and stacks.csv', quick=f'every {QUICK}th scene')
     options = parser.parse_args(args)
-    folder = output.results_folder(parser, options)
+    folder, ours = output.results_folder(parser, options), str(TIMINGS[0])
     scenes = {scene().name: scene for scene in SCENES[::QUICK if options.quick else 1]}
     found: dict[str, dict[str, Outcome]] = {}
     for name, make in scenes.items():
         found[name] = {str(timing): run(make, timing) for timing in TIMINGS}
         found[name][MUJOCO] = run(make, None)
-        print(name, {way: verdict(each) for way, each in found[name].items()}, flush=True)
-    ours = str(TIMINGS[0])
+        print(name, {way: verdict(each, found[name][ours])
+                     for way, each in found[name].items()}, flush=True)
     rest = output.markdown_table(
         ['scene', *map(str, TIMINGS), MUJOCO],
-        [[name, *map(verdict, ways.values())] for name, ways in found.items()])
+        [[name, *(verdict(each, ways[ours]) for each in ways.values())]
+         for name, ways in found.items()])
     both = output.markdown_table(
         ['scene', 'deepest [mm]', 'MuJoCo', 'moved [mm]', 'MuJoCo', 'µs per step', 'MuJoCo'],
         [[name, *(f'{value:.3g}' for field in ('deepest', 'moved', 'cost')
