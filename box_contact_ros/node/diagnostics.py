@@ -281,7 +281,9 @@ def _without_partner(unmatched: Sequence[Pair], pairing: Pairing) -> Finding:
         a, b = np.sort(pairing.stamps(pair.a)), np.sort(pairing.stamps(pair.b))
         if max(len(a), len(b)) < FEWEST_STAMPS or not len(a) or not len(b):
             continue
-        difference = 1e-9 * int(abs(a[:, None] - b).min())
+        after = np.searchsorted(b, a)  # the first of b not before each of a
+        difference = 1e-9 * int(min(abs(a - b.take(near, mode='clip')).min()
+                                    for near in (after - 1, after)))
         if difference <= 1e-9 * pairing.tolerance:
             continue
         message += f': stamps of {pair.a} and {pair.b} differ by {difference:.3g} s'
