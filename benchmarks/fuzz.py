@@ -259,7 +259,7 @@ class RandomMlp:
     def batch(self, pose_a: np.ndarray, pose_b: np.ndarray, *, size_a: np.ndarray,
               size_b: np.ndarray) -> Contacts:
         """Return the contacts of poses (n, 7) and full extents (n, 3), as `ContactSolver` does."""
-        return Contacts(*self._solver.solve(pose_a, pose_b, size_a, size_b, 1)[0])
+        return self._solver.solve(pose_a, pose_b, size_a, size_b, 1)[0]
 
 
 Solver = ContactSolver | RandomMlp

@@ -50,9 +50,7 @@ class PairSolver:
     def batch(self, *args: Any, **keywords: Any) -> Any: ...
     def solve(self, poses_a: np.ndarray, poses_b: np.ndarray, sizes_a: np.ndarray,
               sizes_b: np.ndarray, threads: int, patch: bool = True,
-              pairs: np.ndarray | None = None, /,
-              ) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray,
-                               np.ndarray, np.ndarray], int]: ...
+              pairs: np.ndarray | None = None, /) -> tuple[Any, int]: ...  # Contacts
     @property
     def clipped(self) -> int: ...
 

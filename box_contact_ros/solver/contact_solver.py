@@ -147,8 +147,7 @@ class ContactSolver(native.PairSolver):
         if threads > 1:
             threads = min(int(threads), 1 + len(a if places is None else places))
         if self._model is None:
-            rows, refused = self.solve(a, b, size_a, size_b, threads, bool(patch), places)
-            contacts = Contacts(*rows)
+            contacts, refused = self.solve(a, b, size_a, size_b, threads, bool(patch), places)
         else:
             if places is not None:
                 first, second = places.T

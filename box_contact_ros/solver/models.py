@@ -14,7 +14,6 @@ from typing import Protocol
 
 import numpy as np
 
-from ..core import native
 from .checks import nearest_name, short_repr
 from .contact import Contacts
 
@@ -43,19 +42,6 @@ class Model(Protocol):
         With them comes the number of the first row that is refused, or −1. Contacts of a batch with
         a refused row have no meaning.
         """
-
-
-class Exact:
-    """Model `exact` as an object, for models in Python that leave pairs to it."""
-
-    def __init__(self) -> None:
-        self._pairs = native.PairSolver('exact', (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
-
-    def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
-              threads: int = 1) -> tuple[Contacts, int]:
-        """Return contacts for poses (n, 7), sizes (n or 1, 3), and the first refused row or −1."""
-        columns, refused = self._pairs.solve(a, b, size_a, size_b, threads)
-        return Contacts(*columns), refused
 
 
 def check_model(where: str, name: object) -> None:

@@ -149,15 +149,14 @@ class Paper:
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
               threads: int = 1) -> tuple[Contacts, int]:
         """Return contacts for poses (n, 7), sizes (n or 1, 3), and the first refused row or −1."""
-        columns, refused = self._exact.solve(a, b, size_a, size_b, threads, False)
-        exact = Contacts(*columns)
+        exact, refused = self._exact.solve(a, b, size_a, size_b, threads, False)
         sizes_a, sizes_b = (np.broadcast_to(size, (len(a), 3)) for size in (size_a, size_b))
         misfits = np.flatnonzero(~self._fits(sizes_a, sizes_b))
         if len(misfits) and (refused < 0 or misfits[0] < refused):
             refused = int(misfits[0])
         touching = exact.colliding
         if refused < 0 and touching.any():
-            rows = Contacts(*(column[touching] for column in columns))
+            rows = Contacts(*(column[touching] for column in exact))
             exact.point[touching], exact.normal[touching] = self._contacts(
                 a[touching], b[touching], 0.5 * sizes_a[touching], rows)
         return exact, refused

@@ -28,8 +28,8 @@ from typing import NamedTuple
 import fcl
 import numpy as np
 
+from box_contact_ros.core import native
 from box_contact_ros.solver.contact import Contacts, without_patch
-from box_contact_ros.solver.models import Exact
 
 Size = tuple[float, ...]  # three full extents [m], as a key of what is kept
 
@@ -123,7 +123,7 @@ class Soup:
 
     def __init__(self, divisions: int) -> None:
         self.fallbacks = 0
-        self._exact = Exact()
+        self._exact = native.PairSolver('exact', (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
 
         # Each solver keeps objects of its own, one for A and one for B: placing moves them. Their
         # meshes are kept with them, as other solvers' may displace them in `mesh`.

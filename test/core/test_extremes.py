@@ -109,7 +109,7 @@ def test_mlp_is_sound(seed: int) -> None:
     rng = np.random.default_rng([23, seed])
     pairs = poses.extreme_pairs(rng, N)
     pairs = Pairs(*(part[accepted(pairs)] for part in pairs))
-    found = Contacts(*solver('mlp', rng).solve(*pairs, 1)[0])
+    found = solver('mlp', rng).solve(*pairs, 1)[0]
     rows = found.colliding
     assert rows.mean() > 0.1 and np.isfinite(found.point[rows]).all()
     assert (found.volume[rows] > 0.0).all()

@@ -13,6 +13,7 @@ import poses
 import pytest
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.core import native
 from box_contact_ros.scene.scene_solver import (
     EVERY_PAIR,
     Box,
@@ -21,7 +22,6 @@ from box_contact_ros.scene.scene_solver import (
     SceneSolver,
     two_boxes,
 )
-from box_contact_ros.solver.models import Exact
 
 IDENTITY = (0, 0, 0, 0, 0, 0, 1)
 
@@ -219,7 +219,8 @@ class Upwards:
     """A model of a user's own: the answers of exact, every normal upwards."""
 
     def solve(self, a, b, size_a, size_b, threads=1):
-        contacts, refused = Exact().solve(a, b, size_a, size_b, threads)
+        exact = native.PairSolver('exact', poses.CUBE, poses.CUBE)
+        contacts, refused = exact.solve(a, b, size_a, size_b, threads)
         return contacts._replace(normal=np.tile([0.0, 0, 1], (len(a), 1))), refused
 
 

@@ -76,7 +76,7 @@ def named_set(request: pytest.FixtureRequest) -> tuple[str, Pairs]:
 
 def with_numbers(pairs: Pairs, numbers: np.ndarray) -> Contacts:
     """Return the contacts by a network as the core reads it."""
-    return Contacts(*native.PairSolver('mlp', UNIT, UNIT, numbers).solve(*pairs, 1)[0])
+    return native.PairSolver('mlp', UNIT, UNIT, numbers).solve(*pairs, 1)[0]
 
 
 def assert_same_bits(one: Contacts, other: Contacts, where: object = None) -> None:

@@ -18,8 +18,9 @@ import yaml
 
 import box_contact_ros
 from box_contact_ros import ContactSolver
+from box_contact_ros.core import native
 from box_contact_ros.solver.arguments import model_name
-from box_contact_ros.solver.models import MODELS, NATIVE, Exact, check_model, most_near
+from box_contact_ros.solver.models import MODELS, NATIVE, check_model, most_near
 
 ROOT = Path(__file__).resolve().parents[2]
 HIGHER = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
@@ -30,11 +31,11 @@ def python(code):
                           cwd=Path(box_contact_ros.__file__).parents[1])
 
 
-class Lifted(Exact):
+class Lifted(native.PairSolver):
     """The exact point, moved up by some millimetres: a model of this test's own."""
 
     def __init__(self, millimetres):
-        super().__init__()
+        super().__init__('exact', poses.CUBE, poses.CUBE)
         self.lift = 1e-3 * millimetres
 
     def __reduce__(self):

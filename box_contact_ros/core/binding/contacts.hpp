@@ -141,11 +141,11 @@ struct ContactArrays {
             axis.numbers,
             margin};
   }
-  PyObject* release(PyTypeObject* type) {
+  PyObject* release() {
     // Without a patch, the volume of pairs in contact is unknown.
     for (npy_intp row = 0; !patch && row < count; ++row)
       volume.numbers[row] = colliding.numbers[row] ? unknown : 0.0;
-    return pack(type, colliding, separation, normal, point, volume, covariance, axis);
+    return pack(contacts_type, colliding, separation, normal, point, volume, covariance, axis);
   }
 
  private:

@@ -56,12 +56,11 @@ inline const double* numbers_of(PyObject* object, int n, double* copy) {
 
 // Rows (count, columns) of a float64 array that lies in order, or nullptr. `count` −1: any.
 inline const double* plain_rows(PyObject* object, npy_intp& count, npy_intp columns) {
-  if (!PyArray_CheckExact(object)) return nullptr;
+  if (!is_plain<double>(object)) return nullptr;
   auto* array = reinterpret_cast<PyArrayObject*>(object);
-  bool plain = PyArray_TYPE(array) == NPY_DOUBLE && PyArray_NDIM(array) == 2 &&
-               PyArray_DIM(array, 1) == columns && PyArray_ISCARRAY_RO(array) &&
-               (count < 0 || PyArray_DIM(array, 0) == count);
-  if (!plain) return nullptr;
+  bool fits = PyArray_NDIM(array) == 2 && PyArray_DIM(array, 1) == columns &&
+              (count < 0 || PyArray_DIM(array, 0) == count);
+  if (!fits) return nullptr;
   count = PyArray_DIM(array, 0);
   return static_cast<const double*>(PyArray_DATA(array));
 }

@@ -186,7 +186,7 @@ inline PyObject* solver_batch(PyObject* self, PyObject* args, PyObject* keywords
   PlainBatch plain;
   if (setup && plain.read(args, keywords, *setup)) {
     ContactArrays found{plain.count, plain.patch};
-    if (setup->solve(plain.rows, found, plain.threads) < 0) return found.release(contacts_type);
+    if (setup->solve(plain.rows, found, plain.threads) < 0) return found.release();
   }
   return call_method(self, name_batch_general, args, keywords);
 }
@@ -202,7 +202,7 @@ inline PyObject* solver_solve(PyObject* self, PyObject* const* args, Py_ssize_t 
   PairArrays pairs(args, count > 6 ? args[6] : Py_None);
   ContactArrays found{pairs.count, patch};
   long refused = setup->solve(pairs.rows, found, threads);
-  return Py_BuildValue("(Nl)", found.release(&PyTuple_Type), refused);
+  return Py_BuildValue("(Nl)", found.release(), refused);
 }
 
 inline PyObject* solver_clipped(PyObject* self, void*) {
@@ -213,12 +213,9 @@ inline PyObject* solver_clipped(PyObject* self, void*) {
 inline PyMethodDef solver_methods[] = {
     {"solve", method<solver_solve>(), METH_FASTCALL,
      "solve(poses_a, poses_b, sizes_a, sizes_b, threads, patch=True, pairs=None)\n--\n\n"
-     "Return (colliding, separation, normal, point, volume, covariance, axis), and the first "
-     "refused "
-     "row or -1.\n\n"
-     "poses (m, 7), sizes (m, 3) or (1, 3) full extents [m]; frame: that of the poses. pairs (n, "
-     "2): "
-     "places of the boxes of each row."},
+     "Return Contacts, and the first refused row or -1.\n\n"
+     "poses (m, 7), sizes (m, 3) or (1, 3) full extents [m]; frame: that of the poses.\n"
+     "pairs (n, 2): places of the boxes of each row."},
     {"batch", method<solver_batch>(), METH_VARARGS | METH_KEYWORDS,
      "batch($self, poses_a, poses_b=None, *, size_a=None, size_b=None, sizes=None, pairs=None, "
      "threads=1, patch=True)\n--\n\n"
