@@ -29,7 +29,6 @@ POSE_ARRAY = 'poses'
 """Topic of the poses of all moving boxes, where they come as one message."""
 ALL_BOXES = 'all boxes'
 """Source of these poses: no box of a scene file can have this name."""
-FLOAT64 = np.dtype(np.float64)
 NOWHERE = np.full(7, np.nan)
 """Instead of the pose of a box that is not there."""
 EVERY_PAIR = (('*', '*'),)
@@ -374,8 +373,6 @@ class SceneSolver:
         self._size = np.array([box.size for box in boxes], dtype=float)
         self._poses = np.array([box.pose or [np.nan] * 7 for box in boxes], dtype=float)
         self._moving = np.array([scene.index_of[name] for name in scene.moving])
-        self._places = [(name, self._poses[index])  # views: faster than rows by index
-                        for name, index in zip(scene.moving, self._moving)]
         self._broad_phase = native.BroadPhase(self._size, scene.is_fixed, margin, scene.rows,
                                               *scene.groups)
         a, b = scene.rows[0] if scene.pairs else (0, 0)
@@ -441,6 +438,8 @@ class SceneSolver:
 
     def _set_poses(self, poses: Sequence[np.ndarray | None] | np.ndarray) -> None:
         """Take the poses of the moving boxes."""
+        if native.write_poses(self._poses, self._moving, poses):  # those of every node
+            return
         if len(poses) != len(self._moving):
             raise ValueError(f'{len(poses)} poses, but {len(self._moving)} boxes move: '
                              f'{short_repr(list(self.scene.moving))}; give a list of a pose or '
@@ -448,10 +447,6 @@ class SceneSolver:
         if isinstance(poses, np.ndarray):
             self._poses[self._moving] = as_floats(poses, 'poses', 'poses (n, 7)', (None, 7))
             return
-        for (name, place), pose in zip(self._places, poses):
-            if pose is None:
-                pose = NOWHERE
-            elif type(pose) is not np.ndarray or pose.dtype is not FLOAT64 or pose.shape != (7,):
-                pose = as_floats(pose, f'pose of {name}',
-                                 'a pose (x y z qx qy qz qw)', (7,))
-            place[:] = pose
+        for name, index, pose in zip(self.scene.moving, self._moving, poses):
+            self._poses[index] = NOWHERE if pose is None else as_floats(
+                pose, f'pose of {name}', 'a pose (x y z qx qy qz qw)', (7,))

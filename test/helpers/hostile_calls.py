@@ -90,6 +90,23 @@ def places_of_no_box() -> None:
             refused(ValueError, native.BroadPhase, *given)
 
 
+def rows_of_no_array() -> None:
+    """`write_poses` writes to an array that it is given, at rows that it is given."""
+    to, places = rows(), np.array([3, 0])
+    assert native.write_poses(to, places, [POSE, None])
+    assert to[3].tolist() == list(POSE) and np.isnan(to[0]).all()
+    for given in ((POSE, POSE), [POSE], [POSE, POSE[:6]], [POSE, 'a'], [POSE, [True] * 7]):
+        assert not native.write_poses(to, places, given)
+    for row in (-1, 4, 2**40, -2**62):
+        refused(ValueError, native.write_poses, to, np.array([0, row]), [POSE, POSE])
+    fixed = rows()
+    fixed.flags.writeable = False
+    refused(ValueError, native.write_poses, fixed, places, [POSE, POSE])
+    refused(ValueError, native.write_poses, np.zeros((4, 6)), places, [POSE, POSE])
+    for other in (to[::2], to.astype(np.float32), to.tolist(), None):  # would be copied
+        refused(TypeError, native.write_poses, other, places, [POSE, POSE])
+
+
 def arrays_too_short() -> None:
     for argument in (0, 1, 4, 5):
         given = phase_arguments()
@@ -243,6 +260,7 @@ def random_calls(seed: int, rounds: int) -> None:
         (public.batch, [rows()], {'sizes': boxes, 'pairs': places}),
         (solver.solve, [rows(), rows(), one, one, 2, True, places], {}),
         (native.Contact, [True, -1.0, np.ones(3), np.ones(3), 1.0, np.eye(3), 2], {}),
+        (native.write_poses, [rows(), np.array([3, 0]), [POSE, None]], {}),
         (native.mlp_inputs, [rows(), rows(), one, one], {}),
         (native.clipped, [rows(), rows(), one, one], {}),
         (native.BroadPhase, phase_arguments(), {}),
@@ -273,7 +291,7 @@ def random_calls(seed: int, rounds: int) -> None:
 
 
 if __name__ == '__main__':
-    for attack in (places_of_no_box, arrays_too_short, bounds_without_an_order,
+    for attack in (places_of_no_box, rows_of_no_array, arrays_too_short, bounds_without_an_order,
                    networks_that_no_file_has, threads_below_one, extreme_numbers,
                    pairs_changed_meanwhile):
         attack()

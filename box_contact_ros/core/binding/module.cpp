@@ -36,6 +36,10 @@ PyMethodDef module_methods[] = {
      "Return the instruction sets that were built and that this machine can run, best last."},
     {"use_contacts", method<use_contacts>(), METH_O,
      "use_contacts(type)\n--\n\nSet the named tuple that batches return."},
+    {"write_poses", method<write_poses>(), METH_FASTCALL,
+     "write_poses(to, rows, poses)\n--\n\n"
+     "Write a list of poses (7,), or None for NaN, to rows (n,) of an array (m, 7).\n\n"
+     "Return False where one is no plain array, tuple or list of numbers, or poses no list of n."},
     {"mlp_inputs", method<mlp_inputs>(), METH_FASTCALL,
      "mlp_inputs(poses_a, poses_b, sizes_a, sizes_b)\n--\n\n"
      "Return what model `mlp` reads of n pairs that touch.\n\n"

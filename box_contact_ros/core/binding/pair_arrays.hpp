@@ -4,6 +4,9 @@
 // Poses and sizes of pairs of boxes as arguments.
 #pragma once
 
+#include <algorithm>
+#include <limits>
+
 #include "../src/kernel.hpp"
 #include "arrays.hpp"
 
@@ -63,6 +66,29 @@ inline const double* plain_rows(PyObject* object, npy_intp& count, npy_intp colu
   if (!fits) return nullptr;
   count = PyArray_DIM(array, 0);
   return static_cast<const double*>(PyArray_DATA(array));
+}
+
+// Write a list of poses (7,), None for a box that is not there, to rows of an array. Returns False
+// at the first that is not plain, so that Python converts them all or says what is wrong.
+inline PyObject* write_poses(PyObject*, PyObject* const* args, Py_ssize_t count) {
+  if (count != 3 || !is_plain<double>(args[0]))
+    fail(PyExc_TypeError, "write_poses(to, rows, poses)");
+  auto to = read<double>(args[0], "to", {any_length, 7});
+  auto rows = read<int64_t>(args[1], "rows", {any_length});
+  if (!PyArray_ISWRITEABLE(to.array())) fail(PyExc_ValueError, "to is read-only");
+  PyObject* poses = args[2];
+  if (!PyList_Check(poses) || PyList_GET_SIZE(poses) != rows.length(0)) Py_RETURN_FALSE;
+  for (npy_intp k = 0; k < rows.length(0); ++k) {
+    int64_t row = rows.numbers[k];
+    if (row < 0 || row >= to.length(0)) fail(PyExc_ValueError, "rows has one that `to` lacks");
+    double copy[7], *place = to.numbers + 7 * row;
+    std::fill_n(copy, 7, std::numeric_limits<double>::quiet_NaN());
+    PyObject* pose = PyList_GET_ITEM(poses, k);
+    const double* numbers = pose == Py_None ? copy : numbers_of(pose, 7, copy);
+    if (!numbers) Py_RETURN_FALSE;
+    std::memmove(place, numbers, sizeof copy);  // a pose may be a row of `to`
+  }
+  Py_RETURN_TRUE;
 }
 
 // Rows of pairs, as arrays that stay alive.
