@@ -29,7 +29,7 @@ _ORDERS = {b'\0\0': '>', LITTLE: '<'}
 another way: docs/contributing/decisions/contact-node.md."""
 _PADDING = 3
 """Most bytes after the body, of any value: RTPS pads a message to a multiple of four."""
-_STAMP = struct.Struct('<iI')
+_HEAD = struct.Struct('<2s2xiI')  # encapsulation and stamp
 _POSE = struct.Struct('<7d')
 VECTOR_BYTES = 8 * 3
 _LAYOUT = '<2s2xiI{}s{}x7d'
@@ -40,11 +40,10 @@ CONTACT_BYTES = 8 * 15
 """Of a contact behind its names: point, normal, depth, volume, area and covariance."""
 MOST_NAMES = 2**16
 """Pairs whose names are kept as bytes, some 10 MB."""
-FRAME_AT = ENCAPSULATION + _STAMP.size + 4
+FRAME_AT = _HEAD.size + 4
 """Where frame_id's characters are: behind stamp and length."""
 _LEAST, _MOST = 2.0 * QUATERNION_MIN, 0.5 * QUATERNION_MAX
 """Norms of quaternions that are certainly good, whatever the rounding."""
-_array = np.array
 _new_tuple = tuple.__new__  # a named tuple's own constructor is Python code
 
 
@@ -123,7 +122,7 @@ class PoseReader:
         if (frame == self._frame and order == LITTLE and nanosec < NANOSECONDS
                 and hypot(x, y, z) < LENGTH_MAX
                 and _LEAST < hypot(qx, qy, qz, qw) < _MOST):
-            return _new_tuple(StampedPose, (_array((x, y, z, qx, qy, qz, qw)), self._frame_id,
+            return _new_tuple(StampedPose, ((x, y, z, qx, qy, qz, qw), self._frame_id,
                                             sec * NANOSECONDS + nanosec))
         return self._read_slowly(data)
 
@@ -140,7 +139,7 @@ class PoseReader:
             self._frame, self._frame_id = data[start:end], frame_id
             self._unpack = struct.Struct(
                 _LAYOUT.format(end - start, numbers_at(length) - end)).unpack
-        return StampedPose(np.array(numbers), frame_id, stamp)
+        return StampedPose(numbers, frame_id, stamp)
 
     def read_poses(self, data: bytes) -> StampedPose:
         """Return all poses of a serialised PoseArray, numbers (n, 7), or raise Refused.
@@ -180,7 +179,7 @@ class ContactWriter:
 
 def header_bytes(stamp: int, frame_id: str) -> bytes:
     """Return the encapsulation and the header of a stamp [ns]."""
-    return LITTLE + b'\0\0' + _STAMP.pack(*divmod(stamp, NANOSECONDS)) + _string(frame_id)
+    return _HEAD.pack(LITTLE, *divmod(stamp, NANOSECONDS)) + _string(frame_id)
 
 
 def aligned(data: bytes) -> bytes:

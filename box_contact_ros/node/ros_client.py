@@ -50,7 +50,7 @@ def pose_topics(scene: Scene) -> list[PoseTopic]:
 
 def _read_one(reader: PoseReader, _: int, data: bytes) -> StampedPose:
     pose = reader.read_pose(data)
-    return pose._replace(numbers=pose.numbers[None])
+    return pose._replace(numbers=np.array([pose.numbers]))
 
 
 def _read_array(reader: PoseReader, count: int, data: bytes) -> StampedPose:

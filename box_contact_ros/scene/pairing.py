@@ -81,7 +81,7 @@ OVERTAKEN = 'dropped: newer poses wait'
 class StampedPose(NamedTuple):
     """A pose as it came."""
 
-    numbers: np.ndarray  # (7,) `x y z qx qy qz qw`; of an array of poses (n, 7)
+    numbers: Any  # seven floats `x y z qx qy qz qw`; of a message of all poses an array (n, 7)
     frame_id: str
     stamp: int  # [ns]
 

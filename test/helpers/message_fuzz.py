@@ -25,6 +25,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
 from geometry_msgs.msg import PoseArray, PoseStamped
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.serialization import deserialize_message
@@ -198,7 +199,8 @@ def outcome_of(read: Callable[[Any], StampedPose], message: Any) -> Outcome:
         pose = read(message)
     except Refused as refused:
         return (refused.reason,)
-    return pose.numbers.tobytes(), pose.numbers.shape, pose.frame_id, pose.stamp
+    numbers = np.array(pose.numbers)
+    return numbers.tobytes(), numbers.shape, pose.frame_id, pose.stamp
 
 
 def fuzz(message_type: type, messages: int, *, seed: int) -> tuple[Counter[str], list[str]]:

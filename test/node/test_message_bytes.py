@@ -89,8 +89,8 @@ def test_what_cdr_leaves_open_makes_no_difference(order):
         array = start + counted + padding * (-len(counted) % 8) + pose
         for _ in range(2):  # the second time the reader knows the frame
             for stamped in (reader.read_pose(data), reader.read_poses(array)):
-                assert stamped.numbers.ravel().tolist() == list(POSE)
-                assert stamped.numbers.dtype == np.float64
+                numbers = np.array(stamped.numbers)
+                assert numbers.ravel().tolist() == list(POSE) and numbers.dtype == np.float64
                 assert (stamped.frame_id, stamped.stamp) == (frame[:-1].decode(), STAMP)
 
 
