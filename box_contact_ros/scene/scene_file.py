@@ -11,7 +11,6 @@ import json
 import os
 import re
 from collections.abc import Mapping
-from itertools import islice
 from typing import Any
 
 import yaml
@@ -25,8 +24,6 @@ MOST_STREAMS = 1000
 all poses in one message."""
 PLAIN_INT = re.compile(r'[-+]?(0|[1-9][0-9]*)')
 PLAIN_FLOAT = re.compile(r'[-+]?[0-9]*(\.[0-9]*)?([eE][-+]?[0-9]+)?')
-LONGEST_NAME = 100
-_NAME = re.compile('[A-Za-z_][A-Za-z0-9_]*')
 _WILDCARDS = re.compile(r'[*?[]')
 _ALL = [{'a': '*', 'b': '*'}]  # what `pairs: all` stands for
 
@@ -108,28 +105,10 @@ def _check_schema(data: Any) -> None:
     from jsonschema import Draft202012Validator  # only here: it takes 0.1 s
     from jsonschema.exceptions import best_match
 
-    if isinstance(data, dict) and isinstance(data.get('boxes'), dict):
-        # The validator takes 0.2 ms for a box: it gets those that may be wrong, and never none.
-        boxes = data['boxes']
-        odd = {name: entry for name, entry in boxes.items() if not _is_plain(name, entry)}
-        data = data | {'boxes': odd or dict(islice(boxes.items(), 1))}
     schema = json.loads(resource_path('msg_schemas', 'scene.json').read_text('utf-8'))
     error = best_match(Draft202012Validator(schema).iter_errors(data))
     if error is not None:
         raise Fault(tuple(error.absolute_path), error.message)
-
-
-def _is_plain(name: Any, entry: Any) -> bool:
-    """Return whether a box has nothing but a good name, and plain numbers as its size and pose."""
-    return (isinstance(entry, dict) and isinstance(name, str) and len(name) <= LONGEST_NAME
-            and _NAME.fullmatch(name) is not None and entry.keys() <= {'size', 'pose'}
-            and _are_numbers(entry.get('size'), 3) and min(entry['size']) > 0
-            and ('pose' not in entry or _are_numbers(entry['pose'], 7)))
-
-
-def _are_numbers(value: Any, count: int) -> bool:
-    return type(value) is list and len(value) == count and all(
-        type(number) in (int, float) for number in value)
 
 
 def _is_pattern(entry: Mapping[str, str]) -> bool:
