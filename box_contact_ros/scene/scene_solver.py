@@ -183,27 +183,23 @@ class Scene:
         met[self.rows[(self.rows == index).any(axis=1)]] = False
         return met
 
+    def _later_partners(self, index: int) -> np.ndarray:
+        """Return the boxes (n,) behind a box that patterns pair it with."""
+        return index + 1 + np.flatnonzero(self._partners(index)[index + 1:])
+
     def every_pair(self) -> Iterator[Pair]:
         """Yield the listed pairs, then those that patterns ask for, by index."""
         yield from self.pairs
-        group, allowed = self.groups
         for index in range(len(self.boxes) if self.patterns else 0):
-            for other in (index + 1 + np.flatnonzero(self._partners(index)[index + 1:])).tolist():
-                is_a = allowed[group[index], group[other]] == 1
-                yield self.pair_of(*((index, other) if is_a else (other, index)))
+            for other in self._later_partners(index).tolist():
+                boxes = (index, other) if self.has_pair(index, other) else (other, index)
+                yield self.pair_of(*boxes)
 
     @cached_property
     def pair_count(self) -> int:
         """How many pairs the scene has."""
-        group, allowed = self.groups
-        if not self.patterns:
-            return len(self.pairs)
-        boxes, fixed = (np.bincount(group[of], minlength=len(allowed))
-                        for of in (slice(None), self.is_fixed))
-        both = (allowed > 0) * (np.outer(boxes, boxes) - np.outer(fixed, fixed))
-        with_itself = ((boxes - fixed) * (np.diag(allowed) > 0)).sum()
-        listed = np.count_nonzero(allowed[group[self.rows[:, 0]], group[self.rows[:, 1]]])
-        return len(self.pairs) + int(both.sum() - with_itself) // 2 - int(listed)
+        indices = range(len(self.boxes) if self.patterns else 0)
+        return len(self.pairs) + sum(len(self._later_partners(index)) for index in indices)
 
     def partners(self, name: str) -> set[str]:
         """Return the moving boxes that a moving box has a pair with; itself if one is fixed."""
