@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,11 +15,7 @@ from safetensors.numpy import load, load_file, save_file
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.resources import resource_path
-from box_contact_ros.solver.weights_file import (
-    FILE_LIMIT,
-    WeightsError,
-    load_weights,
-)
+from box_contact_ros.solver.weights_file import WeightsError, load_weights
 
 WIDTHS = (6, 5, 3, 4)
 
@@ -111,7 +106,7 @@ def test_sizes_that_are_none(tmp_path: Path, sizes: object) -> None:
 
 
 @pytest.mark.parametrize('text', [None, '', '{', '3', '"name"', '[]',
-                                  '[["name", "a pair"]]', '[' * 200_000])
+                                  '[["name", "a pair"]]'])
 def test_no_card(tmp_path: Path, text: str | None) -> None:
     metadata = {} if text is None else {'card': text}
     save_file(tensors(), tmp_path / 'x', metadata=metadata)
@@ -180,14 +175,6 @@ def test_nothing_stands_after_the_tensors(good: Path, tail: bytes) -> None:
         load_weights(good)
 
 
-def test_a_file_of_any_size_is_not_read(good: Path) -> None:
-    """Sparse, so that the test is quick."""
-    with good.open('ab') as file:
-        file.truncate(FILE_LIMIT + 1)
-    with pytest.raises(WeightsError, match='larger than'):
-        load_weights(good)
-
-
 def test_every_edited_byte_of_the_header(good: Path) -> None:
     """What is still read has the bits that were written, under whatever name."""
     content = good.read_bytes()
@@ -205,17 +192,6 @@ def test_every_edited_byte_of_the_header(good: Path) -> None:
                       for layer in network.layers for array in layer) == want
         read += 1
     assert read > 0  # a letter of the card
-
-
-def test_many_networks_take_no_quadratic_time(tmp_path: Path) -> None:
-    """20,000 in one file are read in a second or so; a hundred times that, where each asks all."""
-    count = 20_000
-    one = {'0.weight': np.zeros((1, 1), np.float32), '0.bias': np.zeros(1, np.float32)}
-    path = write(tmp_path / 'x', {f'n{k}.{part}': array for k in range(count)
-                                  for part, array in one.items()}, architecture=[1, 1])
-    began = time.process_time()
-    assert len(load_weights(path).networks) == count
-    assert time.process_time() - began < 30.0
 
 
 def test_a_refusal_is_one_line_without_terminal_codes(tmp_path: Path) -> None:
