@@ -59,21 +59,6 @@ def with_info(callback: CallbackWithInfo) -> CallbackWithInfo:
 
 
 @contextmanager
-def qos_refused() -> Iterator[None]:
-    """Raise ValueError where a parameter names a quality of service that there is not.
-
-    Symptom: rclpy raises a RuntimeError, as for a fault of the program.
-    Test: test_contact_node.py::test_a_bad_start_is_one_clear_line.
-    """
-    try:
-        yield
-    except RCLError:
-        raise
-    except RuntimeError as error:
-        raise ValueError(f'qos_overrides: {error}') from error
-
-
-@contextmanager
 def ends_within(seconds: float) -> Iterator[None]:
     """End the process with status 1, and its threads' tracebacks, if the block takes longer.
 

@@ -20,7 +20,7 @@ from box_contact_msgs.msg import Contacts
 
 from ..scene.scene_solver import ALL_BOXES, Pair, Scene
 from ..solver.checks import short_repr
-from .rclpy_workarounds import RCLError, qos_refused, with_info
+from .rclpy_workarounds import with_info
 
 MOST_PAIRS_WITH_TOPICS = 1000
 """Two publishers a pair take milliseconds and memory, here and in every process that listens."""
@@ -71,9 +71,8 @@ class SceneTopics:
         self._check(scene, pairs)
         self._subscriptions: dict[str, Subscription] = {}
         self.of_pair: dict[tuple[int, int], tuple[Publisher, Publisher]] = {}
-        with qos_refused():
-            self.contacts = self._publisher(Contacts, f'{prefix}contacts',
-                                            qos_overriding_options=QOS_OVERRIDES)
+        self.contacts = self._publisher(Contacts, f'{prefix}contacts',
+                                        qos_overriding_options=QOS_OVERRIDES)
         for pair in pairs:
             topic = self._topic_of(pair)
             boxes = scene.index_of[pair.a], scene.index_of[pair.b]
@@ -83,12 +82,11 @@ class SceneTopics:
     def subscribe(self, scene: Scene, callback_of: Callable[[str, str], PoseCallback]) -> None:
         """Subscribe to all poses, with the callback for the bytes of a box and its topic."""
         for box, topic in scene.sources.items():
-            with qos_refused():
-                self._subscriptions[box] = self._node.create_subscription(
-                    PoseArray if box == ALL_BOXES else PoseStamped, topic,
-                    with_info(callback_of(box, topic)), pose_qos(box), raw=True,
-                    event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
-                    qos_overriding_options=QOS_OVERRIDES)
+            self._subscriptions[box] = self._node.create_subscription(
+                PoseArray if box == ALL_BOXES else PoseStamped, topic,
+                with_info(callback_of(box, topic)), pose_qos(box), raw=True,
+                event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+                qos_overriding_options=QOS_OVERRIDES)
 
     def close(self) -> None:
         """Destroy all topics."""

@@ -182,7 +182,6 @@ def test_a_bad_start_is_one_clear_line(program):
         ({'model': 'paper', 'size_a': '[1.0, 2.0, 3.0]', 'size_b': '[1.0, 2.0, 3.0]'},
          "use model 'exact'"),
         ({'scene': 'config/scenes/two_boxes.yaml'}, 'size_a (2.0, 2.0, 2.0) has no effect while'),
-        ({'qos_overrides./contacts.publisher.reliability': 'maybe'}, 'policy `reliability`: `mayb'),
         ({'qos_overrides./box_a/pose.subscription.depth': 'deep'}, "'deep' of type 'STRING'"),
         ({'size_a': '{2.0'}, "Couldn't parse"))]
     for running, words in started:
