@@ -24,8 +24,6 @@ from .rclpy_workarounds import with_info
 
 MOST_PAIRS_WITH_TOPICS = 1000
 """Two publishers a pair take milliseconds and memory, here and in every process that listens."""
-NODE_TOPICS = ('/diagnostics', '/parameter_events', '/rosout', '/clock', '~/transition_event')
-"""Topics of every node, of other types than poses."""
 CONTACT_DEPTH = 10
 POSE_DEPTH = 100
 """Poses that wait: 100 ms at 1 kHz, longer than any collection of garbage."""
@@ -68,7 +66,10 @@ class SceneTopics:
             raise ValueError(f'scene: {scene.pair_count} pairs are too many for topics of their '
                              f'own (at most {MOST_PAIRS_WITH_TOPICS}): set pair_topics to false')
         pairs = tuple(scene.every_pair()) if pair_topics else ()
-        self._check(scene, pairs)
+        labels = Counter(pair.label for pair in pairs)
+        if len(labels) < len(pairs):
+            raise ValueError(f'scene: {labels.most_common(1)[0][0]} is the name of two pairs: list '
+                             'one of them with a name of its own')
         self._subscriptions: dict[str, Subscription] = {}
         self.of_pair: dict[tuple[int, int], tuple[Publisher, Publisher]] = {}
         self.contacts = self._publisher(Contacts, f'{prefix}contacts',
@@ -122,31 +123,8 @@ class SceneTopics:
                 return f'{topic} is published with another quality of service: {reason}'
         return f'{topic} has {len(offers)} of {wanted}, silent so far'
 
-    def _check(self, scene: Scene, pairs: tuple[Pair, ...]) -> None:
-        """Raise ValueError where a pose topic is one of the node's own, or two pairs share one."""
-        own = [f'{self._prefix}contacts', *NODE_TOPICS]
-        own += [f'{self._topic_of(pair)}/{vector}' for pair in pairs
-                for vector in ('point', 'normal')]
-        taken = {self._resolved(topic) for topic in own}
-        labels = Counter(pair.label for pair in pairs)
-        if len(labels) < len(pairs):
-            raise ValueError(f'scene: {labels.most_common(1)[0][0]} is the name of two pairs: list '
-                             'one of them with a name of its own')
-        for box, topic in scene.sources.items():
-            if self._resolved(topic) in taken:
-                raise ValueError(f'scene: pose_topic {short_repr(topic)} of box {box} is a topic '
-                                 'of this node that carries no poses')
-
     def _topic_of(self, pair: Pair) -> str:
         return f'{self._prefix}{pair.name}{"/" if pair.name else ""}contact'
-
-    def _resolved(self, topic: str) -> str:
-        """Return a topic's full name, or raise ValueError if it can have none."""
-        try:
-            return self._node.resolve_topic_name(topic)
-        except RCLError as error:
-            reason = str(error).partition(', at ')[0]
-            raise ValueError(f'scene: {short_repr(topic)}: {reason}') from error
 
     def _publisher(self, message: type, topic: str, **options: Any) -> Publisher:
         # Without events: an event that waits in EventsExecutor outlives a publisher that is

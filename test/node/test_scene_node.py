@@ -133,17 +133,6 @@ def test_many_pairs_have_no_topics_of_their_own(scene_node):
         assert node._tick.solver.scene.pair_count == 1035
 
 
-@pytest.mark.parametrize('topic', [
-    'contacts', '/floor_load/contact/point', '/rosout', '/diagnostics',
-    '/contact_node/transition_event', '/' + 'x' * 250, '/a//b'])
-def test_a_topic_that_can_carry_no_poses_is_refused(scene_node, topic):
-    """One of the node's own, of another type, and a name that can be none."""
-    with pytest.raises(ValueError, match='scene') as refused, scene_node(
-            SCENE.replace('/traffic/lorry', topic)):
-        pass
-    assert topic[:20] in str(refused.value)
-
-
 def test_a_stale_pair_is_named_and_never_an_old_contact(client, scene_node):
     """The lorry falls silent while the load lies on it; the load and the floor go on.
 
