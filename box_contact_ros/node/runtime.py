@@ -15,7 +15,6 @@ import os
 import signal
 import sys
 import threading
-import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
@@ -60,7 +59,6 @@ class GuardedNode(Node):
 
     def __init__(self, *args: Any, **options: Any) -> None:
         """Begin as rclpy's node does."""
-        self._silent_until: dict[str, float] = {}  # monotonic time [s], by reason of a line
         super().__init__(*args, **options)
         for service in self.services:  # rclpy's own: parameters, and states of a lifecycle node
             service.callback = self.answered(service.callback, service.service_name)
@@ -81,7 +79,8 @@ class GuardedNode(Node):
     def guarded(self, callback: Callable[..., None], what: str) -> Callable[..., None]:
         """Return a callback that raises nothing; `what` it serves stands before the logged cause.
 
-        Each kind of error is logged once per LOG_SECONDS, with its traceback at level debug.
+        Refusals and other errors are each logged once per LOG_SECONDS, with the traceback at level
+        debug.
         """
         @functools.wraps(callback)
         def guarded(*args: Any) -> None:
@@ -106,17 +105,13 @@ class GuardedNode(Node):
         return answered
 
     def _complain(self, what: str, error: Exception) -> None:
-        now, reason = time.monotonic(), getattr(error, 'reason', type(error).__name__)
-        if now < self._silent_until.get(reason, 0.0):
-            return
-        self._silent_until[reason] = now + LOG_SECONDS
         logger, line = self.get_logger(), f'{what}: {reason_of(error)}; ignored'
         # Two lines of code: rclpy refuses another severity from the same one.
         if isinstance(error, ValueError):  # a refusal
-            logger.warning(line)
+            logger.warning(line, throttle_duration_sec=LOG_SECONDS)
         else:
-            logger.error(line)
-        logger.debug(''.join(traceback.format_exception(error)))
+            logger.error(line, throttle_duration_sec=LOG_SECONDS)
+        logger.debug(''.join(traceback.format_exception(error)), throttle_duration_sec=LOG_SECONDS)
 
 
 def spin_for(node: Node, executor: Any, seconds: float) -> None:
