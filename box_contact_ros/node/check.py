@@ -4,7 +4,6 @@
 """The service ~/check: the contacts of the boxes of one request, without stamps and topics."""
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -87,7 +86,7 @@ class Checker:
             places = np.array([_places_of(number, pair, place_of)
                                for number, pair in enumerate(request.pairs)])
         else:
-            places = _all_pairs(count)
+            places = np.stack(np.triu_indices(count, 1), axis=1)
         return list(place_of), places
 
     def _sizes(self, boxes: Sequence[Any]) -> list[Row]:
@@ -111,12 +110,6 @@ class Checker:
                 (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), model=self._model,
                 margin=math.inf if with_normals else 0.0)
         return solver
-
-
-@functools.lru_cache(maxsize=8)
-def _all_pairs(count: int) -> np.ndarray:
-    """Return places (n, 2) of all pairs of so many boxes."""
-    return np.stack(np.triu_indices(count, 1), axis=1)
 
 
 def _pose(box: Any) -> Row:

@@ -23,7 +23,6 @@ from .rclpy_workarounds import parameter_overrides
 
 Check = Callable[[str, Any], Any]
 """From a parameter's name and value to the value as the node uses it; ValueError if it is wrong."""
-LONGEST_REASON = 1000  # characters of a refusal
 
 
 @dataclass(frozen=True)
@@ -141,7 +140,7 @@ def warn_of_unknown(node: Node, settings: Mapping[str, Setting]) -> None:
 def reason_of(error: Exception) -> str:
     """Return what an error says; with its type, unless it is a refusal or a missing library."""
     known = isinstance(error, (ValueError, ImportError))
-    return (str(error) if known else f'{type(error).__name__}: {error}')[:LONGEST_REASON]
+    return str(error) if known else f'{type(error).__name__}: {error}'
 
 
 def parse_command_line(program: str, doc: str | None, settings: Mapping[str, Setting],

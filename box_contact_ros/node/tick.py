@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 
 from ..scene.pairing import NEVER, OVERTAKEN, PAIRINGS, Pairing, StampedPose, Tick
-from ..scene.scene_solver import ALL_BOXES, SceneSolver, TooManyNear
+from ..scene.scene_solver import ALL_BOXES, SceneSolver
 from ..solver.checks import absent_poses, are_poses, pose_fault, short_repr
 from .diagnostics import TickMonitor
 from .message_bytes import VECTOR_BYTES, ContactWriter, PoseReader, aligned, header_bytes
 from .messages import NANOSECONDS, Refused
+from .parameters import reason_of
 from .topics import PoseCallback, SceneTopics
 
 
@@ -200,8 +201,6 @@ class TickAnswerer:
 
     def _refuse(self, error: Exception, topic: str, box: str = '') -> None:
         """Count what was refused, and hand it to the next report."""
-        known = isinstance(error, (Refused, TooManyNear))
-        reason = error.reason if isinstance(error, (Refused, TooManyNear)) else 'internal error'
-        text = f'{topic}: {error}' if known else f'{type(error).__name__}: {error}'
+        reason = getattr(error, 'reason', 'internal error')
         self._counts[f'refused: {reason}'] += 1
-        self._monitor.refused(reason, text, box)
+        self._monitor.refused(reason, f'{topic}: {reason_of(error)}', box)
