@@ -157,17 +157,7 @@ def parse_command_line(program: str, doc: str | None, settings: Mapping[str, Set
         epilog='parameters (--ros-args -p NAME:=VALUE):\n' + '\n'.join(lines))
     unknown = parser.parse_known_args(outside_ros_args(sys.argv[1:] if args is None else args))[1]
     if unknown:
-        parser.error(f'unrecognized arguments: {" ".join(unknown)}'
-                     f'{_as_parameter(unknown, settings)}')
-
-
-def _as_parameter(arguments: Sequence[str], settings: Collection[str]) -> str:
-    """Return how to write the first of unknown arguments that names a parameter; '' for none."""
-    for argument in arguments:
-        name = argument.lstrip('-').replace(':=', '=').partition('=')[0].replace('-', '_')
-        if name in settings:
-            return f' (parameters follow --ros-args: --ros-args -p {name}:=VALUE)'
-    return ''
+        parser.error(f'unrecognized arguments: {" ".join(unknown)}')
 
 
 def outside_ros_args(args: Sequence[str]) -> list[str]:

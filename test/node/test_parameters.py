@@ -76,11 +76,11 @@ def test_help_lists_all_parameters_with_their_defaults(capsys):
 
 
 @pytest.mark.parametrize('args, words', [
-    (['--model', 'exact'], 'parameters follow --ros-args: --ros-args -p model:=VALUE'),
+    (['--model', 'exact'], 'unrecognized arguments: --model exact'),
     (['-p', 'rate:=1'], 'unrecognized arguments: -p rate:=1'),
     (['--ros-args', '-p', 'model:=exact', '--', '--fast'], 'unrecognized arguments: --fast')])
 def test_options_outside_ros_args_are_refused(args, words, capsys):
-    """With status 2 and a hint."""
+    """With status 2; the line of usage has --ros-args."""
     with pytest.raises(SystemExit) as ended:
         parameters.parse_command_line('node', 'Test.', SETTINGS, args)
     assert ended.value.code == 2 and words in capsys.readouterr().err

@@ -126,12 +126,6 @@ def test_help_of_each_program(program: str, module: str) -> None:
     assert done.returncode == 0 and done.stdout.startswith(f'usage: {program}'), done.stderr
 
 
-def test_parameters_before_ros_args_are_explained() -> None:
-    done = _run('-m', 'box_contact_ros.node.contact_node', '-p', 'model:=exact')
-    assert done.returncode == 2
-    assert '(parameters follow --ros-args: --ros-args -p model:=VALUE)' in done.stderr
-
-
 # --- metadata -------------------------------------------------------------------------------------
 
 
