@@ -164,30 +164,16 @@ def deprioritise_other_threads() -> None:
         pass
 
 
-@contextlib.contextmanager
-def interrupts_noted() -> Iterator[Callable[[], bool]]:
-    """Let Ctrl-C raise nothing in the block, nor later if one came; yield whether one came.
+def _note_interrupts() -> list[int]:
+    """Let Ctrl-C raise nothing any more; return a list that each one is noted in.
 
     KeyboardInterrupt may fall anywhere in rclpy: where a lock is held that the clean end needs, or
-    in EventsExecutor, which then aborts the process. Handlers of the caller's own stay.
+    in EventsExecutor, which then aborts the process.
     """
-    if (threading.current_thread() is not threading.main_thread()  # only that one may
-            or signal.getsignal(signal.SIGINT) is not signal.default_int_handler):
-        yield lambda: False
-        return
-    heard = False
-
-    def note(number: int, frame: object) -> None:
-        nonlocal heard
-        heard = True
-
-    signal.signal(signal.SIGINT, note)
-    try:
-        yield lambda: heard
-    finally:
-        if not heard:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
-        atexit.register(_ignore_signals)
+    interrupts: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _: interrupts.append(number))
+    atexit.register(_ignore_signals)
+    return interrupts
 
 
 def _ignore_signals() -> None:
@@ -209,38 +195,37 @@ def running_node(make_node: Callable[[Context], NodeKind], args: Sequence[str] |
 
     signals: which handlers of rclpy's are installed; none where the caller has its own. They shut
     the context down. Whatever then fails is raised as KeyboardInterrupt after Ctrl-C, and as
-    ExternalShutdownException after SIGTERM.
+    ExternalShutdownException after SIGTERM. Ctrl-C itself raises nothing any more in this process.
     """
     context = Context()
     node = executor = None
-    handled = signals is not SignalHandlerOptions.NO
-    with interrupts_noted() if handled else contextlib.nullcontext(lambda: False) as interrupted:
-        # Handlers have to be asked for where the context is not the default one.
-        try:
-            rclpy.init(args=None if args is None else list(args), context=context,
-                       signal_handler_options=signals)
-        except UnknownROSArgsError as error:
-            raise ValueError(f'after --ros-args, ROS does not know {error}: a parameter is '
-                             '-p NAME:=VALUE, a name is remapped by -r FROM:=TO') from error
-        try:
-            if interrupted():  # before rclpy's handlers were installed
-                raise KeyboardInterrupt
-            node = make_node(context)
-            executor = EventsExecutor(context=context)
-            executor.add_node(node)
-            yield node, executor
-        except Exception as error:
-            if context.ok():
-                raise
-            raise (KeyboardInterrupt if interrupted() else ExternalShutdownException) from error
-        finally:
-            with ends_within(END_SECONDS), contextlib.ExitStack() as last_first:
-                last_first.callback(shut_down, context)
-                if node is not None:
-                    last_first.callback(node.destroy_node)
-                if executor is not None:
-                    keep_for_ever(executor)
-                    last_first.callback(executor.shutdown)
+    # Handlers have to be asked for where the context is not the default one.
+    interrupts = [] if signals is SignalHandlerOptions.NO else _note_interrupts()
+    try:
+        rclpy.init(args=None if args is None else list(args), context=context,
+                   signal_handler_options=signals)
+    except UnknownROSArgsError as error:
+        raise ValueError(f'after --ros-args, ROS does not know {error}: a parameter is '
+                         '-p NAME:=VALUE, a name is remapped by -r FROM:=TO') from error
+    try:
+        if interrupts:  # before rclpy's handlers were installed
+            raise KeyboardInterrupt
+        node = make_node(context)
+        executor = EventsExecutor(context=context)
+        executor.add_node(node)
+        yield node, executor
+    except Exception as error:
+        if context.ok():
+            raise
+        raise (KeyboardInterrupt if interrupts else ExternalShutdownException) from error
+    finally:
+        with ends_within(END_SECONDS), contextlib.ExitStack() as last_first:
+            last_first.callback(shut_down, context)
+            if node is not None:
+                last_first.callback(node.destroy_node)
+            if executor is not None:
+                keep_for_ever(executor)
+                last_first.callback(executor.shutdown)
 
 
 def spin(node: Node, executor: Any) -> None:

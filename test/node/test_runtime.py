@@ -163,22 +163,6 @@ def test_a_signal_falls_nowhere(number, when, words):
     assert (done.returncode, done.stdout) == (0, words), done.stderr
 
 
-def test_an_interrupt_is_noted(monkeypatch):
-    """What was there before comes back, if none was heard."""
-    monkeypatch.setattr(runtime.atexit, 'register', lambda *_: None)
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        with runtime.interrupts_noted() as interrupted:
-            assert not interrupted()
-        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-        with runtime.interrupts_noted() as interrupted:
-            signal.raise_signal(signal.SIGINT)
-            assert interrupted()
-        signal.raise_signal(signal.SIGINT)
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
 def test_an_end_that_fails_goes_on(monkeypatch):
     """What an executor cannot let go of leaves neither the node nor the context behind."""
     def fail():
@@ -204,28 +188,6 @@ def test_two_threads_shut_a_context_down():
     shut_down(SimpleNamespace(try_shutdown=fail, ok=lambda: False))
     with pytest.raises(RCLError):
         shut_down(SimpleNamespace(try_shutdown=fail, ok=lambda: True))
-
-
-def test_handlers_of_other_threads_and_callers_stay():
-    """Another thread may not set handlers; a handler of the caller's own is not replaced."""
-    def own(*_):
-        pass
-
-    seen, before = [], signal.getsignal(signal.SIGINT)
-
-    def look():
-        with runtime.interrupts_noted():
-            seen.append(signal.getsignal(signal.SIGINT))
-
-    thread = Thread(target=look)
-    thread.start()
-    thread.join()
-    try:
-        signal.signal(signal.SIGINT, own)
-        look()
-    finally:
-        signal.signal(signal.SIGINT, before)
-    assert seen == [before, own]
 
 
 def test_a_message_comes_with_its_time_and_number():
