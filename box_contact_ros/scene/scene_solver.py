@@ -382,11 +382,6 @@ class SceneSolver:
         """Pickle the arguments."""
         return self._again, (self.scene,)
 
-    @property
-    def fallbacks(self) -> int:
-        """Contacts so far that the model handed to `exact`: see `soup-N`."""
-        return self._solver.fallbacks - self._warm_up_answers
-
     def _warm_up(self) -> None:
         """Let the model refuse sizes that it has no answer for.
 
@@ -405,7 +400,6 @@ class SceneSolver:
         self._solver.batch(a, b, size_a=np.ascontiguousarray(size_a),
                            size_b=np.ascontiguousarray(size_b))
         self([None] * len(self.scene.moving))
-        self._warm_up_answers = self._solver.fallbacks
 
     def __call__(self, poses: Sequence[np.ndarray | None] | np.ndarray) -> Answer:
         """Return the answer to one tick: a pose (7,) or None for each box of `scene.moving`.
