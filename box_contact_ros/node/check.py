@@ -4,6 +4,7 @@
 """The service ~/check: the contacts of the boxes of one request, without stamps and topics."""
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -35,7 +36,8 @@ class Checker:
         self.solver, self._scene, self._model = solver, solver.scene, solver.model
         self._labels = {(pair.a, pair.b): pair.label for pair in self._scene.pairs}
         self._most_pairs = min(MOST_PAIRS, most_near(str(self._model)))
-        self._solvers: dict[bool, ContactSolver] = {}  # by whether pairs apart have a normal
+        self._solver_for = functools.cache(lambda margin: ContactSolver(
+            (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), model=solver.model, margin=margin))
 
     def answer(self, request: Check.Request, response: Check.Response) -> Check.Response:
         """Fill in the response: contacts, or why there are none."""
@@ -52,7 +54,8 @@ class Checker:
         names, places = self._names_and_places(request)
         if not request.margin >= 0.0:
             raise ValueError(f'margin must be 0 or more, not {request.margin:g}')
-        solver = self._solver(request.margin > 0.0)
+        # Normals of pairs apart are computed only where one may be listed.
+        solver = self._solver_for(math.inf if request.margin else 0.0)
         poses, sizes = [_pose(box) for box in request.boxes], self._sizes(request.boxes)
         try:
             contacts = solver.batch(np.array(poses), sizes=np.array(sizes), pairs=places)
@@ -101,15 +104,6 @@ class Checker:
                                      f'{nearest_name(box.name, self._scene.boxes)}')
                 sizes[number] = known.size
         return sizes
-
-    def _solver(self, with_normals: bool) -> ContactSolver:
-        """Return the solver; of pairs apart it computes the normal only if one is listed."""
-        solver = self._solvers.get(with_normals)
-        if solver is None:
-            solver = self._solvers[with_normals] = ContactSolver(
-                (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), model=self._model,
-                margin=math.inf if with_normals else 0.0)
-        return solver
 
 
 def _pose(box: Any) -> Row:
