@@ -353,7 +353,7 @@ class SceneSolver:
     """
 
     def __init__(self, scene: Scene, *, model: str | Model = 'exact', weights: str | None = None,
-                 margin: float = 0.0, most_near: int | None = None) -> None:
+                 margin: float = 0.0, most_near: int = sys.maxsize) -> None:
         """Begin without poses.
 
         margin: up to which separation pairs apart are listed [m].
@@ -364,7 +364,7 @@ class SceneSolver:
         self.scene = scene
         self.model = model
         self.margin = margin
-        self._most_near = sys.maxsize if most_near is None else most_near
+        self._most_near = most_near
         boxes = list(scene.boxes.values())
         self._size = np.array([box.size for box in boxes], dtype=float)
         self._poses = np.array([box.pose or [np.nan] * 7 for box in boxes], dtype=float)
