@@ -83,10 +83,10 @@ PARAMETERS = {
     'margin': Setting(0.0, 'pairs apart are listed as near up to this separation [m]',
                       number(0.0, LENGTH_MAX)),
     'pair_topics': Setting(True, 'whether pairs have topics of their own next to contacts', flag),
+    'autostart': Setting(True, 'whether the node configures and activates itself', flag),
 }
 LIVE = ('model', 'tolerance', 'max_age')
 """The parameters that may be set while the node runs; none of them touches a topic."""
-AUTOSTART = {'autostart': Setting(True, 'whether the node configures and activates itself', flag)}
 
 
 class ContactNode(GuardedNode, LifecycleNode):
@@ -103,7 +103,8 @@ class ContactNode(GuardedNode, LifecycleNode):
     def __init__(self, context: Context, **options: Any) -> None:
         """Begin unconfigured."""
         super().__init__(self.name, context=context, **options)
-        self.autostart: bool = declare(self, AUTOSTART)['autostart']
+        self.autostart: bool = declare(
+            self, {'autostart': self.parameters['autostart']})['autostart']
         self.counts: Counter[str] = Counter()
         self.fault: Exception | None = None  # why the last transition failed
         self._monitor = TickMonitor()
@@ -202,7 +203,7 @@ class ContactNode(GuardedNode, LifecycleNode):
         except Exception:
             topics.close()
             raise
-        warn_of_unknown(self, {**self.parameters, **AUTOSTART})
+        warn_of_unknown(self, self.parameters)
         self._values, self._topics, self._answerer = values, topics, answerer
 
     def _set_live(self, parameters: Sequence[Parameter]) -> SetParametersResult:
@@ -273,7 +274,7 @@ class ContactNode(GuardedNode, LifecycleNode):
 
 def run(node_type: type[ContactNode], doc: str | None, args: Sequence[str] | None) -> int:
     """Run a node of this class until SIGINT or SIGTERM; return the exit status."""
-    parse_command_line(node_type.name, doc, {**node_type.parameters, **AUTOSTART}, args)
+    parse_command_line(node_type.name, doc, node_type.parameters, args)
 
     def started(context: Context) -> ContactNode:
         node = node_type(context)

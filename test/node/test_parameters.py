@@ -70,7 +70,7 @@ def test_help_lists_all_parameters_with_their_defaults(capsys):
         contact_node.main(['--help'])
     assert ended.value.code == 0
     printed = capsys.readouterr().out
-    for name in (*contact_node.PARAMETERS, 'autostart'):
+    for name in contact_node.PARAMETERS:
         assert f'\n  {name} ' in printed
     assert '[12.192,2.438,2.591]' in printed and 'default: none' in printed
 
