@@ -8,7 +8,6 @@ type, and not rclpy. Where a double is meant, 200 is as good as 200.0.
 """
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -59,25 +58,15 @@ def whole_number(low: int, high: int) -> Check:
     return check
 
 
-def numbers(count: int) -> Check:
-    """Check for so many finite numbers."""
-    def check(name: str, value: Any) -> tuple[float, ...]:
-        given = value if isinstance(value, Sequence) else ()
-        if len(given) != count or not all(map(_is_number, given)) or not all(
-                map(math.isfinite, given)):
-            raise ValueError(f'{name} must be {count} finite numbers, not '
-                             f'{short_repr(list(given) if len(given) else value)}')
-        return tuple(map(float, given))
-    return check
-
-
 def size(name: str, value: Any) -> tuple[float, ...]:
     """Check three full extents [m]."""
-    extents: tuple[float, ...] = numbers(3)(name, value)
-    fault = size_fault(extents)
+    given = list(value) if isinstance(value, Sequence) else value
+    if not isinstance(given, list) or len(given) != 3 or not all(map(_is_number, given)):
+        raise ValueError(f'{name} must be 3 numbers, not {short_repr(given)}')
+    fault = size_fault(given)
     if fault:
         raise ValueError(f'{name} {fault}')
-    return extents
+    return tuple(map(float, given))
 
 
 def text(name: str, value: Any) -> str:
