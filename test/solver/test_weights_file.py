@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -192,6 +193,17 @@ def test_every_edited_byte_of_the_header(good: Path) -> None:
                       for layer in network.layers for array in layer) == want
         read += 1
     assert read > 0  # a letter of the card
+
+
+def test_many_networks_take_no_quadratic_time(tmp_path: Path) -> None:
+    """20,000 in one file are read in a second or so; a hundred times that, where each asks all."""
+    count = 20_000
+    one = {'0.weight': np.zeros((1, 1), np.float32), '0.bias': np.zeros(1, np.float32)}
+    path = write(tmp_path / 'x', {f'n{k}.{part}': array for k in range(count)
+                                  for part, array in one.items()}, architecture=[1, 1])
+    began = time.process_time()
+    assert len(load_weights(path).networks) == count
+    assert time.process_time() - began < 30.0
 
 
 def test_a_refusal_is_one_line_without_terminal_codes(tmp_path: Path) -> None:
