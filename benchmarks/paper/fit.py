@@ -28,15 +28,14 @@ from torch import Tensor
 from torch.func import functional_call, stack_module_state, vmap
 from tqdm import tqdm
 
-from box_contact_ros.solver.weights_file import Layers
+from box_contact_ros.solver.weights_file import WEIGHT_LIMIT, Layers
 
 from .dataset import Patterns
 from .errors import difference
 
 CHECKS = 200  # least number of times that the cross-validation error is looked at in a training
 DEVIATION_MIN = 1e-3
-"""Least deviation by which an input is divided: folding multiplies its weights by the inverse.
-Tilts of 1e-4 rad would give weights beyond those that a loader accepts (`WEIGHT_LIMIT`)."""
+"""Least deviation by which an input is divided: folding multiplies its weights by the inverse."""
 ROWS = 5000  # patterns whose answers are in memory at a time, of all networks
 
 
@@ -125,6 +124,15 @@ class Scaling:
         deviation = inputs.std(axes, dtype=np.float64)
         deviation = np.maximum(deviation + 1e-6, DEVIATION_MIN)
         return Scaling(mean.astype(np.float32), deviation.astype(np.float32))
+
+    def limit(self) -> Tensor:
+        """Return the largest weights (inputs,) that a loader accepts once they are folded.
+
+        Half of `WEIGHT_LIMIT`, shared by all inputs: so the sum of weights and means, which becomes
+        the bias, is within it too.
+        """
+        share = 0.5 * WEIGHT_LIMIT / len(self.mean)
+        return torch.tensor(share * self.deviation / np.maximum(1.0, np.abs(self.mean)))
 
     def folded(self, layers: Layers) -> Layers:
         """Return the network that takes raw inputs, from one that takes normalised inputs."""
@@ -224,6 +232,7 @@ def fit(training: Patterns, checking: Patterns, settings: PaperSettings, *, prog
     check = tensors(checking, scaling)
     fitted = Fitted(copy.deepcopy(networks), scaling, torch.full((s.networks,), math.inf),
                     torch.zeros(s.networks, dtype=torch.int64), [], s.wrap)
+    limit, first = scaling.limit(), next(networks.parameters())
     optimiser = Momentum(networks, rate, momentum)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, s.epochs)
 
@@ -236,6 +245,7 @@ def fit(training: Patterns, checking: Patterns, settings: PaperSettings, *, prog
             optimiser.zero_grad()
             loss.sum().backward()
             optimiser.step()
+            first.data.clamp_(-limit, limit)
         schedule.step()
         if epoch % max(1, s.epochs // CHECKS) == 0 or epoch == s.epochs:
             fitted.check(epoch, networks, rmse(networks, *check, s.wrap))

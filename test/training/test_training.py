@@ -159,6 +159,20 @@ def test_a_loss_that_is_not_wrapped_sees_the_turn(sets: dict[str, dataset.Patter
     assert far - near == pytest.approx(2 * np.pi, abs=1.0)
 
 
+def test_folded_weights_are_what_a_loader_accepts(sets: dict[str, dataset.Patterns],
+                                                  monkeypatch: pytest.MonkeyPatch) -> None:
+    """However fast it learns, and whatever the deviations and means of the inputs are."""
+    monkeypatch.setattr('benchmarks.paper.fit.WEIGHT_LIMIT', 3.0)
+    scales = np.array([1e-4, 1.0, 1.0, 1.0, 1e-4, 1.0])
+    training, checking = (dataset.Patterns(patterns.inputs * scales + 5.0, patterns.outputs)
+                          for patterns in (sets['training'], sets['cross-validation']))
+    fitted = fit(training, checking, SMALL)
+    weight, bias = fitted.export()[0]
+    own_bias = fitted.networks.layers(int(fitted.error.argmin()))[0][1]
+    assert np.abs(weight).max() == pytest.approx(0.5 * 3.0 / 6 / 5.0, rel=1e-2)
+    assert np.abs(bias - own_bias).max() <= 1.5
+
+
 @pytest.mark.parametrize(('scene', 'output'), [
     *product(['random cubes'], paper.SETTINGS), ('stacks', paper.ANGLES)])
 def test_quick_training_for_a_scene(scene: str, output: str, tmp_path: Path) -> None:
