@@ -43,7 +43,7 @@ class AnswerLog:
 
     @property
     def answered(self) -> np.ndarray:
-        """Which pairs were answered (rows,)."""
+        """Which pairs were answered; shape (rows,)."""
         return np.all([times > 0 for times in self.received.values()], axis=0)
 
     @property

@@ -19,6 +19,8 @@ from box_contact_ros.solver.paper import Paper
 from box_contact_ros.solver.weights_file import WeightsError, load_weights
 
 EXACT = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
+
+
 def solver_of(model: Paper) -> ContactSolver:
     return ContactSolver(poses.CUBE, poses.CUBE, model=model)
 

@@ -14,6 +14,7 @@ from box_contact_ros.node import processes
 
 pytestmark = pytest.mark.usefixtures('signal_handlers')
 
+
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_signals_are_noted_and_raise_nothing(number):
     with processes.asked_to_end() as signals:
