@@ -15,10 +15,10 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,10 +41,6 @@ GAP_LIMIT = 0.020  # gap after the first touch [m]: how high it may bounce
 
 NamedContacts = Mapping[str, Contact]
 """The contacts of one question, by the names of their pairs; the load is box A."""
-MakeLaw = Callable[..., 'LoadLaw']
-"""What makes the law of a load, called as `LoadForces` is."""
-
-
 NO_TURN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)  # a pose
 
 
@@ -54,16 +50,6 @@ class LoopState(NamedTuple):
     tick: int
     time: float  # [s]
     pose: np.ndarray  # of the load's box (7,)
-
-
-class LoadLaw(Protocol):
-    """The wrench on a load, from the answer that it holds."""
-
-    def hold(self, contacts: NamedContacts, pose: np.ndarray, *, age: float) -> None:
-        """Take the contacts that were asked for `age` [s] ago with the load at `pose` (7,)."""
-
-    def wrench(self, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """Return force and torque (6,) at `pose` (7,) and `velocity` (6,), a physics step each."""
 
 
 LATE_STEPS = 3
@@ -270,14 +256,14 @@ class LandingRecord:
 
 
 class ClosedLoop:
-    """A crane under the wrench of a law, recorded tick by tick, wherever contacts come from."""
+    """A crane under the forces of contacts, recorded tick by tick, wherever these come from."""
 
-    def __init__(self, scenario: CraneScenario, rate_hz: float, *, law: MakeLaw = LoadForces,
-                 watched: float = WATCHED, window: float = WINDOW) -> None:
-        """Make the crane, and the law of its load; watched, window: those of the record [s]."""
+    def __init__(self, scenario: CraneScenario, rate_hz: float, *, watched: float = WATCHED,
+                 window: float = WINDOW) -> None:
+        """Make the crane, and the forces on its load; watched, window: those of the record [s]."""
         self.crane = Crane(scenario, rate_hz)
         self.record = LandingRecord(scenario, rate_hz, watched, window)
-        self._law = law(scenario.load, rate_hz=rate_hz, step=self.crane.physics_step)
+        self.forces = LoadForces(scenario.load, rate_hz=rate_hz, step=self.crane.physics_step)
         self._under_way: deque[tuple[float, NamedContacts, LoopState]] = deque()
         """Answers that do not act yet: when they will [s], and the state that they are for."""
         self._wrench = np.zeros(6)
@@ -313,6 +299,6 @@ class ClosedLoop:
         """Return the wrench (6,) of the physics step that starts at `time` [s]."""
         while self._under_way and self._under_way[0][0] <= time + TIME_ROUNDING:
             _, contacts, state = self._under_way.popleft()
-            self._law.hold(contacts, state.pose, age=max(0.0, time - state.time))
-        self._wrench = self._law.wrench(self.crane.load_pose, self.crane.load_velocity)
+            self.forces.hold(contacts, state.pose, age=max(0.0, time - state.time))
+        self._wrench = self.forces.wrench(self.crane.load_pose, self.crane.load_velocity)
         return self._wrench

@@ -85,7 +85,7 @@ def test_an_answer_acts_from_its_time_on():
     """It is held with the pose for which it was asked, and the next takes its place."""
     held = []
 
-    class Law:
+    class Forces:
         def hold(self, contacts, pose, *, age):
             held.append((len(times), contacts, pose))
             ages.append(age)
@@ -95,7 +95,8 @@ def test_an_answer_acts_from_its_time_on():
             return np.zeros(6)
 
     times, ages = [], []
-    loop = ClosedLoop(HARD, 200.0, law=lambda load, **_: Law())
+    loop = ClosedLoop(HARD, 200.0)
+    loop.forces = Forces()
     asked = []
     for latency in (0.002, 0.006, 0.001, 0.0):
         asked.append(loop.ask())
