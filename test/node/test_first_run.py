@@ -145,11 +145,11 @@ class FirstRuns:
             self.spin()
 
     def play(self, cases, seconds):
-        """Publish the poses of cases at RATE."""
-        began = time.monotonic()
+        """Publish the poses of cases at RATE, with stamps that no load of the machine moves."""
+        began, first = time.monotonic(), time.time_ns()
         for number in range(int(seconds * RATE)):
             for case in cases:
-                for box, message in poses(case, number, time.time_ns()).items():
+                for box, message in poses(case, number, first + number * SECOND // RATE).items():
                     self.publishers[case, box].publish(message)
             while time.monotonic() < began + (number + 1) / RATE:
                 self.spin()
