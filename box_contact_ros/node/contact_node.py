@@ -52,8 +52,8 @@ from .parameters import (
     text,
     warn_of_unknown,
 )
-from .rclpy_workarounds import lifecycle_state
-from .runtime import LOG_SECONDS, GuardedNode, run_node
+from .rclpy_workarounds import ends_within, lifecycle_state
+from .runtime import END_SECONDS, LOG_SECONDS, GuardedNode, run_node
 from .tick import TickAnswerer
 from .topics import SceneTopics
 
@@ -278,8 +278,13 @@ def run(node_type: type[ContactNode], doc: str | None, args: Sequence[str] | Non
 
     def started(context: Context) -> ContactNode:
         node = node_type(context)
-        if node.autostart:
-            node.start()
+        try:
+            if node.autostart:
+                node.start()
+        except Exception:  # whoever holds it would destroy it later, and without a guard
+            with ends_within(END_SECONDS):
+                node.destroy_node()
+            raise
         return node
     return run_node(started, args)
 

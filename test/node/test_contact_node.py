@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import math
 import signal
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -189,6 +191,19 @@ def test_a_bad_start_is_one_clear_line(program):
         last = running.output.splitlines()[-1]
         assert last.startswith('error: ') and words in running.output
         assert 'Traceback' not in running.output
+
+
+def test_a_node_that_does_not_start_is_destroyed_before_its_context():
+    """In time: Python destroyed it as it ended, where Fast DDS may hang and nothing ends that."""
+    done = subprocess.run([sys.executable, '-c', """
+from box_contact_ros.node.contact_node import ContactNode, run
+class Node(ContactNode):
+    def destroy_node(self):
+        print('destroyed', self.context.ok(), flush=True)
+        super().destroy_node()
+print(run(Node, None, ['--ros-args', '-p', 'size_a:=[0.0, 1.0, 1.0]']))
+"""], capture_output=True, text=True)
+    assert done.stdout.split('\n') == ['destroyed True', '1', ''], done.stderr
 
 
 @pytest.mark.parametrize('pauses', [
