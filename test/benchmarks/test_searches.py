@@ -4,8 +4,11 @@
 """The searches for the worst case and for the largest step, and what they find of model `mlp`."""
 from __future__ import annotations
 
+from itertools import islice
+
 import numpy as np
 import pytest
+import search_needles
 
 from benchmarks import steps, worst_case
 from benchmarks.errors import contact_errors
@@ -56,6 +59,14 @@ def test_a_climb_stays_where_it_may(name: str, free: bool) -> None:
         assert (edges.max(axis=1) < worst_case.RATIO_MAX**2 * edges.min(axis=1)).all()
         for size in (found.size_a, found.size_b):
             assert (size.max(axis=1) <= worst_case.RATIO_MAX * size.min(axis=1)).all()
+
+
+def test_a_search_over_needles() -> None:
+    """The covariance's bound holds up to an aspect of 300; no eigenvalue is negative to 1e8."""
+    _, shares = next(search_needles.climb(search_needles.by_the_bound, 300.0, 1))
+    assert 0.0 < shares[0] <= 1.0
+    for _, below in islice(search_needles.climb(search_needles.below_zero, 1e8, 1), 3):
+        assert below[0] <= 1e-8
 
 
 def test_a_climb_starts_from_the_worst() -> None:
