@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 # The library as a Python extension; see binding/module.cpp.
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
-
-from ..solver.contact import Contacts  # what `use_contacts` is called with
 
 LENGTH_MIN: float
 LENGTH_MAX: float
@@ -46,14 +46,11 @@ class PairSolver:
     def __init__(self, model: str | None, size_a: tuple[float, float, float],
                  size_b: tuple[float, float, float], network: np.ndarray | None = None,
                  margin: float = 0.0) -> None: ...
-    def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact: ...
-    def batch(self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,
-              size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
-              sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
-              threads: int = 1, patch: bool = True) -> Contacts: ...
+    def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Any: ...
+    def batch(self, *args: Any, **keywords: Any) -> Any: ...
     def solve(self, poses_a: np.ndarray, poses_b: np.ndarray, sizes_a: np.ndarray,
               sizes_b: np.ndarray, threads: int, patch: bool = True,
-              pairs: np.ndarray | None = None, /) -> tuple[Contacts, int]: ...
+              pairs: np.ndarray | None = None, /) -> tuple[Any, int]: ...  # Contacts
     @property
     def clipped(self) -> int: ...
 
@@ -80,7 +77,7 @@ class PatchForces:
 
 def instruction_sets() -> tuple[str, ...]: ...
 def use_contacts(many: type[tuple[object, ...]], /) -> None: ...
-def write_poses(to: np.ndarray, rows: np.ndarray, poses: object, /) -> bool: ...
+def write_poses(to: np.ndarray, rows: np.ndarray, poses: Any, /) -> bool: ...
 def mlp_inputs(poses_a: np.ndarray, poses_b: np.ndarray, sizes_a: np.ndarray, sizes_b: np.ndarray,
                /) -> tuple[np.ndarray, ...]: ...
 def clipped(poses_a: np.ndarray, poses_b: np.ndarray, sizes_a: np.ndarray, sizes_b: np.ndarray, /,

@@ -7,7 +7,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -73,6 +73,16 @@ class ContactSolver(native.PairSolver):
                          tuple(row_b[0]), network, margin)
         self.model = model
         self._size_a, self._size_b, self._weights, self._margin = row_a, row_b, weights, margin
+
+    if TYPE_CHECKING:  # the core, which does it, knows no type of ours
+        def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact: ...  # noqa: D102
+
+        def batch(self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,  # noqa: D102
+                  size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
+                  sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
+                  threads: int = 1, patch: bool = True) -> Contacts: ...
+    else:
+        batch = native.PairSolver.batch
 
     def __reduce__(self) -> tuple[Callable[..., ContactSolver], tuple[Any, ...]]:
         """Pickle the arguments."""

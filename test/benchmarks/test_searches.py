@@ -62,7 +62,7 @@ def test_a_climb_stays_where_it_may(name: str, free: bool) -> None:
 
 
 def test_a_search_over_needles() -> None:
-    """The covariance's bound holds up to an aspect of 300; no eigenvalue is negative to 1e8."""
+    """The bound holds up to an aspect of 300; no eigenvalue is negative, but by rounding."""
     _, shares = next(search_needles.climb(search_needles.by_the_bound, 300.0, 1))
     assert 0.0 < shares[0] <= 1.0
     for _, below in islice(search_needles.climb(search_needles.below_zero, 1e8, 1), 3):
