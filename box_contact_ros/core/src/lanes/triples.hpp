@@ -115,7 +115,7 @@ BC_INLINE Number<Packed> largest(Packed a) {
   return max(max(a[0], a[1]), a[2]);
 }
 
-// The components y z x.
+// The components y z x, and z x y.
 template <class T>
 BC_INLINE Vec<T> rotated(const Vec<T>& a) {
   return {a[1], a[2], a[0]};
@@ -124,10 +124,13 @@ template <class Packed>
 BC_INLINE Packed rotated(Packed a) {
   return __builtin_shufflevector(a, a, 1, 2, 0, 0);
 }
-// The components z x y.
-template <class Three>
-BC_INLINE Three rotated_back(const Three& a) {
-  return rotated(rotated(a));
+template <class T>
+BC_INLINE Vec<T> rotated_back(const Vec<T>& a) {
+  return {a[2], a[0], a[1]};
+}
+template <class Packed>
+BC_INLINE Packed rotated_back(Packed a) {
+  return __builtin_shufflevector(a, a, 2, 0, 1, 1);
 }
 
 // One choice for all three numbers of a single pair, without a branch.
