@@ -48,8 +48,7 @@ constexpr double least_covariance_error = 1e-8;
 
 namespace planes {
 
-// Least magnitude of an entry of R that is inverted. An edge exactly along a slab must not give
-// 0 · ∞, and three of them multiplied must not underflow.
+// Least magnitude of an entry of R that is inverted: an edge exactly along a slab must not give 0 · ∞.
 constexpr double least_entry = 1e-90;
 // Rounding of a place [of the size] that may not decide whether a plane meets the overlap.
 constexpr double place_slack = 1e-14;
@@ -82,16 +81,14 @@ constexpr double outside_by_rounding = 0x1p-48;
 constexpr double off_diagonal_share = 0.01, diagonal_share = 0.3, closure_share = 0.1;
 constexpr double covariance_diagonal_share = 0.17;
 
-// Reciprocals of the entries of R, given by its columns. Three need one division.
+// Reciprocals of the entries of a matrix.
 template <class T>
-BC_INLINE Columns<T> reciprocals(const Columns<T>& r) {
-  auto away_from_zero = [](auto entry) {
-    return select(abs(entry) > least_entry, entry, splat<decltype(entry)>(least_entry));
+BC_INLINE Columns<T> reciprocals(const Columns<T>& m) {
+  auto reciprocal = [](auto entry) {
+    using N = decltype(entry);
+    return 1.0 / select<N>(abs(entry) > least_entry, entry, splat<N>(least_entry));
   };
-  Columns<T> x;
-  for (int j = 0; j < 3; ++j) x[j] = each(away_from_zero, r[j]);
-  Triple<T> product = uniform(splat<T>(1.0)) / (x[0] * (x[1] * x[2]));
-  return {{product * (x[1] * x[2]), product * (x[0] * x[2]), product * (x[0] * x[1])}};
+  return {{each(reciprocal, m[0]), each(reciprocal, m[1]), each(reciprocal, m[2])}};
 }
 
 // A matrix by its diagonal, and the entries one and two rows below it, in each column: its columns.
@@ -188,9 +185,17 @@ struct PairOfBoxes {
   BC_INLINE explicit PairOfBoxes(const Pair<T>& pair, const SeparatingAxis<T>& axis)
       : p_is_a(axis.face < splat<Place<T>>(3)),
         columns(one_of<T>(p_is_a, pair.b_in_a, pair.a_in_b)),
-        rows(one_of<T>(p_is_a, pair.a_in_b, pair.b_in_a)),
-        by_columns(reciprocals(columns)),
-        by_rows(transpose(by_columns)) {}
+        rows(one_of<T>(p_is_a, pair.a_in_b, pair.b_in_a)) {
+    if constexpr (packed<T>) {
+      // Which box is P is known late.
+      Columns<T> by_b = reciprocals(pair.b_in_a), by_a = transpose(by_b);
+      by_columns = select<T>(p_is_a, by_b, by_a);
+      by_rows = select<T>(p_is_a, by_a, by_b);
+    } else {
+      by_columns = reciprocals(columns);
+      by_rows = transpose(by_columns);
+    }
+  }
 };
 
 // Where the two edges of an edge axis cross: the middle of the shortest way between them, in A's frame.
