@@ -53,13 +53,15 @@ struct SeparatingAxis {
   T separation;      // largest gap [m]
   Place<T> axis;     // 0–2 faces of A, 3–5 faces of B, 6 + 3 i + j for a_i × b_j
   Place<T> face;     // best face axis, 0–5, whatever wins
+  T face_gap;        // largest gap of all face axes [m]
   Triple<T> normal;  // unit vector along the axis, from A to B, in A's frame
   Mask<T> doubtful;  // rounding of an edge axis may matter: see near_parallel_edges.hpp
 };
 
 template <class T>
 BC_INLINE SeparatingAxis<double> lane(const SeparatingAxis<T>& axis, int i) {
-  return {lane(axis.separation, i), int(lane(axis.axis, i)), int(lane(axis.face, i)),
+  return {lane(axis.separation, i),          int(lane(axis.axis, i)),
+          int(lane(axis.face, i)),           lane(axis.face_gap, i),
           triple_of_lane<T>(axis.normal, i), lane(axis.doubtful, i) != 0};
 }
 
@@ -289,6 +291,7 @@ BC_INLINE SeparatingAxis<T> separating_axis(const Pair<T>& pair) {
   offer_face_axes(pair, best);
   SeparatingAxis<T> found;
   found.face = best.winner(tolerance);
+  found.face_gap = best.largest();
   offer_edge_axes(pair, best, found.doubtful);
   found.separation = best.largest();
   found.axis = best.winner(tolerance);

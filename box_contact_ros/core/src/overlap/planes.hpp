@@ -198,6 +198,18 @@ struct PairOfBoxes {
   }
 };
 
+// The depth of a pair on a face axis, 0 to 5 [m].
+template <class T>
+BC_INLINE T depth_on(const Pair<T>& pair, Place<T> face) {
+  Mask<T> of_a = face < splat<Place<T>>(3);
+  Place<T> z = select<Place<T>>(of_a, face, face - splat<Place<T>>(3));
+  Triple<T> across = at<T>(one_of<T>(of_a, pair.a_in_b, pair.b_in_a), z);
+  Triple<T> own = select(of_a, pair.half_a, pair.half_b);
+  Triple<T> other = select(of_a, pair.half_b, pair.half_a);
+  Triple<T> offset = select(of_a, pair.offset_a, pair.offset_b);
+  return (at<T>(own, z) + dot(abs(across), other)) - abs(at<T>(offset, z));
+}
+
 // Where the two edges of an edge axis cross: the middle of the shortest way between them, in A's frame.
 template <class T>
 BC_INLINE Triple<T> crossing(const Pair<T>& pair, const Triple<T>& offset_a,
@@ -218,10 +230,11 @@ BC_INLINE Triple<T> crossing(const Pair<T>& pair, const Triple<T>& offset_a,
   return on_a + 0.5 * ((choose(is_at<T>(i), s * one, zero) + way) + t * along);
 }
 
-// Find the planes that may meet the overlap. `offset_a`, `offset_b`: from A to B in their frames [m].
+// Find the planes that may meet the overlap. `offset_a`, `offset_b`: from A to B in their frames [m],
+// `depth`: on the best face axis [m].
 template <class T>
 BC_INLINE void find_planes(const Pair<T>& pair, const SeparatingAxis<T>& axis,
-                           const Triple<T>& offset_a, const Triple<T>& offset_b,
+                           const Triple<T>& offset_a, const Triple<T>& offset_b, T depth,
                            PairOfBoxes<T>& boxes) {
   Box<T>&p = boxes.p, &q = boxes.q;
   Mask<T> is_a = boxes.p_is_a;
@@ -236,15 +249,14 @@ BC_INLINE void find_planes(const Pair<T>& pair, const SeparatingAxis<T>& axis,
   Triple<T> zero{}, up = at<T>(boxes.rows, z);
   T height = at<T>(c, z);
   Mask<T> above = height >= 0.0;
-  T half_z = at<T>(p.half, z), radius_z = dot(abs(up), q.half);
-  T depth = (half_z + radius_z) - abs(height);
-  Triple<T> reach = min(q.half, (0.5 * depth) * abs(at<T>(boxes.by_rows, z)));
+  T half_z = at<T>(p.half, z);
+  Triple<T> reach = min(q.half, (0.5 * (depth + tie * pair.size)) * abs(at<T>(boxes.by_rows, z)));
   Triple<T> rises = select(above, up, -up);
   Triple<T> middle_q = choose(rises >= zero, reach - q.half, q.half - reach);
   Triple<T> centre = c + m * middle_q, radius = abs(m) * reach;
   Triple<T> high = centre + radius, low = centre - radius;
   // P's sides: strictly through it. The contact face counts, unless Q does not come out of it.
-  Mask<T> comes_out = abs(height) + radius_z > half_z + max(flush_limit * depth, slack);
+  Mask<T> comes_out = 2.0 * (abs(height) - half_z) + depth > max(flush_limit * depth, slack);
   Flags<T> contact_face = is_at<T>(select<Place<T>>(comes_out, z, splat<Place<T>>(-1)));
   Flags<T> top = contact_face & (c >= zero), bottom = contact_face & (zero > c);
   Triple<T> extent = min(high, p.half) - max(low, -p.half);
