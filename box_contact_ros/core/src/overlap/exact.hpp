@@ -27,19 +27,19 @@ inline Moments<double> clipped_overlap(Pair<double> pair, int face, bool pressed
 // The way from A to B, where pairs are pressed in to the minimum depth.
 template <class T>
 struct Pressed {
-  Triple<T> offset_a, offset_b;  // in the boxes' frames [m]
-  Triple<T> origin_b;            // B's centre, common frame [m]
-  T depth;                       // on the best face axis [m]
-  Mask<T> moved;                 // and touching
-  Mask<T> too_shallow;           // along another axis: `enforce_on_further_axes` has work to do
+  Triple<T> from_a, from_b;  // from each box to the other, in its own frame [m]
+  Triple<T> origin_b;        // B's centre, common frame [m]
+  T depth;                   // on the best face axis [m]
+  Mask<T> moved;             // and touching
+  Mask<T> too_shallow;       // along another axis: `enforce_on_further_axes` has work to do
 };
 template <class T>
 [[gnu::noinline]] void press(const Query<T>& q, Pressed<T>& pressed) {
   Pair<T> pair = q.pair;
   pressed.moved &= enforce_minimum_depth(pair, q.axis);
   pressed.too_shallow = pressed.moved & has_too_little_depth(pair);
-  pressed.offset_a = pair.offset_a;
-  pressed.offset_b = pair.offset_b;
+  pressed.from_a = pair.offset_a;
+  pressed.from_b = -pair.offset_b;
   pressed.depth = select<T>(pressed.moved, planes::depth_on(pair, q.axis.face), pressed.depth);
   T distance = max(depth_floor * pair.size + q.axis.separation, T{});
   pressed.origin_b = pair.origin_b - distance * direction_in_common_frame(pair, q.axis.normal);
@@ -65,11 +65,11 @@ template <class Found>
 [[gnu::noinline]] void solve_uncertain(Query<double> q, const Vec<double>& near, Found& found,
                                        Counts& counts) {
   bool moved = (depth_floor * q.pair.size + q.axis.separation > 0.0) & q.touching;
-  Pressed<double> pressed{q.pair.offset_a,   q.pair.offset_b, q.pair.origin_b,
-                          -q.axis.face_gap, moved,           moved};
+  Pressed<double> pressed{q.pair.offset_a,   -q.pair.offset_b, q.pair.origin_b,
+                          -q.axis.face_gap, moved,            moved};
   if (moved) press(q, pressed);
   planes::PairOfBoxes<double> boxes(q.pair, q.axis);
-  planes::find_planes(q.pair, q.axis, pressed.offset_a, pressed.offset_b, pressed.depth, boxes);
+  planes::find_planes(q.pair, q.axis, pressed.from_a, pressed.from_b, pressed.depth, boxes);
   Columns<double> to_p = transpose(boxes.p_is_a ? q.pair.axes_a : q.pair.axes_b);
   Triple<double> origin = boxes.p_is_a ? q.pair.origin_a : pressed.origin_b;
   planes::move_origin(boxes, to_p * (triple(near) - origin));
@@ -110,11 +110,11 @@ template <class T, class Found>
                                            Counts& counts) {
   const Pair<T>& pair = q.pair;
   Mask<T> moved = (depth_floor * pair.size + q.axis.separation > 0.0) & q.touching;
-  Pressed<T> pressed{pair.offset_a,   pair.offset_b, pair.origin_b,
-                     -q.axis.face_gap, moved,         moved};
+  Pressed<T> pressed{pair.offset_a,   -pair.offset_b, pair.origin_b,
+                     -q.axis.face_gap, moved,          moved};
   if (any(moved)) press(q, pressed);
   planes::PairOfBoxes<T> boxes(pair, q.axis);
-  planes::find_planes(pair, q.axis, pressed.offset_a, pressed.offset_b, pressed.depth, boxes);
+  planes::find_planes(pair, q.axis, pressed.from_a, pressed.from_b, pressed.depth, boxes);
   unsigned touching = bits(q.touching);
   unsigned two_sided = bits(any_of(boxes.p.both | boxes.q.both)) & touching;
   if (all || 2 * __builtin_popcount(two_sided) > __builtin_popcount(touching)) {

@@ -206,8 +206,8 @@ BC_INLINE T depth_on(const Pair<T>& pair, Place<T> face) {
   Triple<T> across = at<T>(one_of<T>(of_a, pair.a_in_b, pair.b_in_a), z);
   Triple<T> own = select(of_a, pair.half_a, pair.half_b);
   Triple<T> other = select(of_a, pair.half_b, pair.half_a);
-  Triple<T> offset = select(of_a, pair.offset_a, pair.offset_b);
-  return (at<T>(own, z) + dot(abs(across), other)) - abs(at<T>(offset, z));
+  T offset = at<T>(select(of_a, pair.offset_a, pair.offset_b), z);
+  return (at<T>(own, z) + dot(abs(across), other)) - abs(offset);
 }
 
 // Where the two edges of an edge axis cross: the middle of the shortest way between them, in A's frame.
@@ -230,34 +230,32 @@ BC_INLINE Triple<T> crossing(const Pair<T>& pair, const Triple<T>& offset_a,
   return on_a + 0.5 * ((choose(is_at<T>(i), s * one, zero) + way) + t * along);
 }
 
-// Find the planes that may meet the overlap. `offset_a`, `offset_b`: from A to B in their frames [m],
-// `depth`: on the best face axis [m].
+// Find the planes that may meet the overlap. `from_a`, `from_b`: from each box to the other, in its own
+// frame [m]. `depth`: on the best face axis [m].
 template <class T>
 BC_INLINE void find_planes(const Pair<T>& pair, const SeparatingAxis<T>& axis,
-                           const Triple<T>& offset_a, const Triple<T>& offset_b, T depth,
+                           const Triple<T>& from_a, const Triple<T>& from_b, T depth,
                            PairOfBoxes<T>& boxes) {
   Box<T>&p = boxes.p, &q = boxes.q;
   Mask<T> is_a = boxes.p_is_a;
   const Columns<T>& m = boxes.columns;
   p.half = one_of<T>(is_a, pair.half_a, pair.half_b);
   q.half = one_of<T>(is_a, pair.half_b, pair.half_a);
-  const Triple<T>& c = boxes.offset = select(is_a, offset_a, -offset_b);
+  OneOf<T, Triple<T>> c = one_of<T>(is_a, from_a, from_b);
+  boxes.offset = c;
 
   // 1. Q's part below the contact face.
   Place<T> z = select<Place<T>>(is_a, axis.face, axis.face - splat<Place<T>>(3));
   T slack = place_slack * pair.size;
   Triple<T> zero{}, up = at<T>(boxes.rows, z);
   T height = at<T>(c, z);
-  Mask<T> above = height >= 0.0;
-  T half_z = at<T>(p.half, z);
   Triple<T> reach = min(q.half, (0.5 * (depth + tie * pair.size)) * abs(at<T>(boxes.by_rows, z)));
-  Triple<T> rises = select(above, up, -up);
-  Triple<T> middle_q = choose(rises >= zero, reach - q.half, q.half - reach);
+  Triple<T> middle_q = choose(height * up >= zero, reach - q.half, q.half - reach);
   Triple<T> centre = c + m * middle_q, radius = abs(m) * reach;
   Triple<T> high = centre + radius, low = centre - radius;
   // P's sides: strictly through it. The contact face counts, unless Q does not come out of it.
-  Mask<T> comes_out = 2.0 * (abs(height) - half_z) + depth > max(flush_limit * depth, slack);
-  Flags<T> contact_face = is_at<T>(select<Place<T>>(comes_out, z, splat<Place<T>>(-1)));
+  Triple<T> comes_out = 2.0 * (abs(c) - p.half) + depth;
+  Flags<T> contact_face = is_at<T>(z) & (comes_out > uniform(max(flush_limit * depth, slack)));
   Flags<T> top = contact_face & (c >= zero), bottom = contact_face & (zero > c);
   Triple<T> extent = min(high, p.half) - max(low, -p.half);
   Triple<T> side = p.half + max(flush_limit * extent, uniform(slack));
@@ -276,8 +274,7 @@ BC_INLINE void find_planes(const Pair<T>& pair, const SeparatingAxis<T>& axis,
   // The origin: the middle of P's part. A contact of two edges may be small in it.
   Mask<T> by_edges = axis.axis >= splat<Place<T>>(first_edge_axis);
   if (any(by_edges)) {
-    Triple<T> in_a = crossing(pair, offset_a, axis);
-    Triple<T> in_b = pair.a_in_b * in_a - offset_b;
+    Triple<T> in_a = crossing(pair, from_a, axis), in_b = pair.a_in_b * in_a + from_b;
     p.origin = select(by_edges, select(is_a, in_a, in_b), p.origin);
     in_q = boxes.rows * (p.origin - c);
   }
