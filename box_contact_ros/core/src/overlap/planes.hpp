@@ -152,6 +152,7 @@ template <class T>
 struct Box {
   Triple<T> half;          // half extents [m]
   Triple<T> origin;        // of the sums [m]
+  Triple<T> first;         // the places of the first planes along the axes [m]
   Triple<T> slab, middle;  // half widths of the slabs that clip lines, and their middles [m]
   Planes<T> planes[2];     // two across an axis where both sides meet the overlap
   Flags<T> both;           // where they do
@@ -163,13 +164,15 @@ struct Box {
     slab = 0.5 * (up + down);
     middle = 0.5 * (up - down);
     both = plus & minus;
+    first = choose(plus, half, -half);
     planes[0].sign = choose(plus, one, -one);
     planes[0].start = choose(plus | minus, here, -here);
     planes[1].sign = -one;
     planes[1].start = choose(both, here, -here);
   }
   BC_INLINE void place_planes() {
-    for (Planes<T>& side : planes) side.place = side.sign * half - origin;
+    planes[0].place = first - origin;
+    planes[1].place = -half - origin;
   }
 };
 
