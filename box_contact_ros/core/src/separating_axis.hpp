@@ -102,9 +102,9 @@ struct BestAxis<T, true> {
     offered[count] = gaps;
     scales[count++] = their_scales;
   }
-  BC_INLINE T largest() const { return box_contact::BOX_CONTACT_SET::largest(highest); }
+  BC_INLINE T largest() const { return largest_in_each(highest)[0]; }
   BC_INLINE int winner(T tolerance) const {
-    Triple<T> limit = Triple<T>{} + largest();
+    Triple<T> limit = largest_in_each(highest);
     unsigned near = 0;
     auto note = [&](int n) { near |= (~bits(offered[n] + tolerance < limit) & 7) << (3 * n); };
     for (int n = 0; n < 2; ++n) note(n);

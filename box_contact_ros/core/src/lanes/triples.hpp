@@ -115,6 +115,13 @@ BC_INLINE Number<Packed> largest(Packed a) {
   return max(max(a[0], a[1]), a[2]);
 }
 
+// The same in each lane.
+template <class Packed>
+BC_INLINE Packed largest_in_each(Packed a) {
+  Packed of_two = max(a, __builtin_shufflevector(a, a, 1, 0, 3, 2));
+  return max(of_two, __builtin_shufflevector(of_two, of_two, 2, 3, 0, 1));
+}
+
 // The components y z x, and z x y.
 template <class T>
 BC_INLINE Vec<T> rotated(const Vec<T>& a) {
