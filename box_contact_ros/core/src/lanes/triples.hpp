@@ -140,17 +140,21 @@ BC_INLINE Packed rotated_back(Packed a) {
   return __builtin_shufflevector(a, a, 2, 0, 1, 1);
 }
 
-// One choice for all three numbers of a single pair, without a branch.
-template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_class_v<Packed>>>
-BC_INLINE Packed select(bool mask, Packed a, Packed b) {
-  return (Mask<Packed>{} - Number<Mask<Packed>>(mask)) ? a : b;
-}
-
 // By numbers, each with its own mask.
 template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_class_v<Packed>>>
 BC_INLINE Packed choose(Mask<Packed> masks, Packed a, Packed b) {
+#if defined(__AVX__)
+  if constexpr (std::is_same_v<Packed, Lanes<double, 4>>)
+    return (Packed)_mm256_blendv_pd((__m256d)b, (__m256d)a, (__m256d)masks);
+#endif
   return masks ? a : b;
 }
+// One choice for all three numbers of a single pair, without a branch.
+template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_class_v<Packed>>>
+BC_INLINE Packed select(bool mask, Packed a, Packed b) {
+  return choose(Mask<Packed>{} - Number<Mask<Packed>>(mask), a, b);
+}
+
 // Which of three numbers is the one at `place`: 0, 1 or 2. None is at −1.
 template <class T>
 BC_INLINE Flags<T> is_at(Place<T> place) {

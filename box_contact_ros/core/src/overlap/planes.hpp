@@ -594,7 +594,7 @@ struct Surface {
   Columns<T> x_n;              // ∫ x nᵀ dA by its columns
   Triple<T> first{};           // twelve times ∫ x dV
   Squares<T> second;           // twenty times ∫ x xᵀ dV
-  T gross{};                   // Σ |distance| · twice the area
+  T volume{}, gross{};         // six times ∫ dV; Σ |distance| · twice the area
 };
 
 template <bool squares, bool two_sided, class T>
@@ -622,6 +622,7 @@ BC_INLINE Surface<T> surface(const Box<T>& box, const Sums<T>& sums) {
     }
   }
   // Column k has its own component from the places of the planes, and two from the moments.
+  s.volume = sum(own);
   s.gross = sum(gross);
   s.x_n = from_diagonals<T>({{0.5 * own, (1.0 / 3.0) * next, (1.0 / 3.0) * after}});
   return s;
@@ -688,7 +689,7 @@ BC_INLINE Mask<T> overlap_by_planes(const Pair<T>& pair, const planes::PairOfBox
   const Columns<T>& m = boxes.columns;
   Columns<T> x_n, half_way{{m * q.x_n[0], m * q.x_n[1], m * q.x_n[2]}};
   for (int i = 0; i < 3; ++i) x_n[i] = p.x_n[i] + half_way * boxes.rows[i];
-  T volume = ((x_n[0][0] + x_n[1][1]) + x_n[2][2]) * (1.0 / 3.0), by_volume = 1.0 / volume;
+  T volume = (1.0 / 6.0) * (p.volume + q.volume), by_volume = 1.0 / volume;
   Triple<T> from_origin = ((1.0 / 12.0) * by_volume) * (p.first + m * q.first);
   Triple<T> centroid = boxes.p.origin + from_origin;
   T radius = splat<T>(infinity), least_sine2_here;
