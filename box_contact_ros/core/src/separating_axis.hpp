@@ -214,12 +214,23 @@ BC_INLINE void offer_edge_axes(const Pair<T>& pair, BestAxis<T>& best, Mask<T>& 
   doubtful = (gap <= pair.touch) & ((largest(largest_possible) > gap) | skipped_may_win);
 }
 
-// The edge of A, 0 to 2, of the edge axis at a place.
-BC_INLINE int edge_of_a(int place) { return (place - first_edge_axis) / 3; }
+// The edges of A and of B, 0 to 2, of the edge axis at a place.
+BC_INLINE int edge_of_a(int place) {
+  static constexpr int8_t edges[15] = {0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 2, 2, 2};
+  return edges[place];
+}
+BC_INLINE int edge_of_b(int place) {
+  static constexpr int8_t edges[15] = {0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2};
+  return edges[place];
+}
 template <class T>
 BC_INLINE T edge_of_a(T place) {
   return select<T>(place < double(first_edge_axis + 3), T{},
                    select<T>(place < double(first_edge_axis + 6), splat<T>(1.0), splat<T>(2.0)));
+}
+template <class T>
+BC_INLINE T edge_of_b(T place) {
+  return (place - double(first_edge_axis)) - 3.0 * edge_of_a(place);
 }
 
 // The winning axis as a unit vector from A to B, in A's frame.
@@ -236,7 +247,7 @@ BC_INLINE Triple<T> axis_normal(const Pair<T>& pair, const BestAxis<T>& best) {
     face[k] = select<T>(of_a, splat<T>(1.0), face[k]);
   }
   // A pair of edges.
-  T i = edge_of_a(place), j = (place - double(first_edge_axis)) - 3.0 * i;
+  T i = edge_of_a(place), j = edge_of_b(place);
   Vec<T> u;
   for (int k = 0; k < 3; ++k) {
     const Triple<T>& edges = pair.a_in_b[k];
@@ -279,7 +290,7 @@ BC_INLINE int swapped_axis(int axis) {
 }
 template <class T>
 BC_INLINE T swapped_axis(T axis) {
-  T i = edge_of_a(axis), j = (axis - double(first_edge_axis)) - 3.0 * i;
+  T i = edge_of_a(axis), j = edge_of_b(axis);
   T face = select<T>(axis < 3.0, axis + 3.0, axis - 3.0);
   return select<T>(axis < double(first_edge_axis), face, (double(first_edge_axis) + 3.0 * j) + i);
 }

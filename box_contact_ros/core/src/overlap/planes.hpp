@@ -213,24 +213,25 @@ BC_INLINE T depth_on(const Pair<T>& pair, Place<T> face) {
   return (at<T>(own, z) + dot(abs(across), other)) - abs(offset);
 }
 
-// Where the two edges of an edge axis cross: the middle of the shortest way between them, in A's frame.
+// Where the two edges of an edge axis cross: the middle of the shortest way between them, in P's frame.
 template <class T>
-BC_INLINE Triple<T> crossing(const Pair<T>& pair, const Triple<T>& offset_a,
-                             const SeparatingAxis<T>& axis) {
-  const Columns<T>& axes_b = pair.b_in_a;
-  Place<T> i = edge_of_a(axis.axis);
-  Place<T> j = (axis.axis - splat<Place<T>>(first_edge_axis)) - splat<Place<T>>(3) * i;
-  Triple<T> zero{}, one = uniform(splat<T>(1.0)), n = axis.normal, n_b = pair.a_in_b * n;
+BC_INLINE Triple<T> crossing(const Pair<T>& pair, const SeparatingAxis<T>& axis,
+                             const PairOfBoxes<T>& boxes) {
+  Mask<T> is_a = boxes.p_is_a;
+  Place<T> of_a = edge_of_a(axis.axis), of_b = edge_of_b(axis.axis);
+  Place<T> i = select<Place<T>>(is_a, of_a, of_b), j = select<Place<T>>(is_a, of_b, of_a);
+  Triple<T> zero{}, one = uniform(splat<T>(1.0)), n_a = axis.normal, n_b = pair.a_in_b * n_a;
+  Triple<T> n_p = select(is_a, n_a, -n_b), n_q = select(is_a, n_b, -n_a);
   auto corner = [&](const Triple<T>& half, const Triple<T>& direction) {
     return choose(direction >= zero, half, -half);
   };
-  Triple<T> on_a = choose(is_at<T>(i), zero, corner(pair.half_a, n));
-  Triple<T> on_b = choose(is_at<T>(j), zero, corner(pair.half_b, n_b));
-  Triple<T> along = at<T>(axes_b, j), way = (offset_a - axes_b * on_b) - on_a;
-  T cosine = at<T>(along, i), way_i = at<T>(way, i), way_j = dot(way, along);
+  Triple<T> on_p = choose(is_at<T>(i), zero, corner(boxes.p.half, n_p));
+  Triple<T> on_q = choose(is_at<T>(j), zero, corner(boxes.q.half, n_q));
+  Triple<T> along = at<T>(boxes.columns, j), way = (boxes.offset - boxes.columns * on_q) - on_p;
+  T cosine = at<T>(at<T>(boxes.rows, i), j), way_i = at<T>(way, i), way_j = dot(way, along);
   T scale = 1.0 / max(1.0 - cosine * cosine, splat<T>(1e-20));
   T s = (way_i - cosine * way_j) * scale, t = (cosine * way_i - way_j) * scale;
-  return on_a + 0.5 * ((choose(is_at<T>(i), s * one, zero) + way) + t * along);
+  return on_p + 0.5 * ((choose(is_at<T>(i), s * one, zero) + way) + t * along);
 }
 
 // Find the planes that may meet the overlap. `from_a`, `from_b`: from each box to the other, in its own
@@ -277,8 +278,7 @@ BC_INLINE void find_planes(const Pair<T>& pair, const SeparatingAxis<T>& axis,
   // The origin: the middle of P's part. A contact of two edges may be small in it.
   Mask<T> by_edges = axis.axis >= splat<Place<T>>(first_edge_axis);
   if (any(by_edges)) {
-    Triple<T> in_a = crossing(pair, from_a, axis), in_b = pair.a_in_b * in_a + from_b;
-    p.origin = select(by_edges, select(is_a, in_a, in_b), p.origin);
+    p.origin = select(by_edges, crossing(pair, axis, boxes), p.origin);
     in_q = boxes.rows * (p.origin - c);
   }
   q.origin = in_q;
