@@ -160,9 +160,9 @@ struct Box {
   // Which sides meet the overlap. The first plane is the positive side, where that one does.
   BC_INLINE void choose_planes(const Flags<T>& plus, const Flags<T>& minus) {
     Triple<T> zero{}, one = uniform(splat<T>(1.0)), here = uniform(splat<T>(far_away));
-    Triple<T> up = half + choose(plus, zero, half), down = half + choose(minus, zero, half);
-    slab = 0.5 * (up + down);
-    middle = 0.5 * (up - down);
+    Triple<T> up = choose(plus, zero, 0.5 * half), down = choose(minus, zero, 0.5 * half);
+    slab = half + (up + down);
+    middle = up - down;
     both = plus & minus;
     first = choose(plus, half, -half);
     planes[0].sign = choose(plus, one, -one);
@@ -261,14 +261,14 @@ BC_INLINE void find_planes(const Pair<T>& pair, const SeparatingAxis<T>& axis,
   Triple<T> comes_out = 2.0 * (abs(c) - p.half) + depth;
   Flags<T> contact_face = is_at<T>(z) & (comes_out > uniform(max(flush_limit * depth, slack)));
   Flags<T> top = contact_face & (c >= zero), bottom = contact_face & (zero > c);
-  Triple<T> extent = min(high, p.half) - max(low, -p.half);
+  // Where a side is nearly flush, the overlap's extent is twice the less of the two.
+  Triple<T> extent = 2.0 * min(radius, p.half);
   Triple<T> side = p.half + max(flush_limit * extent, uniform(slack));
   Flags<T> plus = (high > side) | top, minus = (-low > side) | bottom;
   p.choose_planes(plus, minus);
 
   // 2. P's part within its bounds, and the faces of Q that touch it.
-  Triple<T> most = choose(plus, min(high, p.half), high);
-  Triple<T> least = choose(minus, max(low, -p.half), low);
+  Triple<T> most = min(high, side), least = max(low, -side);
   p.origin = 0.5 * (most + least);
   Triple<T> in_q = boxes.rows * (p.origin - c), radius_q = abs(boxes.rows) * (0.5 * (most - least));
   Triple<T> edge = q.half + (-slack);
