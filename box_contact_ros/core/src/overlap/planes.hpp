@@ -154,6 +154,7 @@ struct Box {
   Triple<T> origin;        // of the sums [m]
   Triple<T> first;         // the places of the first planes along the axes [m]
   Triple<T> slab, middle;  // half widths of the slabs that clip lines, and their middles [m]
+  Triple<T> from;          // the origin, from these middles [m]
   Planes<T> planes[2];     // two across an axis where both sides meet the overlap
   Flags<T> both;           // where they do
 
@@ -171,6 +172,7 @@ struct Box {
     planes[1].start = choose(both, here, -here);
   }
   BC_INLINE void place_planes() {
+    from = origin - middle;
     planes[0].place = first - origin;
     planes[1].place = -half - origin;
   }
@@ -272,8 +274,8 @@ BC_INLINE void find_planes(const Pair<T>& pair, const SeparatingAxis<T>& axis,
   p.origin = 0.5 * (most + least);
   Triple<T> in_q = boxes.rows * (p.origin - c), radius_q = abs(boxes.rows) * (0.5 * (most - least));
   Triple<T> edge = q.half + (-slack);
-  q.choose_planes((in_q + radius_q >= edge) & (middle_q + reach >= edge),
-                  (radius_q - in_q >= edge) & (reach - middle_q >= edge));
+  q.choose_planes(min(in_q + radius_q, middle_q + reach) >= edge,
+                  min(radius_q - in_q, reach - middle_q) >= edge);
 
   // The origin: the middle of P's part. A contact of two edges may be small in it.
   Mask<T> by_edges = axis.axis >= splat<Place<T>>(first_edge_axis);
@@ -401,10 +403,8 @@ BC_INLINE void add_line(const PairOfBoxes<T>& boxes, int i, int s, int j, int t,
   N start = min(spread(of_p.start, i), on(of_q.start));
   // The line's direction: −qz and qy in P, pl and −pk in Q.
   N back = select<N>(sine2 > least_sine2, start, splat<N>(nowhere)), to = back;
-  N from_y = spread(p.origin, y) - spread(p.middle, y) + at_y;
-  N from_z = spread(p.origin, z) - spread(p.middle, z) + at_z;
-  N from_k = on(rotated(q.origin - q.middle)) + at_k;
-  N from_l = on(rotated_back(q.origin - q.middle)) + at_l;
+  N from_y = spread(p.from, y) + at_y, from_z = spread(p.from, z) + at_z;
+  N from_k = on(rotated(q.from)) + at_k, from_l = on(rotated_back(q.from)) + at_l;
   clip(from_y, spread(p.slab, y), by_z, to, back);
   clip(from_z, spread(p.slab, z), by_y, back, to);
   clip(from_k, on(rotated(q.slab)), by_l, back, to);
@@ -534,12 +534,11 @@ BC_INLINE void add_edges(const Box<T>& x, int s, int t, const Box<T>& y, const C
                          const Columns<T>& inverse, Sums<T>& sums, Triple<T>& length) {
   const Planes<T>&of_f = x.planes[s], &of_g = x.planes[t];
   Triple<T> f = rotated(of_f.place), g = rotated_back(of_g.place);
-  Triple<T> start = min(rotated(of_f.start), rotated_back(of_g.start)), from = x.origin - x.middle;
-  Triple<T> from_y = y.origin - y.middle;
-  Triple<T> back = min(start, x.slab + from), to = min(start, x.slab - from);
+  Triple<T> start = min(rotated(of_f.start), rotated_back(of_g.start));
+  Triple<T> back = min(start, x.slab + x.from), to = min(start, x.slab - x.from);
 #pragma GCC unroll 3
   for (int m = 0; m < 3; ++m) {
-    Triple<T> place = (f * rotated(axes[m]) + g * rotated_back(axes[m])) + spread(from_y, m);
+    Triple<T> place = (f * rotated(axes[m]) + g * rotated_back(axes[m])) + spread(y.from, m);
     clip(place, spread(y.slab, m), inverse[m], back, to);
   }
   Triple<T> span = max(to + back, Triple<T>{}), middle = 0.5 * (to - back);
