@@ -178,16 +178,15 @@ BC_INLINE void offer_edge_axes(const Pair<T>& pair, BestAxis<T>& best, Mask<T>& 
   T tolerance = tie * pair.size, error = edge_gap_error * pair.size;
   Triple<T> largest_possible = uniform(splat<T>(-infinity)), longest_skipped2{};
   Triple<T> half_k = rotated(pair.half_b), half_l = rotated(half_k);
-#pragma GCC unroll 3
-  for (int i = 0; i < 3; ++i) {
-    int y = (i + 1) % 3, z = (i + 2) % 3;
+  for (int i = 0; i < count_of(3); ++i) {
+    int y = i == 2 ? 0 : i + 1, z = i == 0 ? 2 : i - 1;
     // By j, and B's axes k and l that follow it.
     Triple<T> uy = edges[y], uz = edges[z];
     Triple<T> ky = rotated(uy), kz = rotated(uz), ly = rotated(ky), lz = rotated(kz);
     Triple<T> length2 = uy * uy + uz * uz;
-    Triple<T> width = (spread(half, y) * abs(uz) + spread(half, z) * abs(uy)) +
+    Triple<T> width = (half[y] * abs(uz) + half[z] * abs(uy)) +
                       (half_k * abs(kz * uy - ky * uz) + half_l * abs(lz * uy - ly * uz));
-    Triple<T> overlap = abs(spread(offset, z) * uy - spread(offset, y) * uz) - width;
+    Triple<T> overlap = abs(offset[z] * uy - offset[y] * uz) - width;
     Triple<T> inverse = each([](auto x) { return 1.0 / sqrt(x); }, length2);
     auto if_used = [](auto gap, auto length2) {
       return select<decltype(gap)>(length2 >= parallel * parallel, gap,
