@@ -81,6 +81,25 @@ template <class Found>
   set_lane(found, 0, clipped);
 }
 
+// Shortest edge [of the size] of boxes whose second moments are sound. Of longer needles and thinner
+// plates, rounding may leave a negative eigenvalue.
+constexpr double least_edge = 1e-4;
+
+// Keep the covariances of needles and plates free of negative eigenvalues.
+template <class T>
+BC_INLINE void mend_needles(const Pair<T>& pair, unsigned chosen, Moments<T>& found) {
+  Triple<T> least = uniform((0.5 * least_edge) * pair.size);
+  unsigned needles = chosen & ~bits(all_of(min(pair.half_a, pair.half_b) >= least));
+  for (; needles; needles &= needles - 1) {
+    int i = __builtin_ctz(needles);
+    Sym<double> covariance = lane(found.covariance, i);
+    clipping::make_possible(covariance, {infinity, infinity, infinity});
+    set_lane(found.covariance, i, covariance);
+  }
+}
+template <class T>
+BC_INLINE void mend_needles(const Pair<T>&, unsigned, PointAndVolume<T>&) {}
+
 // The overlaps of the chosen lanes, whose planes have been found.
 template <bool two_sided, class T, class Found>
 BC_INLINE void solve_overlaps(const Query<T>& q, const Pressed<T>& pressed,
@@ -94,6 +113,7 @@ BC_INLINE void solve_overlaps(const Query<T>& q, const Pressed<T>& pressed,
     solve_uncertain(lane(q, i), lane(found.centroid, i), one, counts);
     copy_lane(found, i, one);
   }
+  mend_needles(q.pair, chosen, found);
 }
 // Not inlined: most pairs do without.
 template <class T, class Found>

@@ -39,6 +39,12 @@ template <class T>
 BC_INLINE Mat<T> matrix(const Sym<T>& s) {
   return {{{s(0, 0), s(0, 1), s(0, 2)}, {s(1, 0), s(1, 1), s(1, 2)}, {s(2, 0), s(2, 1), s(2, 2)}}};
 }
+template <class T>
+BC_INLINE Sym<Number<T>> lane(const Sym<T>& a, int i) {
+  Sym<Number<T>> one;
+  for (int k = 0; k < 6; ++k) one.s[k] = lane(a.s[k], i);
+  return one;
+}
 template <class T, class N>
 BC_INLINE void set_lane(Sym<T>& a, int i, const Sym<N>& value) {
   for (int k = 0; k < 6; ++k) set_lane(a.s[k], i, value.s[k]);
