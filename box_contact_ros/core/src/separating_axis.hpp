@@ -60,9 +60,8 @@ struct SeparatingAxis {
 
 template <class T>
 BC_INLINE SeparatingAxis<double> lane(const SeparatingAxis<T>& axis, int i) {
-  return {lane(axis.separation, i),          int(lane(axis.axis, i)),
-          int(lane(axis.face, i)),           lane(axis.face_gap, i),
-          triple_of_lane<T>(axis.normal, i), lane(axis.doubtful, i) != 0};
+  return {lane(axis.separation, i), int(lane(axis.axis, i)),           int(lane(axis.face, i)),
+          lane(axis.face_gap, i),   triple_of_lane<T>(axis.normal, i), lane(axis.doubtful, i) != 0};
 }
 
 // The best axis so far. Axes are offered three at a time. The largest gap is kept apart, because ties
@@ -178,7 +177,7 @@ BC_INLINE void offer_edge_axes(const Pair<T>& pair, BestAxis<T>& best, Mask<T>& 
   T tolerance = tie * pair.size, error = edge_gap_error * pair.size;
   Triple<T> largest_possible = uniform(splat<T>(-infinity)), longest_skipped2{};
   Triple<T> half_k = rotated(pair.half_b), half_l = rotated(half_k);
-  for (int i = 0; i < count_of(3); ++i) {
+  for (int i = 0; i < opaque(3); ++i) {
     int y = i == 2 ? 0 : i + 1, z = i == 0 ? 2 : i - 1;
     // By j, and B's axes k and l that follow it.
     Triple<T> uy = edges[y], uz = edges[z];

@@ -64,9 +64,9 @@ using Mask = decltype(T() < T());
 template <class T>
 using Place = std::conditional_t<is_scalar<T>, int, T>;
 
-// A count that compilers do not know, so that a loop stays a loop. Code that does not fit the first
-// cache, or that of decoded instructions, takes up to twice the time.
-BC_INLINE int count_of(int n) {
+// The same number, which compilers do not know: a loop of so many rounds stays a loop. Code that does
+// not fit the first cache, or that of decoded instructions, takes up to twice the time.
+BC_INLINE int opaque(int n) {
   asm("" : "+r"(n));
   return n;
 }

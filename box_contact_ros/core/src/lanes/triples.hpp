@@ -155,13 +155,13 @@ BC_INLINE Packed select(bool mask, Packed a, Packed b) {
   return choose(Mask<Packed>{} - Number<Mask<Packed>>(mask), a, b);
 }
 
-// Which of three numbers is the one at `place`: 0, 1 or 2. None is at −1.
+// Which of three numbers is the one at `place`: 0, 1 or 2.
 template <class T>
 BC_INLINE Flags<T> is_at(Place<T> place) {
   if constexpr (packed<T>) {
-    static constexpr int64_t flags[4][4] = {{}, {-1}, {0, -1}, {0, 0, -1, -1}};
+    static constexpr int64_t flags[3][4] = {{-1}, {0, -1}, {0, 0, -1, -1}};
     Flags<T> found;
-    std::memcpy(&found, flags[place + 1], sizeof found);
+    std::memcpy(&found, flags[place], sizeof found);
     return found;
   } else {
     T number = T(place);
@@ -216,7 +216,8 @@ BC_INLINE Columns<T> transpose(const Columns<T>& m) {
              __builtin_shufflevector(odd, last_odd, 0, 1, 4, 5),
              __builtin_shufflevector(even, last_even, 2, 3, 6, 7)}};
   } else {
-    return {{{m[0][0], m[1][0], m[2][0]}, {m[0][1], m[1][1], m[2][1]}, {m[0][2], m[1][2], m[2][2]}}};
+    return {
+        {{m[0][0], m[1][0], m[2][0]}, {m[0][1], m[1][1], m[2][1]}, {m[0][2], m[1][2], m[2][2]}}};
   }
 }
 template <class T>

@@ -24,7 +24,7 @@ inline Moments<double> clipped_overlap(Pair<double> pair, int face, bool pressed
   return overlap_by_clipping(pair, face);
 }
 
-// The way from A to B, where pairs are pressed in to the minimum depth.
+// The way between the boxes, where pairs at exact touch are pressed in to the minimum depth.
 template <class T>
 struct Pressed {
   Triple<T> from_a, from_b;  // from each box to the other, in its own frame [m]
@@ -32,18 +32,29 @@ struct Pressed {
   T depth;                   // on the best face axis [m]
   Mask<T> moved;             // and touching
   Mask<T> too_shallow;       // along another axis: `enforce_on_further_axes` has work to do
+
+  BC_INLINE explicit Pressed(const Query<T>& q)
+      : from_a(q.pair.offset_a),
+        from_b(-q.pair.offset_b),
+        origin_b(q.pair.origin_b),
+        depth(-q.axis.face_gap),
+        moved((depth_floor * q.pair.size + q.axis.separation > 0.0) & q.touching),
+        too_shallow(moved) {
+    if (any(moved)) press(q);
+  }
+
+ private:
+  [[gnu::noinline]] void press(const Query<T>& q) {
+    Pair<T> pair = q.pair;
+    moved &= enforce_minimum_depth(pair, q.axis);
+    too_shallow = moved & has_too_little_depth(pair);
+    from_a = pair.offset_a;
+    from_b = -pair.offset_b;
+    depth = select<T>(moved, planes::depth_on(pair, q.axis.face), depth);
+    T distance = max(depth_floor * pair.size + q.axis.separation, T{});
+    origin_b = pair.origin_b - distance * direction_in_common_frame(pair, q.axis.normal);
+  }
 };
-template <class T>
-[[gnu::noinline]] void press(const Query<T>& q, Pressed<T>& pressed) {
-  Pair<T> pair = q.pair;
-  pressed.moved &= enforce_minimum_depth(pair, q.axis);
-  pressed.too_shallow = pressed.moved & has_too_little_depth(pair);
-  pressed.from_a = pair.offset_a;
-  pressed.from_b = -pair.offset_b;
-  pressed.depth = select<T>(pressed.moved, planes::depth_on(pair, q.axis.face), pressed.depth);
-  T distance = max(depth_floor * pair.size + q.axis.separation, T{});
-  pressed.origin_b = pair.origin_b - distance * direction_in_common_frame(pair, q.axis.normal);
-}
 
 // The overlap of a pair whose planes have been found, with its centroid in the common frame.
 template <bool two_sided, class T, class Found>
@@ -52,10 +63,9 @@ BC_INLINE Mask<T> overlap_of(const Query<T>& q, const Pressed<T>& pressed,
   const Pair<T>& pair = q.pair;
   T depth = max(-q.axis.separation, depth_floor * pair.size);
   Mask<T> certain = overlap_by_planes<two_sided>(pair, boxes, depth, found);
-  found.centroid =
-      components<T>(planes::one_of<T>(boxes.p_is_a, pair.origin_a, pressed.origin_b) +
-                    planes::one_of<T>(boxes.p_is_a, pair.axes_a, pair.axes_b) *
-                        triple(found.centroid));
+  found.centroid = components<T>(planes::one_of<T>(boxes.p_is_a, pair.origin_a, pressed.origin_b) +
+                                 planes::one_of<T>(boxes.p_is_a, pair.axes_a, pair.axes_b) *
+                                     triple(found.centroid));
   return certain;
 }
 
@@ -64,10 +74,7 @@ BC_INLINE Mask<T> overlap_of(const Query<T>& q, const Pressed<T>& pressed,
 template <class Found>
 [[gnu::noinline]] void solve_uncertain(Query<double> q, const Vec<double>& near, Found& found,
                                        Counts& counts) {
-  bool moved = (depth_floor * q.pair.size + q.axis.separation > 0.0) & q.touching;
-  Pressed<double> pressed{q.pair.offset_a,   -q.pair.offset_b, q.pair.origin_b,
-                          -q.axis.face_gap, moved,            moved};
-  if (moved) press(q, pressed);
+  Pressed<double> pressed(q);
   planes::PairOfBoxes<double> boxes(q.pair, q.axis);
   planes::find_planes(q.pair, q.axis, pressed.from_a, pressed.from_b, pressed.depth, boxes);
   Columns<double> to_p = transpose(boxes.p_is_a ? q.pair.axes_a : q.pair.axes_b);
@@ -76,7 +83,7 @@ template <class Found>
   if (!pressed.too_shallow && overlap_of<true>(q, pressed, boxes, found)) return;
   ++counts.clipped;
   enforce_minimum_depth(q.pair, q.axis);
-  Moments<double> clipped = clipped_overlap(q.pair, int(q.axis.face), moved);
+  Moments<double> clipped = clipped_overlap(q.pair, int(q.axis.face), pressed.moved);
   clipped.centroid = components<double>(point_in_common_frame(q.pair, triple(clipped.centroid)));
   set_lane(found, 0, clipped);
 }
@@ -128,13 +135,9 @@ template <class T, class Found>
 template <class T, class Found>
 [[gnu::noinline]] unsigned solve_by_planes(const Query<T>& q, bool all, Found& found,
                                            Counts& counts) {
-  const Pair<T>& pair = q.pair;
-  Mask<T> moved = (depth_floor * pair.size + q.axis.separation > 0.0) & q.touching;
-  Pressed<T> pressed{pair.offset_a,   -pair.offset_b, pair.origin_b,
-                     -q.axis.face_gap, moved,          moved};
-  if (any(moved)) press(q, pressed);
-  planes::PairOfBoxes<T> boxes(pair, q.axis);
-  planes::find_planes(pair, q.axis, pressed.from_a, pressed.from_b, pressed.depth, boxes);
+  Pressed<T> pressed(q);
+  planes::PairOfBoxes<T> boxes(q.pair, q.axis);
+  planes::find_planes(q.pair, q.axis, pressed.from_a, pressed.from_b, pressed.depth, boxes);
   unsigned touching = bits(q.touching);
   unsigned two_sided = bits(any_of(boxes.p.both | boxes.q.both)) & touching;
   if (all || 2 * __builtin_popcount(two_sided) > __builtin_popcount(touching)) {

@@ -192,7 +192,7 @@ struct PairOfBoxes {
         columns(one_of<T>(p_is_a, pair.b_in_a, pair.a_in_b)),
         rows(one_of<T>(p_is_a, pair.a_in_b, pair.b_in_a)) {
     if constexpr (packed<T>) {
-      // Which box is P is known late.
+      // By a division that does not wait for the best face.
       Columns<T> by_b = reciprocals(pair.b_in_a), by_a = transpose(by_b);
       by_columns = select<T>(p_is_a, by_b, by_a);
       by_rows = select<T>(p_is_a, by_a, by_b);
