@@ -256,7 +256,7 @@ def test_needles_beyond_have_possible_covariances(aspect):
     found = SOLVER.batch(a, b, size_a=size_a, size_b=size_b)
     least = np.linalg.eigvalsh(found.covariance[found.colliding])[:, 0]
     trace = np.trace(found.covariance[found.colliding], axis1=1, axis2=2)
-    assert (least / trace).min() > -1e-6
+    assert (least / trace).min() > -1e-15
 
 
 @pytest.mark.parametrize('gap', [-0.1, -0.01, -1e-3, -1e-6, -1e-9])
