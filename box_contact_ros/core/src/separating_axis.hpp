@@ -145,7 +145,8 @@ BC_INLINE bool edges_stay_below(const Pair<T>& pair, T best) {
   constexpr double least2 = cross_product_min * cross_product_min, used2 = parallel * parallel;
   constexpr double margin = 1e-12;
   T room = 2.0 * edge_gap_error * pair.size, limit = best * abs(best) - margin * (best * best);
-  Triple<T> half_k = rotated(pair.half_b), half_l = rotated(half_k), limits = uniform(limit);
+  Triple<T> half_k = rotated(pair.half_b), half_l = rotated_back(pair.half_b),
+            limits = uniform(limit);
   Flags<T> below = limits == limits;
 #pragma GCC unroll 3
   for (int i = 0; i < 3; ++i) {
@@ -176,12 +177,12 @@ BC_INLINE void offer_edge_axes(const Pair<T>& pair, BestAxis<T>& best, Mask<T>& 
   }
   T tolerance = tie * pair.size, error = edge_gap_error * pair.size;
   Triple<T> largest_possible = uniform(splat<T>(-infinity)), longest_skipped2{};
-  Triple<T> half_k = rotated(pair.half_b), half_l = rotated(half_k);
+  Triple<T> half_k = rotated(pair.half_b), half_l = rotated_back(pair.half_b);
   for (int i = 0; i < opaque(3); ++i) {
     int y = i == 2 ? 0 : i + 1, z = i == 0 ? 2 : i - 1;
     // By j, and B's axes k and l that follow it.
     Triple<T> uy = edges[y], uz = edges[z];
-    Triple<T> ky = rotated(uy), kz = rotated(uz), ly = rotated(ky), lz = rotated(kz);
+    Triple<T> ky = rotated(uy), kz = rotated(uz), ly = rotated_back(uy), lz = rotated_back(uz);
     Triple<T> length2 = uy * uy + uz * uz;
     Triple<T> width = (half[y] * abs(uz) + half[z] * abs(uy)) +
                       (half_k * abs(kz * uy - ky * uz) + half_l * abs(lz * uy - ly * uz));
