@@ -140,7 +140,7 @@ BC_INLINE Packed rotated_back(Packed a) {
   return __builtin_shufflevector(a, a, 2, 0, 1, 1);
 }
 
-// By numbers, each with its own mask.
+// By numbers, each with its own mask. The instruction is named because g++ compares the mask first.
 template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_class_v<Packed>>>
 BC_INLINE Packed choose(Mask<Packed> masks, Packed a, Packed b) {
 #if defined(__AVX__)

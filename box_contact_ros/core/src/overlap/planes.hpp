@@ -222,7 +222,7 @@ BC_INLINE Triple<T> crossing(const Pair<T>& pair, const SeparatingAxis<T>& axis,
   Mask<T> is_a = boxes.p_is_a;
   Place<T> of_a = edge_of_a(axis.axis), of_b = edge_of_b(axis.axis);
   Place<T> i = select<Place<T>>(is_a, of_a, of_b), j = select<Place<T>>(is_a, of_b, of_a);
-  Triple<T> zero{}, one = uniform(splat<T>(1.0)), n_a = axis.normal, n_b = pair.a_in_b * n_a;
+  Triple<T> zero{}, n_a = axis.normal, n_b = pair.a_in_b * n_a;
   Triple<T> n_p = select(is_a, n_a, -n_b), n_q = select(is_a, n_b, -n_a);
   auto corner = [&](const Triple<T>& half, const Triple<T>& direction) {
     return choose(direction >= zero, half, -half);
@@ -233,7 +233,7 @@ BC_INLINE Triple<T> crossing(const Pair<T>& pair, const SeparatingAxis<T>& axis,
   T cosine = at<T>(at<T>(boxes.rows, i), j), way_i = at<T>(way, i), way_j = dot(way, along);
   T scale = 1.0 / max(1.0 - cosine * cosine, splat<T>(1e-20));
   T s = (way_i - cosine * way_j) * scale, t = (cosine * way_i - way_j) * scale;
-  return on_p + 0.5 * ((choose(is_at<T>(i), s * one, zero) + way) + t * along);
+  return on_p + 0.5 * ((choose(is_at<T>(i), uniform(s), zero) + way) + t * along);
 }
 
 // Find the planes that may meet the overlap. `from_a`, `from_b`: from each box to the other, in its own
@@ -255,6 +255,7 @@ BC_INLINE void find_planes(const Pair<T>& pair, const SeparatingAxis<T>& axis,
   T slack = place_slack * pair.size;
   Triple<T> zero{}, up = at<T>(boxes.rows, z);
   T height = at<T>(c, z);
+  // Of faces that tie, the best may be deeper by the tolerance.
   Triple<T> reach = min(q.half, (0.5 * (depth + tie * pair.size)) * abs(at<T>(boxes.by_rows, z)));
   Triple<T> middle_q = choose(height * up >= zero, reach - q.half, q.half - reach);
   Triple<T> centre = c + m * middle_q, radius = abs(m) * reach;
@@ -373,8 +374,6 @@ BC_INLINE const auto& of_axis(const Triple<T>& x, int j) {
 // across all of Q's axes.
 template <class T>
 using Line = std::conditional_t<packed<T>, Triple<T>, T>;
-template <class T>
-constexpr int lines_at_once = packed<T> ? 3 : 1;
 
 // The axis that follows.
 constexpr int following[3] = {1, 2, 0};
