@@ -66,7 +66,7 @@ def test_a_search_over_needles() -> None:
     _, shares = next(search_needles.climb(search_needles.by_the_bound, 300.0, 1))
     assert 0.0 < shares[0] <= 1.0
     for _, below in islice(search_needles.climb(search_needles.below_zero, 1e8, 1), 3):
-        assert below[0] <= 1e-8
+        assert below[0] <= 1e-15
 
 
 def test_a_climb_starts_from_the_worst() -> None:
