@@ -100,7 +100,7 @@ BC_INLINE void mend_needles(const Pair<T>& pair, unsigned chosen, Moments<T>& fo
   for (; needles; needles &= needles - 1) {
     int i = __builtin_ctz(needles);
     Sym<double> covariance = lane(found.covariance, i);
-    clipping::make_possible(covariance, {infinity, infinity, infinity});
+    make_possible(covariance, {infinity, infinity, infinity});
     set_lane(found.covariance, i, covariance);
   }
 }

@@ -4,6 +4,8 @@
 // The moments of the overlap A∩B that a model finds: volume, centroid, covariance.
 #pragma once
 
+#include <cmath>
+
 #include "../lanes/triples.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
@@ -48,6 +50,35 @@ BC_INLINE Sym<Number<T>> lane(const Sym<T>& a, int i) {
 template <class T, class N>
 BC_INLINE void set_lane(Sym<T>& a, int i, const Sym<N>& value) {
   for (int k = 0; k < 6; ++k) set_lane(a.s[k], i, value.s[k]);
+}
+
+// Keep a covariance possible where rounding has spoilt it: variances of what lies within these ranges,
+// and no negative eigenvalue. Of needles thinner than 1e-5 squares of the length may be left.
+inline void make_possible(Sym<double>& covariance, const Vec<double>& ranges) {
+  bool is_spoilt = false;
+  int k = 0;
+  for (int i = 0; i < 3; ++i) {
+    double most = 0.25 * ranges[i] * ranges[i];
+    is_spoilt = is_spoilt || covariance(i, i) > most;
+    covariance(i, i) = min(most, max(covariance(i, i), 0.0));
+    if (covariance(i, i) > covariance(k, k)) k = i;
+  }
+  // By the largest variance first; what it leaves of the others is a covariance, too.
+  int i = (k + 1) % 3, j = (k + 2) % 3;
+  double &ki = covariance(k, i), &kj = covariance(k, j), &ij = covariance(i, j);
+  double variance = covariance(k, k);
+  if (is_spoilt || !(variance > 0.0)) {
+    ki = kj = ij = 0.0;
+    return;
+  }
+  auto limit = [](double x, double most) { return min(most, max(x, -most)); };
+  ki = limit(ki, std::sqrt(variance * covariance(i, i)));
+  kj = limit(kj, std::sqrt(variance * covariance(j, j)));
+  double left_i = max(covariance(i, i) - ki * (ki / variance), 0.0);
+  double left_j = max(covariance(j, j) - kj * (kj / variance), 0.0);
+  double by_k = ki * (kj / variance);
+  double most = std::sqrt(left_i * left_j);
+  if (std::fabs(ij - by_k) > most) ij = by_k + limit(ij - by_k, most);
 }
 
 // What a model finds of the overlap without its second moments.
