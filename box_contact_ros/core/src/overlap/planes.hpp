@@ -54,7 +54,7 @@ constexpr double least_entry = 1e-90;
 constexpr double place_slack = 1e-14;
 // Sides of P that cut off less than this [of the overlap's extent] count as flush: they are left out.
 constexpr double flush_limit = 1e-10;
-// Squared sine below which two planes meet in no line.
+// Squared sine up to which two planes meet in no line.
 constexpr double least_sine2 = 1e-26;
 // Squared sine below which the line of two planes is known too badly: to 2⁻⁵³ · size / sine.
 constexpr double wedge_sine2 = 1e-12;
@@ -80,6 +80,9 @@ constexpr double outside_by_rounding = 0x1p-48;
 // times as much as the diagonal is.
 constexpr double off_diagonal_share = 0.01, diagonal_share = 0.3, closure_share = 0.1;
 constexpr double covariance_diagonal_share = 0.17;
+
+// The axis that follows.
+constexpr int following[3] = {1, 2, 0};
 
 // Reciprocals of the entries of a matrix.
 template <class T>
@@ -184,6 +187,7 @@ struct PairOfBoxes {
   Mask<T> p_is_a;
   OneOf<T, Columns<T>> columns, rows;  // Q's axes in P's frame; P's axes in Q's frame
   Columns<T> by_columns, by_rows;      // their reciprocals
+  Columns<T> scales;                   // 1 / sin² of the angles between P's axis i and Q's axes
   Triple<T> offset;                    // Q − P in P's frame [m]
   Box<T> p, q;
 
@@ -199,6 +203,12 @@ struct PairOfBoxes {
     } else {
       by_columns = reciprocals(columns);
       by_rows = transpose(by_columns);
+    }
+    for (int i = 0; i < 3; ++i) {
+      const Triple<T>&y = rows[following[i]], &z = rows[following[following[i]]];
+      scales[i] =
+          each([](auto sine2) { return 1.0 / max(sine2, splat<decltype(sine2)>(least_sine2)); },
+               y * y + z * z);
     }
   }
 };
@@ -375,14 +385,11 @@ BC_INLINE const auto& of_axis(const Triple<T>& x, int j) {
 template <class T>
 using Line = std::conditional_t<packed<T>, Triple<T>, T>;
 
-// The axis that follows.
-constexpr int following[3] = {1, 2, 0};
-
 // The line of P's plane s across axis i with Q's plane t across axis j.
 template <bool squares, class T>
 BC_INLINE void add_line(const PairOfBoxes<T>& boxes, int i, int s, int j, int t,
                         Faces<Line<T>>& face_p, Weighted<Line<T>, squares>& sums,
-                        Faces<Triple<T>>& faces_q, Line<T>& least_sine2_here) {
+                        Faces<Triple<T>>& faces_q, Line<T>& largest_scale) {
   using N = Line<T>;
   const Box<T>&p = boxes.p, &q = boxes.q;
   const Planes<T>&of_p = p.planes[s], &of_q = q.planes[t];
@@ -396,12 +403,12 @@ BC_INLINE void add_line(const PairOfBoxes<T>& boxes, int i, int s, int j, int t,
   N by_k = on(rotated(by_i)), by_l = on(rotated_back(by_i));
 
   N f = spread(of_p.place, i), g = on(of_q.place);
-  N sine2 = qy * qy + qz * qz, scale = 1.0 / max(sine2, splat<N>(least_sine2));
+  N scale = on(boxes.scales[i]);
   N u = g - c * f, v = f - c * g, by_q = u * scale, by_p = v * scale;
   N at_y = by_q * qy, at_z = by_q * qz, at_k = by_p * pk, at_l = by_p * pl;
   N start = min(spread(of_p.start, i), on(of_q.start));
   // The line's direction: −qz and qy in P, pl and −pk in Q.
-  N back = select<N>(sine2 > least_sine2, start, splat<N>(nowhere)), to = back;
+  N back = select<N>(scale < 1.0 / least_sine2, start, splat<N>(nowhere)), to = back;
   N from_y = spread(p.from, y) + at_y, from_z = spread(p.from, z) + at_z;
   N from_k = on(rotated(q.from)) + at_k, from_l = on(rotated_back(q.from)) + at_l;
   clip(from_y, spread(p.slab, y), by_z, to, back);
@@ -409,7 +416,7 @@ BC_INLINE void add_line(const PairOfBoxes<T>& boxes, int i, int s, int j, int t,
   clip(from_k, on(rotated(q.slab)), by_l, back, to);
   clip(from_l, on(rotated_back(q.slab)), by_k, to, back);
   N span = max(to + back, N{}), middle = 0.5 * (to - back);
-  least_sine2_here = min(least_sine2_here, select<N>(span > 0.0, sine2, splat<N>(1.0)));
+  largest_scale = max(largest_scale, select<N>(span > 0.0, scale, N{}));
 
   N side = span * (spread(of_p.sign, i) * on(of_q.sign)), area_p = side * u, area_q = side * v;
   N my = at_y - middle * qz, mz = at_z + middle * qy;
@@ -478,13 +485,13 @@ struct SideSums {
 // The lines of P's plane s across axis i with Q's planes across axis j, `sides_q` of them.
 template <bool squares, bool two_sided, class T>
 BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, int i, int s, int j, int sides_q,
-                         SideSums<squares, T>& of_side, Sums<T>& of_q, Line<T>& least_sine2_here) {
+                         SideSums<squares, T>& of_side, Sums<T>& of_q, Line<T>& largest_scale) {
   Faces<Line<T>> face;
   Weighted<Line<T>, squares> sums;
   if (!(packed<T> || two_sided) || any(spread(boxes.p.planes[s].start, i) > 0.0))
     for (int t = 0; t < sides_q; ++t)
       if (!two_sided || any(of_axis<T>(boxes.q.planes[t].start, j) > 0.0))
-        add_line<squares>(boxes, i, s, j, t, face, sums, of_q.faces[t], least_sine2_here);
+        add_line<squares>(boxes, i, s, j, t, face, sums, of_q.faces[t], largest_scale);
   of_side.put(i, j, face, sums);
 }
 
@@ -492,13 +499,13 @@ BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, int i, int s, int j, int s
 // no loop over two sides is unrolled, and of W pairs none over P's axes.
 template <bool squares, bool two_sided, class T>
 BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, Sums<T>& of_p, Sums<T>& of_q,
-                         Line<T>& least_sine2_here) {
+                         Line<T>& largest_scale) {
   int sides_p = two_sided && any(any_of(boxes.p.both)) ? 2 : 1;
   int sides_q = two_sided && any(any_of(boxes.q.both)) ? 2 : 1;
   for (int s = 0; s < sides_p; ++s) {
     SideSums<squares, T> side;
     auto add = [&](int i, int j) __attribute__((always_inline)) {
-      add_lines<squares, two_sided>(boxes, i, s, j, sides_q, side, of_q, least_sine2_here);
+      add_lines<squares, two_sided>(boxes, i, s, j, sides_q, side, of_q, largest_scale);
     };
     if constexpr (packed<T>) {
       add(0, 0);
@@ -674,8 +681,8 @@ BC_INLINE Mask<T> overlap_by_planes(const Pair<T>& pair, const planes::PairOfBox
   using namespace planes;
   constexpr bool squares = std::is_same_v<Found, Moments<T>>;
   Sums<T> of_p, of_q;
-  Line<T> least = splat<Line<T>>(1.0);
-  add_lines<squares, two_sided>(boxes, of_p, of_q, least);
+  Line<T> largest_scale{};
+  add_lines<squares, two_sided>(boxes, of_p, of_q, largest_scale);
   Triple<T> lengths{};
   constexpr auto edges =
       packed<T> ? add_edges<squares, two_sided, T> : add_edges_apart<squares, two_sided, T>;
@@ -690,12 +697,7 @@ BC_INLINE Mask<T> overlap_by_planes(const Pair<T>& pair, const planes::PairOfBox
   T volume = (1.0 / 6.0) * (p.volume + q.volume), by_volume = 1.0 / volume;
   Triple<T> from_origin = ((1.0 / 12.0) * by_volume) * (p.first + m * q.first);
   Triple<T> centroid = boxes.p.origin + from_origin;
-  T radius = splat<T>(infinity), least_sine2_here;
-  if constexpr (packed<T>) {
-    least_sine2_here = min(min(least[0], least[1]), least[2]);
-  } else {
-    least_sine2_here = least;
-  }
+  T radius = splat<T>(infinity);
   if constexpr (squares) {
     OneOf<T, Columns<T>> axes = one_of<T>(boxes.p_is_a, pair.axes_a, pair.axes_b);
     Squares<T> from_q = turned<T>(m, q.second), mean2 = square_of<T>(from_origin);
@@ -708,7 +710,11 @@ BC_INLINE Mask<T> overlap_by_planes(const Pair<T>& pair, const planes::PairOfBox
   Triple<T> normal = p.normal + m * q.normal, area = p.size + abs(m) * q.size;
   Mask<T> certain =
       certificate<squares>(x_n, normal, area, sum(lengths), volume, radius, pair.size, depth);
-  certain &= least_sine2_here >= wedge_sine2;
+  if constexpr (packed<T>) {
+    certain &= largest(largest_scale) <= 1.0 / wedge_sine2;
+  } else {
+    certain &= largest_scale <= 1.0 / wedge_sine2;
+  }
   certain &= p.gross + q.gross <= (6.0 * most_cancelled) * volume;
   Mask<T> shallow = depth < safely_inside * pair.size;
   if (any(shallow)) {
