@@ -385,11 +385,18 @@ BC_INLINE const auto& of_axis(const Triple<T>& x, int j) {
 template <class T>
 using Line = std::conditional_t<packed<T>, Triple<T>, T>;
 
-// The line of P's plane s across axis i with Q's plane t across axis j.
-template <bool squares, class T>
-BC_INLINE void add_line(const PairOfBoxes<T>& boxes, int i, int s, int j, int t,
-                        Faces<Line<T>>& face_p, Weighted<Line<T>, squares>& sums,
-                        Faces<Triple<T>>& faces_q, Line<T>& largest_scale) {
+// What is left of the line of two planes within the slabs.
+template <class N>
+struct Piece {
+  N span, middle;            // its length in units of D, and the place of its middle
+  N u, v;                    // g − c f, and f − c g [m]
+  N at_y, at_z, at_k, at_l;  // the line's nearest point to the origin, in P and in Q [m]
+};
+
+// The line of P's plane s across axis i with Q's plane t across axis j, clipped.
+template <class T>
+BC_INLINE Piece<Line<T>> clipped_line(const PairOfBoxes<T>& boxes, int i, int s, int j, int t,
+                                      Line<T>& largest_scale) {
   using N = Line<T>;
   const Box<T>&p = boxes.p, &q = boxes.q;
   const Planes<T>&of_p = p.planes[s], &of_q = q.planes[t];
@@ -402,31 +409,49 @@ BC_INLINE void add_line(const PairOfBoxes<T>& boxes, int i, int s, int j, int t,
   N by_y = on(boxes.by_rows[y]), by_z = on(boxes.by_rows[z]);
   N by_k = on(rotated(by_i)), by_l = on(rotated_back(by_i));
 
-  N f = spread(of_p.place, i), g = on(of_q.place);
-  N scale = on(boxes.scales[i]);
-  N u = g - c * f, v = f - c * g, by_q = u * scale, by_p = v * scale;
-  N at_y = by_q * qy, at_z = by_q * qz, at_k = by_p * pk, at_l = by_p * pl;
+  N f = spread(of_p.place, i), g = on(of_q.place), scale = on(boxes.scales[i]);
+  Piece<N> piece;
+  piece.u = g - c * f;
+  piece.v = f - c * g;
+  N by_q = piece.u * scale, by_p = piece.v * scale;
+  piece.at_y = by_q * qy, piece.at_z = by_q * qz;
+  piece.at_k = by_p * pk, piece.at_l = by_p * pl;
   N start = min(spread(of_p.start, i), on(of_q.start));
   // The line's direction: −qz and qy in P, pl and −pk in Q.
   N back = select<N>(scale < 1.0 / least_sine2, start, splat<N>(nowhere)), to = back;
-  N from_y = spread(p.from, y) + at_y, from_z = spread(p.from, z) + at_z;
-  N from_k = on(rotated(q.from)) + at_k, from_l = on(rotated_back(q.from)) + at_l;
-  clip(from_y, spread(p.slab, y), by_z, to, back);
-  clip(from_z, spread(p.slab, z), by_y, back, to);
-  clip(from_k, on(rotated(q.slab)), by_l, back, to);
-  clip(from_l, on(rotated_back(q.slab)), by_k, to, back);
-  N span = max(to + back, N{}), middle = 0.5 * (to - back);
-  largest_scale = max(largest_scale, select<N>(span > 0.0, scale, N{}));
+  clip(spread(p.from, y) + piece.at_y, spread(p.slab, y), by_z, to, back);
+  clip(spread(p.from, z) + piece.at_z, spread(p.slab, z), by_y, back, to);
+  clip(on(rotated(q.from)) + piece.at_k, on(rotated(q.slab)), by_l, back, to);
+  clip(on(rotated_back(q.from)) + piece.at_l, on(rotated_back(q.slab)), by_k, to, back);
+  piece.span = max(to + back, N{});
+  piece.middle = 0.5 * (to - back);
+  largest_scale = max(largest_scale, select<N>(piece.span > 0.0, scale, N{}));
+  return piece;
+}
 
-  N side = span * (spread(of_p.sign, i) * on(of_q.sign)), area_p = side * u, area_q = side * v;
-  N my = at_y - middle * qz, mz = at_z + middle * qy;
+// What this piece adds.
+template <bool squares, class T>
+BC_INLINE void add_piece(const PairOfBoxes<T>& boxes, int i, int s, int j, int t,
+                         const Piece<Line<T>>& piece, Faces<Line<T>>& face_p,
+                         Weighted<Line<T>, squares>& sums, Faces<Triple<T>>& faces_q) {
+  using N = Line<T>;
+  const Planes<T>&of_p = boxes.p.planes[s], &of_q = boxes.q.planes[t];
+  int y = following[i], z = following[y];
+  const Triple<T>& row_i = boxes.rows[i];
+  auto on = [&](const Triple<T>& x) { return of_axis<T>(x, j); };
+  N qy = on(boxes.rows[y]), qz = on(boxes.rows[z]);
+  N pk = on(rotated(row_i)), pl = on(rotated_back(row_i));
+  N f = spread(of_p.place, i), g = on(of_q.place), span = piece.span, middle = piece.middle;
+  N side = span * (spread(of_p.sign, i) * on(of_q.sign));
+  N area_p = side * piece.u, area_q = side * piece.v;
+  N my = piece.at_y - middle * qz, mz = piece.at_z + middle * qy;
   N w = f * area_p + g * area_q;
   face_p.area += area_p;
   face_p.next += area_p * my;
   face_p.after += area_p * mz;
   of_axis<T>(faces_q.area, j) += area_q;
-  of_axis<T>(faces_q.next, j) += area_q * (at_k + middle * pl);
-  of_axis<T>(faces_q.after, j) += area_q * (at_l - middle * pk);
+  of_axis<T>(faces_q.next, j) += area_q * (piece.at_k + middle * pl);
+  of_axis<T>(faces_q.after, j) += area_q * (piece.at_l - middle * pk);
   N wy = w * my, wz = w * mz;
   sums.w += w;
   sums.y += wy;
@@ -482,17 +507,51 @@ struct SideSums {
   }
 };
 
-// The lines of P's plane s across axis i with Q's planes across axis j, `sides_q` of them.
-template <bool squares, bool two_sided, class T>
-BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, int i, int s, int j, int sides_q,
-                         SideSums<squares, T>& of_side, Sums<T>& of_q, Line<T>& largest_scale) {
-  Faces<Line<T>> face;
-  Weighted<Line<T>, squares> sums;
-  if (!(packed<T> || two_sided) || any(spread(boxes.p.planes[s].start, i) > 0.0))
-    for (int t = 0; t < sides_q; ++t)
-      if (!two_sided || any(of_axis<T>(boxes.q.planes[t].start, j) > 0.0))
-        add_line<squares>(boxes, i, s, j, t, face, sums, of_q.faces[t], largest_scale);
-  of_side.put(i, j, face, sums);
+// A bit for each axis that has a plane across it, of any pair.
+template <class T>
+BC_INLINE unsigned axes_of(const Planes<T>& planes) {
+  Triple<T> zero{};
+  if constexpr (packed<T>) {
+    return bits(planes.start > zero) & 7;
+  } else {
+    unsigned found = 0;
+    for (int k = 0; k < 3; ++k) found |= unsigned(any(planes.start[k] > zero[k])) << k;
+    return found;
+  }
+}
+
+// The lines of P's planes s across `count` axes with Q's planes. All that belong to one side of Q are
+// clipped before any is added up: few steps then wait for the one before.
+template <int count, bool squares, bool two_sided, class T>
+BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, int first, int s, unsigned axes_p,
+                         const unsigned (&axes_q)[2], SideSums<squares, T>& of_side, Sums<T>& of_q,
+                         Line<T>& largest_scale) {
+  constexpr int lines = packed<T> ? 1 : 3;  // of an axis of P
+  Faces<Line<T>> face[count][lines];
+  Weighted<Line<T>, squares> sums[count][lines];
+  for (int t = 0; t < (two_sided && axes_q[1] ? 2 : 1); ++t) {
+    auto is_there = [&](int k, int j) {
+      return (axes_p >> (first + k) & 1) && (packed<T> || !two_sided || (axes_q[t] >> j & 1));
+    };
+    Piece<Line<T>> pieces[count][lines];
+#pragma GCC unroll 3
+    for (int k = 0; k < count; ++k)
+#pragma GCC unroll 3
+      for (int j = 0; j < lines; ++j)
+        pieces[k][j] = is_there(k, j) ? clipped_line(boxes, first + k, s, j, t, largest_scale)
+                                      : Piece<Line<T>>{};
+#pragma GCC unroll 3
+    for (int k = 0; k < count; ++k)
+#pragma GCC unroll 3
+      for (int j = 0; j < lines; ++j)
+        if (is_there(k, j))
+          add_piece<squares>(boxes, first + k, s, j, t, pieces[k][j], face[k][j], sums[k][j],
+                             of_q.faces[t]);
+  }
+#pragma GCC unroll 3
+  for (int k = 0; k < count; ++k)
+#pragma GCC unroll 3
+    for (int j = 0; j < lines; ++j) of_side.put(first + k, j, face[k][j], sums[k][j]);
 }
 
 // All lines of P's planes with Q's. Code that does not fit the first cache takes up to twice the time:
@@ -500,24 +559,18 @@ BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, int i, int s, int j, int s
 template <bool squares, bool two_sided, class T>
 BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, Sums<T>& of_p, Sums<T>& of_q,
                          Line<T>& largest_scale) {
+  unsigned axes_q[2] = {};
+  for (int t = 0; two_sided && t < 2; ++t) axes_q[t] = axes_of(boxes.q.planes[t]);
   int sides_p = two_sided && any(any_of(boxes.p.both)) ? 2 : 1;
-  int sides_q = two_sided && any(any_of(boxes.q.both)) ? 2 : 1;
   for (int s = 0; s < sides_p; ++s) {
     SideSums<squares, T> side;
-    auto add = [&](int i, int j) __attribute__((always_inline)) {
-      add_lines<squares, two_sided>(boxes, i, s, j, sides_q, side, of_q, largest_scale);
-    };
+    unsigned axes_p = axes_of(boxes.p.planes[s]);
     if constexpr (packed<T>) {
-      add(0, 0);
-      add(1, 0);
-      add(2, 0);
+      add_lines<3, squares, two_sided>(boxes, 0, s, axes_p, axes_q, side, of_q, largest_scale);
     } else {
 #pragma GCC unroll 1
-      for (int i = 0; i < 3; ++i) {
-        add(i, 0);
-        add(i, 1);
-        add(i, 2);
-      }
+      for (int i = 0; i < 3; ++i)
+        add_lines<1, squares, two_sided>(boxes, i, s, axes_p, axes_q, side, of_q, largest_scale);
     }
     const Triple<T>& f = boxes.p.planes[s].place;
     Faces<Triple<T>>& faces = of_p.faces[s];
