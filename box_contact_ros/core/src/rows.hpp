@@ -4,8 +4,8 @@
 // Rows of pairs in memory: read side by side, and answered in place.
 #pragma once
 
-#include "lanes/row_lanes.hpp"
 #include "kernel.hpp"
+#include "lanes/row_lanes.hpp"
 #include "overlap/moments.hpp"
 #include "query.hpp"
 
@@ -19,6 +19,7 @@ using detail::Rows;
 struct RowPlaces {
   const double *pose_a, *pose_b, *size_a, *size_b;
 
+  RowPlaces() = default;
   BC_INLINE RowPlaces(const Rows& rows, long row) {
     long of_a = row, of_b = row;
     if (rows.pairs) of_a = place(rows, 2 * row), of_b = place(rows, 2 * row + 1);
@@ -44,22 +45,30 @@ struct RowPlaces {
 // not touch. Not inlined: all models share it.
 template <class T>
 [[gnu::noinline]] inline void query_rows(const Rows& rows, long first, long last, Query<T>& q) {
-  const double *poses_a[width<T>], *poses_b[width<T>], *turns_a[width<T>], *turns_b[width<T>];
-  const double *sizes_a[width<T>], *sizes_b[width<T>];
-  for (int i = 0; i < width<T>; ++i) {
-    RowPlaces at(rows, min(first + i, last - 1));
-    poses_a[i] = at.pose_a, poses_b[i] = at.pose_b;
-    turns_a[i] = at.pose_a + 3, turns_b[i] = at.pose_b + 3;
-    sizes_a[i] = at.size_a, sizes_b[i] = at.size_b;
-  }
   Pose<T> pose_a, pose_b;
   Vec<T> size_a, size_b;
-  load_rows(poses_a, pose_a.position.v);
-  load_rows(turns_a, pose_a.quaternion);
-  load_rows(poses_b, pose_b.position.v);
-  load_rows(turns_b, pose_b.quaternion);
-  load_rows(sizes_a, size_a.v);
-  load_rows(sizes_b, size_b.v);
+  auto load = [&](auto at_a, auto at_b, auto at_size_a, auto at_size_b)
+                  __attribute__((always_inline)) {
+                    load_rows(at_a, pose_a.position.v);
+                    load_rows([&](int i) { return at_a(i) + 3; }, pose_a.quaternion);
+                    load_rows(at_b, pose_b.position.v);
+                    load_rows([&](int i) { return at_b(i) + 3; }, pose_b.quaternion);
+                    load_rows(at_size_a, size_a.v);
+                    load_rows(at_size_b, size_b.v);
+                  };
+  if (!rows.pairs && last - first == width<T>) {
+    // Addresses that the compiler counts, without a list.
+    auto every = [&](const double* numbers, long step) {
+      return [=, numbers = numbers + step * first](int i) { return numbers + step * i; };
+    };
+    load(every(rows.poses_a, 7), every(rows.poses_b, 7), every(rows.sizes_a, rows.size_step_a),
+         every(rows.sizes_b, rows.size_step_b));
+  } else {
+    RowPlaces at[width<T>];
+    for (int i = 0; i < width<T>; ++i) at[i] = RowPlaces(rows, min(first + i, last - 1));
+    load([&](int i) { return at[i].pose_a; }, [&](int i) { return at[i].pose_b; },
+         [&](int i) { return at[i].size_a; }, [&](int i) { return at[i].size_b; });
+  }
   query(pose_a, pose_b, size_a, size_b, q);
   for (long i = max(0L, last - first); i < width<T>; ++i) set_lane(q.touching, int(i), 0);
 }
@@ -86,14 +95,19 @@ template <class T>
     for (int i = 0; i < width<T>; ++i) places[i] = results.normal + 3 * (first + i);
     store_rows(places, here, normal.v);
   }
-  for (int i = 0; i < count; ++i) {
-    long row = first + i;
-    bool touches = touching >> i & 1;
-    if (results.colliding) results.colliding[row] = touches;
-    if (results.separation) results.separation[row] = lane(separation, i);
-    if (results.axis) results.axis[row] = int32_t(lane(axis, i));
-    counts.contacts += touches;
-    if (touches) continue;
+  auto store = [&](auto* array, auto number_of) __attribute__((always_inline)) {
+    if (!array) return;
+    if (count == width<T>)
+      for (int i = 0; i < width<T>; ++i) array[first + i] = number_of(i);
+    else
+      for (int i = 0; i < count; ++i) array[first + i] = number_of(i);
+  };
+  store(results.colliding, [&](int i) { return bool(touching >> i & 1); });
+  store(results.separation, [&](int i) { return lane(separation, i); });
+  store(results.axis, [&](int i) { return int32_t(lane(axis, i)); });
+  counts.contacts += __builtin_popcount(touching & here);
+  for (unsigned apart = here & ~touching; apart; apart &= apart - 1) {
+    long row = first + __builtin_ctz(apart);
     for (int k = 0; results.point && k < 3; ++k) results.point[3 * row + k] = not_a_number;
     if (results.volume) results.volume[row] = 0.0;
     for (int k = 0; results.covariance && k < 9; ++k)

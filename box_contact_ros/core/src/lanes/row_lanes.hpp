@@ -39,12 +39,12 @@ BC_INLINE void transpose_fours(T (&x)[4]) {
   }
 }
 
-// The first `count` numbers at each place, three or four of them.
-template <int count, class T>
-BC_INLINE void load_rows(const double* const (&places)[width<T>], T (&x)[count]) {
+// The first `count` numbers at each place, three or four of them. `place(i)`: that of lane i.
+template <int count, class T, class Place>
+BC_INLINE void load_rows(const Place& place, T (&x)[count]) {
   if constexpr (shuffles<T>) {
     auto row = [&](int i) {
-      const double* at = places[i];
+      const double* at = place(i);
       return FourNumbers{at[0], at[1], at[2], at[count - 1]};
     };
     T all[4];
@@ -59,7 +59,7 @@ BC_INLINE void load_rows(const double* const (&places)[width<T>], T (&x)[count])
     for (int k = 0; k < count; ++k) x[k] = all[k];
   } else {
     for (int k = 0; k < count; ++k)
-      for (int i = 0; i < width<T>; ++i) set_lane(x[k], i, places[i][k]);
+      for (int i = 0; i < width<T>; ++i) set_lane(x[k], i, place(i)[k]);
   }
 }
 
