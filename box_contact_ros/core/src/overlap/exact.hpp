@@ -131,7 +131,7 @@ template <class T, class Found>
 }
 
 // The overlaps by planes of the pairs that touch. Of W pairs those that have two planes across an axis
-// of a box are left, unless they are most, or `all` are wanted. Returns which are left.
+// of a box are left, unless they are more than a quarter, or `all` are wanted. Returns which are left.
 template <class T, class Found>
 [[gnu::noinline]] unsigned solve_by_planes(const Query<T>& q, bool all, Found& found,
                                            Counts& counts) {
@@ -140,7 +140,7 @@ template <class T, class Found>
   planes::find_planes(q.pair, q.axis, pressed.from_a, pressed.from_b, pressed.depth, boxes);
   unsigned touching = bits(q.touching);
   unsigned two_sided = bits(any_of(boxes.p.both | boxes.q.both)) & touching;
-  if (all || 2 * __builtin_popcount(two_sided) > __builtin_popcount(touching)) {
+  if (all || 4 * __builtin_popcount(two_sided) > __builtin_popcount(touching)) {
     solve_two_sided(q, pressed, boxes, found, counts);
     return 0;
   }
