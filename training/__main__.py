@@ -98,8 +98,11 @@ def _train_mlp(options: argparse.Namespace, hidden: tuple[int, int] | None = Non
 
 def _train_scene(options: argparse.Namespace) -> None:
     quick = {'counts': QUICK_COUNTS, 'networks': QUICK_STARTS, 'epochs': QUICK_EPOCHS}
-    card = paper.train(options.out or jobs.SHIPPED, options.scene, options.output,
-                       seed=options.seed, commit=_commit(), **(quick if options.quick else {}))
+    try:
+        card = paper.train(options.out or jobs.SHIPPED, options.scene, options.output,
+                           seed=options.seed, commit=_commit(), **(quick if options.quick else {}))
+    except ValueError as error:
+        sys.exit(f'error: {error}')
     print(f'{card["name"]}.safetensors: point {card["metrics"]} [% of the longest edge]')
 
 

@@ -19,6 +19,7 @@ from benchmarks.errors import point_errors
 from benchmarks.output import percentiles
 from benchmarks.paper.dataset import INPUTS, OUTPUTS, PAPER_COUNTS, SETS, Patterns, spherical
 from benchmarks.paper.fit import PaperSettings, fit
+from benchmarks.paper.jobs import SHIPPED
 from benchmarks.pose_sets import LOADS, Generator, Pairs, drawn
 from benchmarks.pose_sets import SETS as POSE_SETS
 from benchmarks.weights import save_weights
@@ -65,7 +66,8 @@ def train(folder: Path, scene: str, output: str, *, seed: int, commit: str,
           ) -> dict[str, Any]:
     """Train the network for a scene of two equal boxes, and write it; return its model card.
 
-    networks, epochs: instead of those of `SETTINGS`. Raises ValueError for a scene of other boxes.
+    networks, epochs: instead of those of `SETTINGS`. Raises ValueError for a scene of other boxes, and
+    where the file would replace the paper's own network.
     """
     settings = SETTINGS[output]
     settings = replace(settings, networks=networks or settings.networks,
@@ -77,11 +79,14 @@ def train(folder: Path, scene: str, output: str, *, seed: int, commit: str,
     if np.ptp(sizes, axis=0).any():
         raise ValueError(f'scene {scene!r} has boxes of several sizes; the network is for two '
                          'equal ones')
+    ending = '' if output == ANGLES else f'-{output}'
+    path = folder / f'paper{in_file_name(sizes[0])}{ending}.safetensors'
+    if path == SHIPPED / 'paper.safetensors':
+        raise ValueError(f'scene {scene!r} has cubes: {path} is the network of the paper\'s poses; '
+                         'name another folder by --out')
     sets = dict(zip(SETS, (scene_patterns(pairs, output) for pairs in streams)))
     fitted = fit(sets['training'], sets['cross-validation'], settings,
                  progress=f'{scene}, {output}')
-    ending = '' if output == ANGLES else f'-{output}'
-    path = folder / f'paper{in_file_name(sizes[0])}{ending}.safetensors'
     card: dict[str, Any] = {
         'name': path.stem, 'model': 'paper', 'architecture': {'contact': list(settings.widths)},
         'sizes': [sizes[0].tolist()] * 2, 'seed': seed, 'commit': commit, 'metrics': {},

@@ -191,6 +191,15 @@ def test_quick_training_for_a_scene(scene: str, output: str, tmp_path: Path) -> 
         paper.train(tmp_path, 'random sizes', output, seed=1, commit='', counts=(9, 9, 9))
 
 
+def test_a_scene_of_cubes_leaves_the_shipped_network(tmp_path: Path,
+                                                     monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(paper, 'SHIPPED', tmp_path)
+    with pytest.raises(ValueError, match='scene .stacks. has cubes.*another folder by --out'):
+        paper.train(tmp_path, 'stacks', paper.ANGLES, seed=1, commit='', counts=(9, 9, 9),
+                    networks=1, epochs=1)
+    assert not list(tmp_path.iterdir())
+
+
 def test_each_file_has_its_folder() -> None:
     """What the package ships is in weights/, what the tables alone need beside them."""
     assert {job.name for job in JOBS.values() if job.folder == SHIPPED} == {'paper'}
