@@ -143,11 +143,24 @@ BC_INLINE OneOf<T, Thing> one_of(Mask<T> mask, const Thing& a, const Thing& b) {
   }
 }
 
+// A bit for each number that is chosen, of any pair.
+template <class T>
+BC_INLINE unsigned bits_of_any(const Flags<T>& chosen) {
+  if constexpr (packed<T>) {
+    return bits(chosen) & 7;
+  } else {
+    unsigned found = 0;
+    for (int k = 0; k < 3; ++k) found |= unsigned(any(chosen[k])) << k;
+    return found;
+  }
+}
+
 // One plane across each axis of a box.
 template <class T>
 struct Planes {
   Triple<T> sign, place;  // side of the box: ±1; distance from the origin along the axis [m]
   Triple<T> start;        // where its lines begin to be clipped; `nowhere`: there is no such plane
+  unsigned axes;          // a bit for each axis that has one, of any pair
 };
 
 // A box, in its own frame.
@@ -171,8 +184,10 @@ struct Box {
     first = choose(plus, half, -half);
     planes[0].sign = choose(plus, one, -one);
     planes[0].start = choose(plus | minus, here, -here);
+    planes[0].axes = bits_of_any<T>(plus | minus);
     planes[1].sign = -one;
     planes[1].start = choose(both, here, -here);
+    planes[1].axes = bits_of_any<T>(both);
   }
   BC_INLINE void place_planes() {
     from = origin - middle;
@@ -507,32 +522,18 @@ struct SideSums {
   }
 };
 
-// A bit for each axis that has a plane across it, of any pair.
-template <class T>
-BC_INLINE unsigned axes_of(const Planes<T>& planes) {
-  Triple<T> zero{};
-  if constexpr (packed<T>) {
-    return bits(planes.start > zero) & 7;
-  } else {
-    unsigned found = 0;
-    for (int k = 0; k < 3; ++k) found |= unsigned(any(planes.start[k] > zero[k])) << k;
-    return found;
-  }
-}
-
 // The lines of P's planes s across `count` axes with Q's planes. All that belong to one side of Q are
 // clipped before any is added up: few steps then wait for the one before.
 template <int count, bool squares, bool two_sided, class T>
-BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, int first, int s, unsigned axes_p,
-                         const unsigned (&axes_q)[2], SideSums<squares, T>& of_side, Sums<T>& of_q,
-                         Line<T>& largest_scale) {
+BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, int first, int s,
+                         SideSums<squares, T>& of_side, Sums<T>& of_q, Line<T>& largest_scale) {
   constexpr int lines = packed<T> ? 1 : 3;  // of an axis of P
   Faces<Line<T>> face[count][lines];
   Weighted<Line<T>, squares> sums[count][lines];
-  for (int t = 0; t < (two_sided && axes_q[1] ? 2 : 1); ++t) {
-    auto is_there = [&](int k, int j) {
-      return (axes_p >> (first + k) & 1) && (packed<T> || !two_sided || (axes_q[t] >> j & 1));
-    };
+  unsigned axes_p = boxes.p.planes[s].axes;
+  for (int t = 0; t < (two_sided && boxes.q.planes[1].axes ? 2 : 1); ++t) {
+    unsigned axes_q = packed<T> || !two_sided ? 7 : boxes.q.planes[t].axes;
+    auto is_there = [&](int k, int j) { return axes_p >> (first + k) & axes_q >> j & 1; };
     Piece<Line<T>> pieces[count][lines];
 #pragma GCC unroll 3
     for (int k = 0; k < count; ++k)
@@ -559,18 +560,15 @@ BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, int first, int s, unsigned
 template <bool squares, bool two_sided, class T>
 BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, Sums<T>& of_p, Sums<T>& of_q,
                          Line<T>& largest_scale) {
-  unsigned axes_q[2] = {};
-  for (int t = 0; two_sided && t < 2; ++t) axes_q[t] = axes_of(boxes.q.planes[t]);
-  int sides_p = two_sided && any(any_of(boxes.p.both)) ? 2 : 1;
+  int sides_p = two_sided && boxes.p.planes[1].axes ? 2 : 1;
   for (int s = 0; s < sides_p; ++s) {
     SideSums<squares, T> side;
-    unsigned axes_p = axes_of(boxes.p.planes[s]);
     if constexpr (packed<T>) {
-      add_lines<3, squares, two_sided>(boxes, 0, s, axes_p, axes_q, side, of_q, largest_scale);
+      add_lines<3, squares, two_sided>(boxes, 0, s, side, of_q, largest_scale);
     } else {
 #pragma GCC unroll 1
       for (int i = 0; i < 3; ++i)
-        add_lines<1, squares, two_sided>(boxes, i, s, axes_p, axes_q, side, of_q, largest_scale);
+        add_lines<1, squares, two_sided>(boxes, i, s, side, of_q, largest_scale);
     }
     const Triple<T>& f = boxes.p.planes[s].place;
     Faces<Triple<T>>& faces = of_p.faces[s];
@@ -626,11 +624,11 @@ BC_INLINE void add_edges(const Box<T>& x, const Box<T>& y, const Columns<T>& axe
                          const Columns<T>& inverse, Sums<T>& sums, Triple<T>& length) {
   if constexpr (packed<T>) {
     // Without two planes there is no edge.
-    unsigned there = bits(x.planes[0].start > Triple<T>{}) & 7;
+    unsigned there = x.planes[0].axes;
     if ((there & (there - 1)) == 0) return;
   }
   add_edges<squares>(x, 0, 0, y, axes, inverse, sums, length);
-  int ways = two_sided && any(any_of(x.both)) ? 4 : 1;
+  int ways = two_sided && x.planes[1].axes ? 4 : 1;
   for (int c = 1; c < ways; ++c)
     if (any(any_of(min(rotated(x.planes[c & 1].start), rotated_back(x.planes[c >> 1].start)) >
                    Triple<T>{})))
