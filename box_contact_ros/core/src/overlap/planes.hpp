@@ -528,6 +528,12 @@ template <int count, bool squares, bool two_sided, class T>
 BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, int first, int s,
                          SideSums<squares, T>& of_side, Sums<T>& of_q, Line<T>& largest_scale) {
   constexpr int lines = packed<T> ? 1 : 3;  // of an axis of P
+  auto each_line = [](auto work) __attribute__((always_inline)) {
+#pragma GCC unroll 3
+    for (int k = 0; k < count; ++k)
+#pragma GCC unroll 3
+      for (int j = 0; j < lines; ++j) work(k, j);
+  };
   Faces<Line<T>> face[count][lines];
   Weighted<Line<T>, squares> sums[count][lines];
   unsigned axes_p = boxes.p.planes[s].axes;
@@ -535,24 +541,19 @@ BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, int first, int s,
     unsigned axes_q = packed<T> || !two_sided ? 7 : boxes.q.planes[t].axes;
     auto is_there = [&](int k, int j) { return axes_p >> (first + k) & axes_q >> j & 1; };
     Piece<Line<T>> pieces[count][lines];
-#pragma GCC unroll 3
-    for (int k = 0; k < count; ++k)
-#pragma GCC unroll 3
-      for (int j = 0; j < lines; ++j)
-        pieces[k][j] = is_there(k, j) ? clipped_line(boxes, first + k, s, j, t, largest_scale)
-                                      : Piece<Line<T>>{};
-#pragma GCC unroll 3
-    for (int k = 0; k < count; ++k)
-#pragma GCC unroll 3
-      for (int j = 0; j < lines; ++j)
-        if (is_there(k, j))
-          add_piece<squares>(boxes, first + k, s, j, t, pieces[k][j], face[k][j], sums[k][j],
-                             of_q.faces[t]);
+    each_line([&](int k, int j) __attribute__((always_inline)) {
+      pieces[k][j] = is_there(k, j) ? clipped_line(boxes, first + k, s, j, t, largest_scale)
+                                    : Piece<Line<T>>{};
+    });
+    each_line([&](int k, int j) __attribute__((always_inline)) {
+      if (is_there(k, j))
+        add_piece<squares>(boxes, first + k, s, j, t, pieces[k][j], face[k][j], sums[k][j],
+                           of_q.faces[t]);
+    });
   }
-#pragma GCC unroll 3
-  for (int k = 0; k < count; ++k)
-#pragma GCC unroll 3
-    for (int j = 0; j < lines; ++j) of_side.put(first + k, j, face[k][j], sums[k][j]);
+  each_line([&](int k, int j) __attribute__((always_inline)) {
+    of_side.put(first + k, j, face[k][j], sums[k][j]);
+  });
 }
 
 // All lines of P's planes with Q's. Code that does not fit the first cache takes up to twice the time:
