@@ -209,7 +209,7 @@ struct PairOfBoxes {
   BC_INLINE explicit PairOfBoxes(const Pair<T>& pair, const SeparatingAxis<T>& axis)
       : p_is_a(axis.face < splat<Place<T>>(3)),
         columns(one_of<T>(p_is_a, pair.b_in_a, pair.a_in_b)),
-        rows(one_of<T>(p_is_a, pair.a_in_b, pair.b_in_a)) {
+        rows(transposed_columns(pair)) {
     if constexpr (packed<T>) {
       // By a division that does not wait for the best face.
       Columns<T> by_b = reciprocals(pair.b_in_a), by_a = transpose(by_b);
@@ -224,6 +224,16 @@ struct PairOfBoxes {
       scales[i] =
           each([](auto sine2) { return 1.0 / max(sine2, splat<decltype(sine2)>(least_sine2)); },
                y * y + z * z);
+    }
+  }
+
+ private:
+  // Of a single pair a choice without a copy; of W pairs other names for the same numbers.
+  BC_INLINE OneOf<T, Columns<T>> transposed_columns(const Pair<T>& pair) const {
+    if constexpr (is_scalar<T>) {
+      return one_of<T>(p_is_a, pair.a_in_b, pair.b_in_a);
+    } else {
+      return transpose(columns);
     }
   }
 };
