@@ -47,15 +47,14 @@ template <class T>
 [[gnu::noinline]] inline void query_rows(const Rows& rows, long first, long last, Query<T>& q) {
   Pose<T> pose_a, pose_b;
   Vec<T> size_a, size_b;
-  auto load = [&](auto at_a, auto at_b, auto at_size_a, auto at_size_b)
-                  __attribute__((always_inline)) {
-                    load_rows(at_a, pose_a.position.v);
-                    load_rows([&](int i) { return at_a(i) + 3; }, pose_a.quaternion);
-                    load_rows(at_b, pose_b.position.v);
-                    load_rows([&](int i) { return at_b(i) + 3; }, pose_b.quaternion);
-                    load_rows(at_size_a, size_a.v);
-                    load_rows(at_size_b, size_b.v);
-                  };
+  auto load = [&](auto a, auto b, auto of_a, auto of_b) __attribute__((always_inline)) {
+    load_rows(a, pose_a.position.v);
+    load_rows([&](int i) { return a(i) + 3; }, pose_a.quaternion);
+    load_rows(b, pose_b.position.v);
+    load_rows([&](int i) { return b(i) + 3; }, pose_b.quaternion);
+    load_rows(of_a, size_a.v);
+    load_rows(of_b, size_b.v);
+  };
   if (!rows.pairs && last - first == width<T>) {
     // Addresses that the compiler counts, without a list.
     auto every = [&](const double* numbers, long step) {
@@ -97,7 +96,7 @@ template <class T>
   }
   auto store = [&](auto* array, auto number_of) __attribute__((always_inline)) {
     if (!array) return;
-    if (count == width<T>)
+    if (count == width<T>)  // most blocks: a loop that the compiler writes out
       for (int i = 0; i < width<T>; ++i) array[first + i] = number_of(i);
     else
       for (int i = 0; i < count; ++i) array[first + i] = number_of(i);
