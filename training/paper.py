@@ -66,8 +66,8 @@ def train(folder: Path, scene: str, output: str, *, seed: int, commit: str,
           ) -> dict[str, Any]:
     """Train the network for a scene of two equal boxes, and write it; return its model card.
 
-    networks, epochs: instead of those of `SETTINGS`. Raises ValueError for a scene of other boxes, and
-    where the file would replace the paper's own network.
+    networks, epochs: instead of those of `SETTINGS`. Raises ValueError for a scene of other boxes,
+    and where the file would replace the paper's own network.
     """
     settings = SETTINGS[output]
     settings = replace(settings, networks=networks or settings.networks,
@@ -82,7 +82,7 @@ def train(folder: Path, scene: str, output: str, *, seed: int, commit: str,
     ending = '' if output == ANGLES else f'-{output}'
     path = folder / f'paper{in_file_name(sizes[0])}{ending}.safetensors'
     if path == SHIPPED / 'paper.safetensors':
-        raise ValueError(f'scene {scene!r} has cubes: {path} is the network of the paper\'s poses; '
+        raise ValueError(f'scene {scene!r} has cubes, but {path} is for the poses of the paper: '
                          'name another folder by --out')
     sets = dict(zip(SETS, (scene_patterns(pairs, output) for pairs in streams)))
     fitted = fit(sets['training'], sets['cross-validation'], settings,
