@@ -25,8 +25,7 @@ BC_INLINE void store(const PointAndVolume<double>& overlap, bc_contact& contact)
   for (int k = 0; k < 3; ++k) contact.point[k] = overlap.centroid[k];
 }
 BC_INLINE void store(const Moments<double>& overlap, bc_contact& contact) {
-  contact.volume = overlap.volume;
-  for (int k = 0; k < 3; ++k) contact.point[k] = overlap.centroid[k];
+  store(static_cast<const PointAndVolume<double>&>(overlap), contact);
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) contact.covariance[i][j] = overlap.covariance(i, j);
 }

@@ -82,12 +82,7 @@ struct WaitingRest {
   Rest<T, Next> rest;
 
   BC_INLINE void take(const Query<T>& q, int i, long row, const Results& results, Counts& counts) {
-    if constexpr (is_scalar<T>) {
-      waiting.block.query = q;
-      waiting.block.rows[0] = row;
-    } else {
-      waiting.put(q, i, row, waiting.count);
-    }
+    waiting.put(q, i, row, waiting.count);
     if (++waiting.count == width<T>) solve(results, counts);
   }
   BC_INLINE void finish(const Results& results, Counts& counts) {
@@ -101,18 +96,15 @@ struct WaitingRest {
   }
 };
 
-// One row alone.
+// One row alone, of which no model leaves anything.
 template <class Model>
 [[gnu::noinline]] inline long solve_row(const Model& model, const Rows& rows, long row,
                                         const Results& results, Counts& counts) {
   Block<double, Model> one;
   query_rows(rows, row, row + 1, one.query);
   one.rows[0] = row;
-  if (one.query.touching) {
-    Rest<double, Model> rest;
-    one.solve(model, results, counts, rest);
-    rest.finish(results, counts);
-  }
+  NoRest<double> rest;
+  if (one.query.touching) one.solve(model, results, counts, rest);
   return write_query(one.query, row, row + 1, results, counts);
 }
 

@@ -171,8 +171,7 @@ inline Moments<double> overlap_from(const Pair<double>& pair, int face, double& 
     int x = axes[d];
     centre[d] = offset[x];
     half[d] = own[x];
-    for (int j = 0; j < 3; ++j)
-      edges[d][j] = (d == 2 ? side : 1.0) * (other[j] * turn[x][j]);
+    for (int j = 0; j < 3; ++j) edges[d][j] = (d == 2 ? side : 1.0) * (other[j] * turn[x][j]);
   }
   // Moments are taken about the middle of the rectangle that bounds both projections, so that a
   // small box on a large one keeps its digits.
@@ -265,9 +264,9 @@ inline Moments<double> overlap_from(const Pair<double>& pair, int face, double& 
   ranges[w] = -least;
   make_possible(covariance, ranges);
   double volume = std::fabs(sum.volume);
-  if (of_a) return {volume, centroid, rotated(pair.axes_a, covariance)};
+  if (of_a) return {{volume, centroid}, rotated(pair.axes_a, covariance)};
   Vec<double> in_a = components<double>(pair.offset_a + pair.b_in_a * triple(centroid));
-  return {volume, in_a, rotated(pair.axes_b, covariance)};
+  return {{volume, in_a}, rotated(pair.axes_b, covariance)};
 }
 
 }  // namespace clipping

@@ -85,7 +85,7 @@ template <class Found>
   enforce_minimum_depth(q.pair, q.axis);
   Moments<double> clipped = clipped_overlap(q.pair, int(q.axis.face), pressed.moved);
   clipped.centroid = components<double>(point_in_common_frame(q.pair, triple(clipped.centroid)));
-  set_lane(found, 0, clipped);
+  found = static_cast<const Found&>(clipped);
 }
 
 // Shortest edge [of the size] of boxes whose second moments are sound. Of longer needles and thinner
@@ -118,7 +118,7 @@ BC_INLINE void solve_overlaps(const Query<T>& q, const Pressed<T>& pressed,
     int i = __builtin_ctz(uncertain);
     LaneOf<Found> one;
     solve_uncertain(lane(q, i), lane(found.centroid, i), one, counts);
-    copy_lane(found, i, one);
+    set_lane(found, i, one);
   }
   mend_needles(q.pair, chosen, found);
 }
@@ -155,31 +155,18 @@ template <class T, class Found>
 //   solve(query, found, counts): fills `found` for the pairs that touch, with the centroid in the
 //     common frame. It returns the bits of those that it leaves.
 
-// Pairs that have two planes across an axis of a box.
-template <template <class> class FoundOf>
-struct TwoSidedModelOf {
-  template <class T>
-  using Found = FoundOf<T>;
-  using Rest = void;
-
-  template <class T>
-  BC_INLINE unsigned solve(const Query<T>& query, Found<T>& found, Counts& counts) const {
-    return solve_by_planes(query, true, found, counts);
-  }
-};
-
 // Model `exact`: the moments of A∩B by the planes that meet it, or by clipping where these are not
-// certain. `FoundOf`: Moments, or PointAndVolume.
-template <template <class> class FoundOf>
+// certain. `FoundOf`: Moments, or PointAndVolume. `leaves`: few pairs of W that have two planes across
+// an axis wait for others of their kind.
+template <template <class> class FoundOf, bool leaves = true>
 struct ExactModelOf {
   template <class T>
   using Found = FoundOf<T>;
-  using Rest = TwoSidedModelOf<FoundOf>;
+  using Rest = std::conditional_t<leaves, ExactModelOf<FoundOf, false>, void>;
 
-  // Few pairs of W that have two planes across an axis wait for others of their kind.
   template <class T>
   BC_INLINE unsigned solve(const Query<T>& query, Found<T>& found, Counts& counts) const {
-    return solve_by_planes(query, false, found, counts);
+    return solve_by_planes(query, !leaves, found, counts);
   }
 };
 
@@ -194,7 +181,7 @@ BC_INLINE const Moments<T>& all_moments(const Moments<T>& found) {
 template <class T>
 BC_INLINE Moments<T> all_moments(const PointAndVolume<T>& found) {
   T unknown = splat<T>(not_a_number);
-  return {found.volume, found.centroid, {{unknown, unknown, unknown, unknown, unknown, unknown}}};
+  return {found, {{unknown, unknown, unknown, unknown, unknown, unknown}}};
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET

@@ -90,22 +90,20 @@ struct PointAndVolume {
 
 // What a model finds of the overlap.
 template <class T>
-struct Moments {
-  T volume;           // [m³]
-  Vec<T> centroid;    // in A's frame from a kernel, in the common frame from a model [m]
+struct Moments : PointAndVolume<T> {
   Sym<T> covariance;  // second central moments by the volume, common frame [m²]
 };
 
 template <class T, class N>
-BC_INLINE void set_lane(PointAndVolume<T>& found, int i, const Moments<N>& value) {
+BC_INLINE void set_lane(PointAndVolume<T>& found, int i, const PointAndVolume<N>& value) {
   set_lane(found.volume, i, value.volume);
   set_lane(found.centroid, i, value.centroid);
 }
 template <class T, class N>
-BC_INLINE void set_lane(Moments<T>& moments, int i, const Moments<N>& value) {
-  set_lane(moments.volume, i, value.volume);
-  set_lane(moments.centroid, i, value.centroid);
-  set_lane(moments.covariance, i, value.covariance);
+BC_INLINE void set_lane(Moments<T>& found, int i, const Moments<N>& value) {
+  set_lane(found.volume, i, value.volume);
+  set_lane(found.centroid, i, value.centroid);
+  set_lane(found.covariance, i, value.covariance);
 }
 
 // What is found of one pair of several.
@@ -117,14 +115,5 @@ struct LaneOfFound<FoundOf<T>> {
 };
 template <class Found>
 using LaneOf = typename LaneOfFound<Found>::type;
-template <class T>
-BC_INLINE void copy_lane(PointAndVolume<T>& found, int i, const PointAndVolume<double>& one) {
-  set_lane(found.volume, i, one.volume);
-  set_lane(found.centroid, i, one.centroid);
-}
-template <class T>
-BC_INLINE void copy_lane(Moments<T>& found, int i, const Moments<double>& one) {
-  set_lane(found, i, one);
-}
 
 }  // namespace box_contact::BOX_CONTACT_SET
