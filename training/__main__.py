@@ -51,7 +51,8 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
                         f'{recipe.HIDDEN[1]}), named in the file')
     parser.add_argument('--sizes', action='store_const', const=recipe.SIZES,
                         help='mlp with each of the other sizes of its hidden layers')
-    parser.add_argument('--scene', choices=paper.SCENES, help='pose set that paper is trained for')
+    parser.add_argument('--scene', choices=paper.SCENES,
+                        help='pose set that paper is trained for; one of cubes needs --out')
     parser.add_argument('--output', choices=tuple(paper.SETTINGS), default=paper.ANGLES,
                         help='of paper --scene: four angles, or x, y and z of the point')
     parser.add_argument('--out', type=Path, metavar='DIR',
