@@ -96,7 +96,7 @@ struct WaitingRest {
   }
 };
 
-// One row alone, of which no model leaves anything.
+// A row alone. No model leaves it.
 template <class Model>
 [[gnu::noinline]] inline long solve_row(const Model& model, const Rows& rows, long row,
                                         const Results& results, Counts& counts) {

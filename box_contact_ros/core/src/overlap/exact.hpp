@@ -108,15 +108,15 @@ template <class T>
 BC_INLINE void mend_needles(const Pair<T>&, unsigned, PointAndVolume<T>&) {}
 
 // The overlaps of the chosen lanes, whose planes have been found.
-template <bool two_sided, class T, class Found>
+template <bool two_sided, class T, template <class> class FoundOf>
 BC_INLINE void solve_overlaps(const Query<T>& q, const Pressed<T>& pressed,
-                              const planes::PairOfBoxes<T>& boxes, unsigned chosen, Found& found,
-                              Counts& counts) {
+                              const planes::PairOfBoxes<T>& boxes, unsigned chosen,
+                              FoundOf<T>& found, Counts& counts) {
   unsigned certain = bits(overlap_of<two_sided>(q, pressed, boxes, found));
   unsigned uncertain = chosen & (bits(pressed.too_shallow) | ~certain);
   for (; uncertain; uncertain &= uncertain - 1) {
     int i = __builtin_ctz(uncertain);
-    LaneOf<Found> one;
+    FoundOf<Number<T>> one;
     solve_uncertain(lane(q, i), lane(found.centroid, i), one, counts);
     set_lane(found, i, one);
   }

@@ -106,14 +106,4 @@ BC_INLINE void set_lane(Moments<T>& found, int i, const Moments<N>& value) {
   set_lane(found.covariance, i, value.covariance);
 }
 
-// What is found of one pair of several.
-template <class Found>
-struct LaneOfFound;
-template <template <class> class FoundOf, class T>
-struct LaneOfFound<FoundOf<T>> {
-  using type = FoundOf<Number<T>>;
-};
-template <class Found>
-using LaneOf = typename LaneOfFound<Found>::type;
-
 }  // namespace box_contact::BOX_CONTACT_SET
