@@ -125,7 +125,7 @@ def test_swap_of_concentric_boxes():
 def test_swap_of_grazing_boxes(sizes):
     """Corner on corner after quarter turns and a tilt of 1e-14 to 1e-10 rad: gaps are nearly 0.
 
-    Evaluated from A, even with 32 digits, 3 % of these separations changed in the last bits.
+    Evaluated from A, whatever the digits, 3 % of these separations changed in the last bits.
     """
     rng, n = np.random.default_rng(14), 20_000
     sizes = rng.choice([0.5, 1.0, 2.0], (2, n, 3)) if sizes is None else np.full((2, n, 3), sizes)
@@ -147,7 +147,7 @@ def test_swap_of_grazing_boxes(sizes):
 def test_quaternions_of_any_length(power):
     """Both scaled by 2^k, to lengths of 1e-99 to 1e99: everything is the same to the bit.
 
-    Grazing containers, which are evaluated with 32 digits.
+    Grazing containers, whose rotation is computed again from the quaternions.
     """
     a, b, size_a, size_b = poses.near_parallel_pairs(np.random.default_rng(13), 20_000)
     scaling = np.array([1.0] * 3 + [2.0**power] * 4)

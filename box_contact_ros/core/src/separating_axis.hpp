@@ -42,8 +42,8 @@ constexpr double edge_gap_error = 0x1p-47;
 // By how many times sine · size a skipped axis may better the best face axis.
 constexpr double skipped_gain = 8.0;
 
-// Length of a cross product below which even double-double finds no axis: what it could better is
-// less than the rounding of a gap.
+// Length of a cross product below which no rotation gives an axis: what it could better is less than
+// the rounding of a gap.
 constexpr double cross_product_min = 1e-15;
 
 constexpr int first_edge_axis = 6;
@@ -138,6 +138,35 @@ BC_INLINE void offer_face_axes(const Pair<T>& pair, BestAxis<T>& best) {
   best.offer(3, face_gaps<T>(pair.offset_b, pair.half_b, pair.half_a, pair.a_in_b), one, tolerance);
 }
 
+// The edge axes a_i × b_j of one i, by j. In A's frame such an axis is (−u_z, u_y) in the components y
+// and z that follow i, with u = b_j.
+template <class T>
+struct EdgeAxes {
+  Triple<T> length2;  // squares of the lengths of the cross products
+  Triple<T> overlap;  // gaps times these lengths [m]
+
+  BC_INLINE Triple<T> inverse_lengths() const {
+    return each([](auto x) { return 1.0 / sqrt(x); }, length2);
+  }
+};
+
+// `as_rounded`: B's half widths are those of the axes as rounded, not by the entries of R.
+template <bool as_rounded, class T>
+BC_INLINE EdgeAxes<T> edge_axes(const Pair<T>& pair, int i) {
+  int y = i == 2 ? 0 : i + 1, z = i == 0 ? 2 : i - 1;
+  const Triple<T>&half = pair.half_a, &offset = pair.offset_a;
+  Triple<T> u = pair.a_in_b[i], uy = pair.a_in_b[y], uz = pair.a_in_b[z];
+  // B's axes k and l that follow j.
+  Triple<T> on_k = rotated_back(u), on_l = rotated(u);
+  if constexpr (as_rounded) {
+    on_k = rotated(uz) * uy - rotated(uy) * uz;
+    on_l = rotated_back(uz) * uy - rotated_back(uy) * uz;
+  }
+  Triple<T> width = (half[y] * abs(uz) + half[z] * abs(uy)) +
+                    (rotated(pair.half_b) * abs(on_k) + rotated_back(pair.half_b) * abs(on_l));
+  return {uy * uy + uz * uz, abs(offset[z] * uy - offset[y] * uz) - width};
+}
+
 // Whether no edge axis of a single pair can win over the gap `best` of a face, or is doubtful.
 // Overlap divided by length is at most `best` for all nine, which takes no root.
 template <class T>
@@ -145,30 +174,22 @@ BC_INLINE bool edges_stay_below(const Pair<T>& pair, T best) {
   constexpr double least2 = cross_product_min * cross_product_min, used2 = parallel * parallel;
   constexpr double margin = 1e-12;
   T room = 2.0 * edge_gap_error * pair.size, limit = best * abs(best) - margin * (best * best);
-  Triple<T> half_k = rotated(pair.half_b), half_l = rotated_back(pair.half_b),
-            limits = uniform(limit);
+  Triple<T> limits = uniform(limit);
   Flags<T> below = limits == limits;
 #pragma GCC unroll 3
   for (int i = 0; i < 3; ++i) {
-    int y = (i + 1) % 3, z = (i + 2) % 3;
-    const Triple<T>&u = pair.a_in_b[i], &uy = pair.a_in_b[y], &uz = pair.a_in_b[z];
-    Triple<T> length2 = uy * uy + uz * uz;
-    Triple<T> width = (spread(pair.half_a, y) * abs(uz) + spread(pair.half_a, z) * abs(uy)) +
-                      (half_k * abs(rotated_back(u)) + half_l * abs(rotated(u)));
-    Triple<T> along = abs(spread(pair.offset_a, z) * uy - spread(pair.offset_a, y) * uz);
-    Triple<T> overlap = (along - width) + room;
-    below &= ((overlap * abs(overlap) <= limits * length2) & (length2 >= uniform(used2))) |
-             (length2 < uniform(least2));
+    EdgeAxes<T> axes = edge_axes<false>(pair, i);
+    Triple<T> overlap = axes.overlap + room;
+    below &=
+        ((overlap * abs(overlap) <= limits * axes.length2) & (axes.length2 >= uniform(used2))) |
+        (axes.length2 < uniform(least2));
   }
   return all_of(below);
 }
 
-// Offer the nine edge axes a_i × b_j. In A's frame a_i × b_j is (−u_z, u_y) in the components y and z
-// that follow i, with u = b_j.
+// Offer the nine edge axes.
 template <class T>
 BC_INLINE void offer_edge_axes(const Pair<T>& pair, BestAxis<T>& best, Mask<T>& doubtful) {
-  const Triple<T>&half = pair.half_a, &offset = pair.offset_a;
-  const Columns<T>& edges = pair.a_in_b;
   if constexpr (packed<T>) {
     if (edges_stay_below(pair, best.largest())) {
       doubtful = false;
@@ -177,17 +198,9 @@ BC_INLINE void offer_edge_axes(const Pair<T>& pair, BestAxis<T>& best, Mask<T>& 
   }
   T tolerance = tie * pair.size, error = edge_gap_error * pair.size;
   Triple<T> largest_possible = uniform(splat<T>(-infinity)), longest_skipped2{};
-  Triple<T> half_k = rotated(pair.half_b), half_l = rotated_back(pair.half_b);
   for (int i = 0; i < opaque(3); ++i) {
-    int y = i == 2 ? 0 : i + 1, z = i == 0 ? 2 : i - 1;
-    // By j, and B's axes k and l that follow it.
-    Triple<T> uy = edges[y], uz = edges[z];
-    Triple<T> ky = rotated(uy), kz = rotated(uz), ly = rotated_back(uy), lz = rotated_back(uz);
-    Triple<T> length2 = uy * uy + uz * uz;
-    Triple<T> width = (half[y] * abs(uz) + half[z] * abs(uy)) +
-                      (half_k * abs(kz * uy - ky * uz) + half_l * abs(lz * uy - ly * uz));
-    Triple<T> overlap = abs(offset[z] * uy - offset[y] * uz) - width;
-    Triple<T> inverse = each([](auto x) { return 1.0 / sqrt(x); }, length2);
+    EdgeAxes<T> axes = edge_axes<true>(pair, i);
+    Triple<T> length2 = axes.length2, inverse = axes.inverse_lengths();
     auto if_used = [](auto gap, auto length2) {
       return select<decltype(gap)>(length2 >= parallel * parallel, gap,
                                    splat<decltype(gap)>(-infinity));
@@ -202,9 +215,9 @@ BC_INLINE void offer_edge_axes(const Pair<T>& pair, BestAxis<T>& best, Mask<T>& 
       return select<N>(length2 >= parallel * parallel, N{}, length2);
     };
     largest_possible =
-        max(largest_possible, each(if_inaccurate, (overlap + error) * inverse, length2));
+        max(largest_possible, each(if_inaccurate, (axes.overlap + error) * inverse, length2));
     longest_skipped2 = max(longest_skipped2, each(if_skipped, length2));
-    best.offer(first_edge_axis + 3 * i, each(if_used, overlap * inverse, length2), inverse,
+    best.offer(first_edge_axis + 3 * i, each(if_used, axes.overlap * inverse, length2), inverse,
                tolerance);
   }
   T gap = best.largest(), reach = skipped_gain * pair.size, skipped2 = largest(longest_skipped2);
@@ -232,9 +245,9 @@ BC_INLINE T edge_of_b(T place) {
   return (place - double(first_edge_axis)) - 3.0 * edge_of_a(place);
 }
 
-// The winning axis as a unit vector from A to B, in A's frame.
+// The winning axis, at a place, as a unit vector from A to B, in A's frame.
 template <class T>
-BC_INLINE Triple<T> axis_normal(const Pair<T>& pair, const BestAxis<T>& best) {
+BC_INLINE Triple<T> axis_normal(const Pair<T>& pair, const BestAxis<T, false>& best, Place<T>) {
   T place = best.place;
   // A face of A or of B: a unit vector, or a column of R.
   Vec<T> face{};
@@ -265,7 +278,7 @@ BC_INLINE Triple<T> axis_normal(const Pair<T>& pair, const BestAxis<T>& best) {
 
 // The same for a single pair whose triples are vectors of the machine.
 template <class T>
-BC_INLINE Triple<T> axis_normal_by_place(const Pair<T>& pair, const BestAxis<T>& best, int place) {
+BC_INLINE Triple<T> axis_normal(const Pair<T>& pair, const BestAxis<T, true>& best, int place) {
   int group = place / 3, k = place % 3;
   Triple<T> zero{}, n, offset = pair.offset_a;
   T along;
@@ -305,11 +318,7 @@ BC_INLINE SeparatingAxis<T> separating_axis(const Pair<T>& pair) {
   offer_edge_axes(pair, best, found.doubtful);
   found.separation = best.largest();
   found.axis = best.winner(tolerance);
-  if constexpr (packed<T>) {
-    found.normal = axis_normal_by_place(pair, best, found.axis);
-  } else {
-    found.normal = axis_normal(pair, best);
-  }
+  found.normal = axis_normal(pair, best, found.axis);
   return found;
 }
 

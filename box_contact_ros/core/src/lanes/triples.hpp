@@ -220,6 +220,17 @@ BC_INLINE Columns<T> transpose(const Columns<T>& m) {
         {{m[0][0], m[1][0], m[2][0]}, {m[0][1], m[1][1], m[2][1]}, {m[0][2], m[1][2], m[2][2]}}};
   }
 }
+// A matrix by its diagonal, and the entries one and two rows below it, in each column: its columns.
+template <class T>
+BC_INLINE Columns<T> from_diagonals(const Columns<T>& d) {
+  Columns<T> by_column = transpose(d);
+  return {{by_column[0], rotated_back(by_column[1]), rotated(by_column[2])}};
+}
+template <class T>
+BC_INLINE Columns<T> diagonals(const Columns<T>& m) {
+  return transpose(Columns<T>{{m[0], rotated(m[1]), rotated_back(m[2])}});
+}
+
 template <class T>
 BC_INLINE Columns<T> abs(const Columns<T>& m) {
   return {{abs(m[0]), abs(m[1]), abs(m[2])}};

@@ -94,17 +94,6 @@ BC_INLINE Columns<T> reciprocals(const Columns<T>& m) {
   return {{each(reciprocal, m[0]), each(reciprocal, m[1]), each(reciprocal, m[2])}};
 }
 
-// A matrix by its diagonal, and the entries one and two rows below it, in each column: its columns.
-template <class T>
-BC_INLINE Columns<T> from_diagonals(const Columns<T>& d) {
-  Columns<T> by_column = transpose(d);
-  return {{by_column[0], rotated_back(by_column[1]), rotated(by_column[2])}};
-}
-template <class T>
-BC_INLINE Columns<T> diagonals(const Columns<T>& m) {
-  return transpose(Columns<T>{{m[0], rotated(m[1]), rotated_back(m[2])}});
-}
-
 // The sums of each triple's numbers, side by side.
 template <class T>
 BC_INLINE Triple<T> totals(const Triple<T>& a, const Triple<T>& b, const Triple<T>& c) {
