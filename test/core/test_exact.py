@@ -242,6 +242,12 @@ def test_a_needle_whose_covariance_clipping_had_wrong():
     check('needle', 0, *(np.array([part], dtype=float) for part in poses.NEEDLE))
 
 
+def test_columns_whose_covariance_planes_had_wrong():
+    """A piece that is lost at the tip moves the covariance by more than the volume."""
+    for column in poses.COLUMNS:
+        check('column', 0, *(np.array([part]) for both in column for part in both))
+
+
 @pytest.mark.parametrize('aspect', [1e3, 1e4, 1e5])
 def test_needles(aspect):
     """Within all bounds up to an aspect of 100,000."""
