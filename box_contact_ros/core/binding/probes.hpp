@@ -65,8 +65,9 @@ inline PyObject* clipped(PyObject*, PyObject* const* args, Py_ssize_t count) {
   npy_intp n = pairs.count;
   auto point = make<double>({n, 3}), volume = make<double>({n}), covariance = make<double>({n, 3, 3});
   each_query(pairs, [&](Query<double> q, long row) {
-    bool pressed = enforce_minimum_depth(q.pair, q.axis);
-    Moments<double> found = clipped_overlap(q.pair, int(q.axis.face), pressed);
+    if (depth_floor * q.pair.size + q.axis.separation > 0.0)
+      enforce_minimum_depth(q.pair, q.axis, true);
+    Moments<double> found = overlap_by_clipping(q.pair, int(q.axis.face));
     Triple<double> centroid = point_in_common_frame(q.pair, triple(found.centroid));
     write(components<double>(centroid), point.numbers + 3 * row);
     volume.numbers[row] = found.volume;

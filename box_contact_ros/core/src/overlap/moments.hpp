@@ -106,4 +106,18 @@ BC_INLINE void set_lane(Moments<T>& found, int i, const Moments<N>& value) {
   set_lane(found.covariance, i, value.covariance);
 }
 
+// Put what was found of the chosen pairs in its place.
+template <class T>
+BC_INLINE void put(Mask<T> chosen, const PointAndVolume<T>& from, PointAndVolume<T>& found) {
+  found.volume = select<T>(chosen, from.volume, found.volume);
+  found.centroid = select(chosen, from.centroid, found.centroid);
+}
+template <class T>
+BC_INLINE void put(Mask<T> chosen, const Moments<T>& from, Moments<T>& found) {
+  found.volume = select<T>(chosen, from.volume, found.volume);
+  found.centroid = select(chosen, from.centroid, found.centroid);
+  for (int k = 0; k < 6; ++k)
+    found.covariance.s[k] = select<T>(chosen, from.covariance.s[k], found.covariance.s[k]);
+}
+
 }  // namespace box_contact::BOX_CONTACT_SET

@@ -685,12 +685,21 @@ BC_INLINE Surface<T> surface(const Box<T>& box, const Sums<T>& sums) {
   return s;
 }
 
+// Whether sums over planes are right.
+template <class T>
+struct Certificate {
+  Mask<T> holds;  // they are
+  Mask<T>
+      closes;  // the areas of the planes agree: no piece is lost, and only digits may be missing
+};
+
 // The twelve equations, and that no line has too long a lever. `x_n`, `normal` and `size` as in Surface,
 // over both boxes; `lever`: of the lines, times the length of the edges' pieces; `radius`: √trace of the
 // covariance.
 template <bool squares, class T>
-BC_INLINE Mask<T> certificate(const Columns<T>& x_n, const Triple<T>& normal, const Triple<T>& size,
-                              T lever, T volume, T radius, T pair_size, T depth) {
+BC_INLINE Certificate<T> certificate(const Columns<T>& x_n, const Triple<T>& normal,
+                                     const Triple<T>& size, T lever, T volume, T radius,
+                                     T pair_size, T depth) {
   T rounding = centroid_rounding * pair_size / depth;
   T error = pair_size * max(splat<T>(least_centroid_error), rounding);
   T covariance_error = max(splat<T>(least_covariance_error), rounding);
@@ -702,10 +711,11 @@ BC_INLINE Mask<T> certificate(const Columns<T>& x_n, const Triple<T>& normal, co
   Columns<T> entries = diagonals(x_n);
   Triple<T> own = abs(entries[0] + (-volume)) * uniform(pair_size);
   Triple<T> beside = max(abs(entries[1]), abs(entries[2]));
-  Mask<T> holds = volume > 0.0;
+  Mask<T> closes = all_of(abs(normal) * uniform(pair_size) <= closure * size);
+  Mask<T> holds = closes & (volume > 0.0);
   holds &= rounding_of_size * pair_size * lever <= lever_share * error * volume;
-  return holds & all_of((own <= uniform(diagonal * volume)) & (beside <= off_diagonal * size) &
-                        (abs(normal) * uniform(pair_size) <= closure * size));
+  holds &= all_of((own <= uniform(diagonal * volume)) & (beside <= off_diagonal * size));
+  return {holds, closes};
 }
 
 // Move a point of P's frame into both boxes, by the nearest points of each in turn. Returns where
@@ -727,10 +737,10 @@ template <class T>
 // Find the overlap of a pair of boxes that `planes::find_planes` has found the planes of, `depth` deep
 // [m], with its centroid in P's frame. Found: Moments<T>, or PointAndVolume<T>, without second moments
 // and with the equations that the centroid needs alone. `two_sided`: an axis may have two planes.
-// Returns where the certificate holds.
 template <bool two_sided, class Found, class T>
-BC_INLINE Mask<T> overlap_by_planes(const Pair<T>& pair, const planes::PairOfBoxes<T>& boxes,
-                                    T depth, Found& found) {
+BC_INLINE planes::Certificate<T> overlap_by_planes(const Pair<T>& pair,
+                                                   const planes::PairOfBoxes<T>& boxes, T depth,
+                                                   Found& found) {
   using namespace planes;
   constexpr bool squares = std::is_same_v<Found, Moments<T>>;
   Sums<T> of_p, of_q;
@@ -768,15 +778,15 @@ BC_INLINE Mask<T> overlap_by_planes(const Pair<T>& pair, const planes::PairOfBox
   }
   T lever = sum(lengths) * sqrt(lever2);
   Triple<T> normal = p.normal + m * q.normal, area = p.size + abs(m) * q.size;
-  Mask<T> certain =
+  Certificate<T> certain =
       certificate<squares>(x_n, normal, area, lever, volume, radius, pair.size, depth);
-  certain &= p.gross + q.gross <= (6.0 * most_cancelled) * volume;
+  certain.holds &= p.gross + q.gross <= (6.0 * most_cancelled) * volume;
   Mask<T> shallow = depth < safely_inside * pair.size;
   if (any(shallow)) {
     Triple<T> moved = centroid;
     Mask<T> inside = move_inside(boxes, moved, pair.size);
     centroid = select(shallow, moved, centroid);
-    certain &= inside | (shallow == 0);
+    certain.holds &= inside | (shallow == 0);
   }
   found.volume = volume;
   found.centroid = components<T>(centroid);
