@@ -67,7 +67,7 @@ inline PyObject* clipped(PyObject*, PyObject* const* args, Py_ssize_t count) {
   each_query(pairs, [&](Query<double> q, long row) {
     if (depth_floor * q.pair.size + q.axis.separation > 0.0)
       enforce_minimum_depth(q.pair, q.axis, true);
-    Moments<double> found = overlap_by_clipping(q.pair, int(q.axis.face));
+    auto found = overlap_by_clipping<Moments<double>>(q.pair, int(q.axis.face));
     Triple<double> centroid = point_in_common_frame(q.pair, triple(found.centroid));
     write(components<double>(centroid), point.numbers + 3 * row);
     volume.numbers[row] = found.volume;

@@ -35,63 +35,86 @@ namespace box_contact::BOX_CONTACT_SET {
 // other's edges less is left; then the other five faces are tried as the reference.
 constexpr double cancelled = 1e-3;
 
+// Faces that add less than this part of the volume are left out: steep sides of a shallow overlap.
+constexpr double negligible_face = 1e-11;
+
 namespace clipping {
+
+// A place (u, v, w) in the reference box's frame. The fourth number repeats the third.
+using Place3 = Lanes<double, 4>;
+// A flag for each of its numbers.
+using Flags3 = Mask<Place3>;
+
+BC_INLINE Place3 place(double u, double v, double w) { return Place3{u, v, w, w}; }
 
 // Up to the first order, about the middle of a rectangle in the contact plane.
 struct FirstMoments {
-  double volume = 0.0, u = 0.0, v = 0.0, w = 0.0;
+  double volume = 0.0;  // six times ∫ w
+  Place3 first{};       // 24 times ∫ (u w, v w, w²)
 
   FirstMoments& operator+=(const FirstMoments& other) {
     volume += other.volume;
-    u += other.u;
-    v += other.v;
-    w += other.w;
+    first += other.first;
     return *this;
   }
 };
 
-// A quadrilateral clipped by six planes has at most ten corners.
+// A quadrilateral clipped by six planes has at most ten corners. Two more are written and not counted.
 struct Polygon {
   int count = 0;
-  Vec<double> corners[12];
+  Place3 corners[12];
 };
 
-// Keep the part with sign · corner[axis] ≤ bound.
-inline Polygon clip(const Polygon& from, int axis, double sign, double bound) {
-  Polygon kept;
-  if (from.count == 0) return kept;
-  Vec<double> before = from.corners[from.count - 1];
-  double excess_before = sign * before[axis] - bound;
+// A half-space: sign · place[axis] ≤ limit.
+struct Bound {
+  int axis;
+  double sign, limit;
+
+  double excess(const Place3& place) const { return sign * place[axis] - limit; }
+};
+
+// Keep what is within the bound. Without branches on the corners, which no processor predicts.
+inline void clip(const Polygon& from, const Bound& bound, Polygon& kept) {
+  static const Flags3 on_axis[3] = {{-1}, {0, -1}, {0, 0, -1, -1}};
+  Flags3 axis = on_axis[bound.axis];
+  Place3 plane = splat<Place3>(bound.sign * bound.limit);
+  kept.count = 0;
+  if (from.count == 0) return;
+  Place3 before = from.corners[from.count - 1];
+  double excess_before = bound.excess(before);
   for (int i = 0; i < from.count; ++i) {
-    Vec<double> here = from.corners[i];
-    double excess = sign * here[axis] - bound;
-    if ((excess > 0.0) != (excess_before > 0.0)) {
-      double share = excess_before / (excess_before - excess);
-      Vec<double> crossing = before + share * (here - before);
-      crossing[axis] = sign * bound;
-      kept.corners[kept.count++] = crossing;
-    }
-    if (!(excess > 0.0)) kept.corners[kept.count++] = here;
+    Place3 here = from.corners[i];
+    double excess = bound.excess(here);
+    double share = excess_before / (excess_before - excess);
+    kept.corners[kept.count] = choose(axis, plane, before + share * (here - before));
+    kept.count += (excess > 0.0) != (excess_before > 0.0);
+    kept.corners[kept.count] = here;
+    kept.count += !(excess > 0.0);
     before = here;
     excess_before = excess;
   }
-  return kept;
 }
 
-// Signed ∫ (w, u w, v w, w²/2) over the polygon's projection on (u, v).
+// Call visit(twice the area, a, b, c) for the triangles of a polygon. The area is that of the projection
+// on (u, v), with a sign.
+template <class Visit>
+BC_INLINE void each_triangle(const Polygon& polygon, Visit visit) {
+  const Place3& a = polygon.corners[0];
+  for (int i = 1; i + 1 < polygon.count; ++i) {
+    const Place3 &b = polygon.corners[i], &c = polygon.corners[i + 1];
+    Place3 ab = b - a, ac = c - a;
+    visit(ab[0] * ac[1] - ac[0] * ab[1], a, b, c);
+  }
+}
+
+// The moments of the columns between a polygon and the plane w = 0.
 inline FirstMoments integrate(const Polygon& polygon) {
   FirstMoments sum;
-  const Vec<double>& a = polygon.corners[0];
-  for (int i = 1; i + 1 < polygon.count; ++i) {
-    const Vec<double>&b = polygon.corners[i], &c = polygon.corners[i + 1];
-    double twice_area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
-    Vec<double> total = a + b + c;
-    Vec<double> products = a[2] * a + b[2] * b + c[2] * c;
-    sum.volume += twice_area * total[2] * (1.0 / 6.0);
-    sum.u += twice_area * (total[0] * total[2] + products[0]) * (1.0 / 24.0);
-    sum.v += twice_area * (total[1] * total[2] + products[1]) * (1.0 / 24.0);
-    sum.w += twice_area * (total[2] * total[2] + products[2]) * (1.0 / 48.0);
-  }
+  each_triangle(polygon, [&](double area, const Place3& a, const Place3& b, const Place3& c) {
+    Place3 total = (a + b) + c;
+    sum.volume += area * total[2];
+    sum.first += area * (total[2] * total + ((a[2] * a + b[2] * b) + c[2] * c));
+  });
   return sum;
 }
 
@@ -100,62 +123,66 @@ inline FirstMoments integrate(const Polygon& polygon) {
 // have the middle, hence the triangles.
 template <class Visit>
 inline void lifted(const Polygon& polygon, double floor, Visit visit) {
-  for (int i = 1; i + 1 < polygon.count; ++i) {
-    Polygon triangle{3, {polygon.corners[0], polygon.corners[i], polygon.corners[i + 1]}};
-    Vec<double> heights{triangle.corners[0][2], triangle.corners[1][2], triangle.corners[2][2]};
-    double low = smallest(heights), high = largest(heights);
+  each_triangle(polygon, [&](double, const Place3& a, const Place3& b, const Place3& c) {
+    Polygon triangle{3, {a, b, c}}, part;
+    double low = min(min(a[2], b[2]), c[2]), high = max(max(a[2], b[2]), c[2]);
     // A triangle in the plane, to the last bit, is a part below it and none above.
-    if (high > floor) visit(clip(triangle, 2, -1.0, -floor));
-    if (low < floor || !(high > floor)) {
-      Polygon below = clip(triangle, 2, 1.0, floor);
-      for (int k = 0; k < below.count; ++k) below.corners[k][2] = floor;
-      visit(below);
+    if (high > floor) {
+      clip(triangle, {2, -1.0, -floor}, part);
+      visit(part);
     }
-  }
+    if (low < floor || !(high > floor)) {
+      clip(triangle, {2, 1.0, floor}, part);
+      for (int k = 0; k < part.count; ++k) part.corners[k][2] = floor;
+      visit(part);
+    }
+  });
 }
 
-// Signed second moments, about `centre`, of the columns between the polygon and the plane w = 0. With
-// c the centre's height, a column has ∫ dw = w, ∫ (w − c) dw = w (w/2 − c), and
-// ∫ (w − c)² dw = w ((w/2 − c)² + w²/12): products of three linear functions on each triangle.
-inline Sym<double> integrate_squares(const Polygon& polygon, const Vec<double>& centre) {
-  Sym<double> sum{};
-  auto moved = [&](int i) -> Vec<double> {
-    const Vec<double>& corner = polygon.corners[i];
-    return {corner[0] - centre[0], corner[1] - centre[1], corner[2]};
-  };
-  Vec<double> a = moved(0);
-  for (int i = 1; i + 1 < polygon.count; ++i) {
-    Vec<double> b = moved(i), c = moved(i + 1);
-    double twice_area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
-    // ∫ f g h over the triangle, for linear functions by their values at the corners.
-    auto integral = [&](const Vec<double>& f, const Vec<double>& g, const Vec<double>& h) {
-      Vec<double> one{1.0, 1.0, 1.0};
-      Vec<double> gh{g[0] * h[0], g[1] * h[1], g[2] * h[2]};
-      double of_f = dot(one, f), of_g = dot(one, g), of_h = dot(one, h);
-      double fg = dot(f, g), fh = dot(f, h);
-      return twice_area * (1.0 / 120.0) *
-             ((of_f * of_g * of_h + 2.0 * dot(f, gh)) +
-              (of_f * dot(one, gh) + (of_g * fh + of_h * fg)));
-    };
-    Vec<double> u{a[0], b[0], c[0]}, v{a[1], b[1], c[1]}, w{a[2], b[2], c[2]};
-    Vec<double> middle = 0.5 * w - Vec<double>{centre[2], centre[2], centre[2]};
-    sum(0, 0) += integral(w, u, u);
-    sum(1, 1) += integral(w, v, v);
-    sum(0, 1) += integral(w, u, v);
-    sum(0, 2) += integral(w, u, middle);
-    sum(1, 2) += integral(w, v, middle);
-    sum(2, 2) += integral(w, middle, middle) + integral(w, w, w) * (1.0 / 12.0);
+// 120 times the second moments of the columns between a polygon and the plane w = 0 about a place, by
+// uu vv ww and by vw uw uv. With c the place's height, a column has ∫ dw = w, ∫ (w − c) dw = w (w/2 − c)
+// and ∫ (w − c)² dw = w ((w/2 − c)² + w²/12). These are products of three linear functions. With the
+// sums X, Y, Z of their values x, y, z at a triangle's corners, the integral is
+//   area/60 · (X Y Z + X Σ y z + Y Σ x z + Z Σ x y + 2 Σ x y z).
+struct SecondMoments {
+  Place3 diagonal{}, beside{};
+
+  BC_INLINE void add(const Polygon& polygon, const Place3& about) {
+    each_triangle(polygon, [&](double area, const Place3& a, const Place3& b, const Place3& c) {
+      const Place3 halved{1.0, 1.0, 0.5, 0.5};
+      Place3 corners[3] = {halved * a - about, halved * b - about, halved * c - about};
+      double heights[3] = {a[2], b[2], c[2]}, height = (a[2] + b[2]) + c[2];
+      Place3 total = (corners[0] + corners[1]) + corners[2], weighted{};
+      Place3 own = height * (total * total);
+      Place3 others = height * (rotated(total) * rotated_back(total));
+      double squares = 0.0, cubes = 0.0;
+      for (int k = 0; k < 3; ++k) {
+        const Place3& x = corners[k];
+        double h = heights[k], weight = height + 2.0 * h;
+        weighted += h * x;
+        own += weight * (x * x);
+        others += weight * (rotated(x) * rotated_back(x));
+        squares += h * h;
+        cubes += h * (h * h);
+      }
+      own += 2.0 * (total * weighted);
+      others += rotated(total) * rotated_back(weighted) + rotated_back(total) * rotated(weighted);
+      double along = height * (height * height) + (3.0 * height * squares + 2.0 * cubes);
+      own += (1.0 / 12.0) * along * Place3{0.0, 0.0, 1.0, 1.0};
+      diagonal += area * own;
+      beside += area * others;
+    });
   }
-  return sum;
-}
+};
 
 // Corner c of a box has the signs of the bits 1, 2, 4 of c; faces turn counter-clockwise outside.
 constexpr int face_corners[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
                                     {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
 
-// The overlap with a face axis (0–5) as the reference. `kept`: what part of the integrals' volume is
-// left in their sum.
-inline Moments<double> overlap_from(const Pair<double>& pair, int face, double& kept) {
+// The overlap with a face axis (0–5) as the reference, with its centroid in A's frame. `kept`: what part
+// of the integrals' volume is left in their sum.
+template <class Found>
+inline Found overlap_from(const Pair<double>& pair, int face, double& kept) {
   bool of_a = face < 3;
   int w = face % 3, axes[3] = {(w + 1) % 3, (w + 2) % 3, w};
   Vec<double> own = components<double>(of_a ? pair.half_a : pair.half_b);
@@ -164,121 +191,135 @@ inline Moments<double> overlap_from(const Pair<double>& pair, int face, double& 
   Mat<double> turn = matrix(of_a ? pair.b_in_a : pair.a_in_b);
   double side = offset[w] >= 0.0 ? 1.0 : -1.0;
 
-  // The incident box in (u, v, w): its centre, and its half axes as columns.
-  Vec<double> centre, half;
-  Mat<double> edges;
-  for (int d = 0; d < 3; ++d) {
-    int x = axes[d];
-    centre[d] = offset[x];
-    half[d] = own[x];
-    for (int j = 0; j < 3; ++j) edges[d][j] = (d == 2 ? side : 1.0) * (other[j] * turn[x][j]);
+  // The incident box in (u, v, w): its centre, and its half axes.
+  Place3 centre = place(offset[axes[0]], offset[axes[1]], side * offset[w]);
+  Place3 half = place(own[axes[0]], own[axes[1]], own[w]), edges[3], radius{};
+  for (int j = 0; j < 3; ++j) {
+    edges[j] = other[j] * place(turn[axes[0]][j], turn[axes[1]][j], side * turn[w][j]);
+    radius += abs(edges[j]);
   }
   // Moments are taken about the middle of the rectangle that bounds both projections, so that a
-  // small box on a large one keeps its digits.
-  double low[2], high[2], middle[2];
-  for (int d = 0; d < 2; ++d) {
-    Vec<double> reach = abs(row(edges, d));
-    double radius = reach[0] + reach[1] + reach[2];
-    low[d] = max(centre[d] - radius, -half[d]);
-    high[d] = min(centre[d] + radius, half[d]);
-    middle[d] = 0.5 * (low[d] + high[d]);
-  }
+  // small box on a large one keeps its digits. Heights count from the contact face.
+  Place3 low = max(centre - radius, -half), high = min(centre + radius, half);
+  const Flags3 heights{0, 0, -1, -1};
+  Place3 middle = choose(heights, half, Place3(0.5 * (low + high)));
+  Place3 most = half - middle, least = -half - middle;
 
-  // 1. Corners, w measured from the contact face. Bits of `outside`: above it, beyond ±u, ±v.
-  Vec<double> start{centre[0] - middle[0], centre[1] - middle[1], side * centre[2] - half[2]};
-  double bounds[5] = {0.0, half[0] - middle[0], half[0] + middle[0], half[1] - middle[1],
-                      half[1] + middle[1]};
-  constexpr int bound_axes[5] = {2, 0, 0, 1, 1};
-  constexpr double bound_signs[5] = {1.0, 1.0, -1.0, 1.0, -1.0};
-  Vec<double> corners[8];
+  // 1. Corners. Bits of `outside`: above w = 0, beyond the most u and v, and the least.
+  Place3 corners[8] = {centre - middle};
   unsigned outside[8];
+  for (int j = 0, count = 1; j < 3; ++j, count *= 2)
+    for (int c = 0; c < count; ++c) {
+      corners[count + c] = corners[c] + edges[j];
+      corners[c] -= edges[j];
+    }
   double lowest = 0.0, floor = -2.0 * half[2];
   for (int c = 0; c < 8; ++c) {
-    Vec<double> signs{c & 1 ? 1.0 : -1.0, c & 2 ? 1.0 : -1.0, c & 4 ? 1.0 : -1.0};
-    corners[c] = start + edges * signs;
     lowest = min(corners[c][2], lowest);
-    outside[c] = 0;
-    for (int k = 0; k < 5; ++k)
-      outside[c] |= unsigned(bound_signs[k] * corners[c][bound_axes[k]] > bounds[k]) << k;
+    unsigned above = bits(corners[c] > most), below = bits(corners[c] < least);
+    outside[c] = (above >> 2 & 1) | (above & 3) << 1 | (below & 3) << 3;
   }
+  const Bound bounds[5] = {{2, 1.0, 0.0},
+                           {0, 1.0, most[0]},
+                           {1, 1.0, most[1]},
+                           {0, -1.0, -least[0]},
+                           {1, -1.0, -least[1]}};
 
   FirstMoments sum;
   double gross = 0.0;
-  Polygon polygons[6];
+  Polygon polygons[6], clipped;
   int count = 0;
   bool through = lowest < floor;
-  for (const int* f : face_corners) {
+  Vec<double> flatness = abs(row(turn, w));
+  int flattest = flatness[0] > flatness[1] ? 0 : 1;
+  if (flatness[2] > flatness[flattest]) flattest = 2;
+  for (int k = 0; k < 6; ++k) {
+    int j = (flattest + k / 2) % 3;
+    const int* f = face_corners[2 * j + k % 2];
+    // A face is twice as long as the size at most, and as deep as the overlap.
+    double most_volume = (2.0 * pair.size) * (lowest * lowest) * flatness[j];
+    if (6.0 * most_volume <= negligible_face * std::fabs(sum.volume)) continue;
     if (outside[f[0]] & outside[f[1]] & outside[f[2]] & outside[f[3]]) continue;
     // 2. Clip by the planes that cut the face.
     unsigned cut = outside[f[0]] | outside[f[1]] | outside[f[2]] | outside[f[3]];
-    Polygon polygon{4, {corners[f[0]], corners[f[1]], corners[f[2]], corners[f[3]]}};
-    for (int k = 0; k < 5; ++k)
-      if (cut >> k & 1U) polygon = clip(polygon, bound_axes[k], bound_signs[k], bounds[k]);
+    Polygon* polygon = &polygons[count];
+    Polygon* other_polygon = &clipped;
+    if (__builtin_popcount(cut) & 1) std::swap(polygon, other_polygon);  // the last one is kept
+    polygon->count = 4;
+    for (int k = 0; k < 4; ++k) polygon->corners[k] = corners[f[k]];
+    for (; cut; cut &= cut - 1) {
+      clip(*polygon, bounds[__builtin_ctz(cut)], *other_polygon);
+      std::swap(polygon, other_polygon);
+    }
     // 3. and 4. Integrate.
     FirstMoments part;
     if (through) {
-      lifted(polygon, floor, [&](const Polygon& lift) { part += integrate(lift); });
+      lifted(*polygon, floor, [&](const Polygon& lift) { part += integrate(lift); });
     } else {
-      part = integrate(polygon);
+      part = integrate(*polygon);
     }
     sum += part;
     gross += std::fabs(part.volume);
-    polygons[count++] = polygon;
+    ++count;
   }
 
   // The sign of the volume is that of the frame's handedness, and cancels in the ratios. Boxes
   // thinner than the rounding of their sizes have no volume.
-  Vec<double> found{};
-  double least = max(floor, lowest);
+  Place3 zero{}, bottom = choose(heights, splat<Place3>(max(floor, lowest)), Place3(low - middle));
+  Place3 top = choose(heights, zero, Place3(high - middle));
+  Place3 found = choose(heights, Place3(0.5 * bottom), zero);
   if (sum.volume != 0.0) {
-    found[0] = min(high[0] - middle[0], max(low[0] - middle[0], sum.u / sum.volume));
-    found[1] = min(high[1] - middle[1], max(low[1] - middle[1], sum.v / sum.volume));
-    found[2] = min(0.0, max(least, sum.w / sum.volume));
-  } else {
-    found[2] = 0.5 * least;
+    Place3 mean = (1.0 / sum.volume) * (Place3{0.25, 0.25, 0.125, 0.125} * sum.first);
+    found = min(top, max(bottom, mean));
   }
+  Place3 at = found + middle;
   Vec<double> centroid;
-  centroid[axes[0]] = middle[0] + found[0];
-  centroid[axes[1]] = middle[1] + found[1];
-  centroid[w] = side * (found[2] + half[2]);
+  centroid[axes[0]] = at[0];
+  centroid[axes[1]] = at[1];
+  centroid[w] = side * at[2];
   kept = gross > 0.0 ? std::fabs(sum.volume) / gross : 0.0;
+  Found overlap;
+  overlap.volume = (1.0 / 6.0) * std::fabs(sum.volume);
+  overlap.centroid =
+      of_a ? centroid : components<double>(pair.offset_a + pair.b_in_a * triple(centroid));
 
   // 5. Second moments about the centroid.
-  Sym<double> squares{};
-  auto add = [&](const Polygon& polygon) { squares = squares + integrate_squares(polygon, found); };
-  for (int i = 0; i < count && sum.volume != 0.0; ++i) {
-    if (through) {
-      lifted(polygons[i], floor, add);
-    } else {
-      add(polygons[i]);
+  if constexpr (std::is_same_v<Found, Moments<double>>) {
+    SecondMoments squares;
+    for (int i = 0; i < count && sum.volume != 0.0; ++i) {
+      if (through) {
+        lifted(polygons[i], floor, [&](const Polygon& lift) { squares.add(lift, found); });
+      } else {
+        squares.add(polygons[i], found);
+      }
     }
+    double scale = sum.volume != 0.0 ? 0.05 / sum.volume : 0.0;
+    Sym<double> covariance;
+    for (int d = 0; d < 3; ++d) {
+      covariance(axes[d], axes[d]) = scale * squares.diagonal[d];
+      covariance(axes[(d + 1) % 3], axes[(d + 2) % 3]) =
+          (d < 2 ? side * scale : scale) * squares.beside[d];
+    }
+    Vec<double> ranges;
+    for (int d = 0; d < 3; ++d) ranges[axes[d]] = top[d] - bottom[d];
+    make_possible(covariance, ranges);
+    overlap.covariance = rotated(of_a ? pair.axes_a : pair.axes_b, covariance);
   }
-  Sym<double> covariance;
-  double scale = sum.volume != 0.0 ? 1.0 / sum.volume : 0.0;
-  for (int d = 0; d < 3; ++d)
-    for (int e = d; e < 3; ++e)
-      covariance(axes[d], axes[e]) = (d < 2 && e == 2 ? side * scale : scale) * squares(d, e);
-  Vec<double> ranges;
-  ranges[axes[0]] = high[0] - low[0];
-  ranges[axes[1]] = high[1] - low[1];
-  ranges[w] = -least;
-  make_possible(covariance, ranges);
-  double volume = std::fabs(sum.volume);
-  if (of_a) return {{volume, centroid}, rotated(pair.axes_a, covariance)};
-  Vec<double> in_a = components<double>(pair.offset_a + pair.b_in_a * triple(centroid));
-  return {{volume, in_a}, rotated(pair.axes_b, covariance)};
+  return overlap;
 }
 
 }  // namespace clipping
 
-// The overlap of a pair that has been pressed in. `face`: the best face axis, 0–5.
-inline Moments<double> overlap_by_clipping(const Pair<double>& pair, int face) {
+// The overlap of a pair that has been pressed in, with its centroid in A's frame. `face`: the best face
+// axis, 0–5. Found: Moments, or PointAndVolume.
+template <class Found>
+inline Found overlap_by_clipping(const Pair<double>& pair, int face) {
   double kept;
-  Moments<double> best = clipping::overlap_from(pair, face, kept);
+  Found best = clipping::overlap_from<Found>(pair, face, kept);
   if (kept < cancelled) {
     for (int other = 0; other < 6; ++other) {
       double kept_by_other;
-      Moments<double> candidate = clipping::overlap_from(pair, other, kept_by_other);
+      Found candidate = clipping::overlap_from<Found>(pair, other, kept_by_other);
       if (kept_by_other > kept) best = candidate, kept = kept_by_other;
     }
   }

@@ -77,9 +77,8 @@ template <class Found>
   ++counts.clipped;
   q.pair.offset_a = pressed.from_a;
   q.pair.offset_b = -pressed.from_b;
-  Moments<double> clipped = overlap_by_clipping(q.pair, int(q.axis.face));
-  clipped.centroid = components<double>(point_in_common_frame(q.pair, triple(clipped.centroid)));
-  found = static_cast<const Found&>(clipped);
+  found = overlap_by_clipping<Found>(q.pair, int(q.axis.face));
+  found.centroid = components<double>(point_in_common_frame(q.pair, triple(found.centroid)));
 }
 
 // Shortest edge [of the size] of boxes whose second moments are sound. Of longer needles and thinner
