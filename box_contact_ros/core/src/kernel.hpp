@@ -13,7 +13,8 @@ namespace box_contact::detail {
 
 // The network of model `mlp`: the features of the overlap that it reads, its outputs, and the most units
 // of a hidden layer. `network_format` counts changes of what features and outputs mean.
-constexpr int network_format = 4, network_features = 21, network_outputs = 7, network_units_max = 64;
+constexpr int network_format = 4, network_features = 21, network_outputs = 7,
+              network_units_max = 64;
 
 // A step of 0 gives all rows the same sizes, one of 3 each row its own.
 struct Rows {
@@ -21,7 +22,7 @@ struct Rows {
   const double *sizes_a, *sizes_b;  // full extents [m]
   long size_step_a, size_step_b;
   const int64_t* pairs = nullptr;  // (count, 2): the rows of a pair's boxes; nullptr: row i of both
-  long pose_count = 0;  // of either array; read with `pairs` alone
+  long pose_count = 0;             // of either array; read with `pairs` alone
 };
 
 // The numbers of a pair alone, as a row has them.
@@ -36,17 +37,15 @@ struct Results {
   double *volume, *covariance;
   int32_t* axis;
   double margin;  // [m]; normals are given up to this separation
+
+  bool want_overlap() const { return point || volume || covariance; }
 };
 
 // How many contacts took another way than most.
 struct Counts {
-  long contacts;
   long clipped;  // by model `exact`: clipped, because the certificate did not hold
 
-  void operator+=(const Counts& part) {
-    contacts += part.contacts;
-    clipped += part.clipped;
-  }
+  void operator+=(const Counts& part) { clipped += part.clipped; }
 };
 
 enum class Model { exact, mlp };

@@ -76,7 +76,7 @@ template <class T>
 // touch. Returns the first that is refused, or −1.
 template <class T>
 [[gnu::noinline]] inline long write_query(const Query<T>& q, long first, long last,
-                                          const Results& results, Counts& counts) {
+                                          const Results& results) {
   T nothing = splat<T>(not_a_number);
   unsigned touching = bits(q.touching), valid = bits(q.pair.valid), all = ~0U >> (32 - width<T>);
   Mask<T> near = q.touching | ((q.axis.separation <= results.margin) & q.pair.valid);
@@ -104,7 +104,6 @@ template <class T>
   store(results.colliding, [&](int i) { return bool(touching >> i & 1); });
   store(results.separation, [&](int i) { return lane(separation, i); });
   store(results.axis, [&](int i) { return int32_t(lane(axis, i)); });
-  counts.contacts += __builtin_popcount(touching & here);
   for (unsigned apart = here & ~touching; apart; apart &= apart - 1) {
     long row = first + __builtin_ctz(apart);
     for (int k = 0; results.point && k < 3; ++k) results.point[3 * row + k] = not_a_number;

@@ -88,7 +88,6 @@ struct MlpModelOf {
 
   template <class T>
   using Found = FoundOf<T>;
-  using Rest = void;
 
   template <class T>
   [[gnu::noinline]] unsigned solve(const Query<T>& query, Found<T>& found, detail::Counts&) const {
@@ -118,6 +117,8 @@ struct MlpModelOf {
     }
     return 0;
   }
+  template <class T>
+  void solve_left(const Query<T>&, Found<T>&, detail::Counts&) const {}  // nothing is left
 };
 
 using MlpModel = MlpModelOf<Moments>;

@@ -162,21 +162,24 @@ template <class T, class Found>
 // A model has three members for lanes T:
 //
 //   Found<T>: what it finds of an overlap: `Moments<T>`, or `PointAndVolume<T>`.
-//   Rest: the model to which it leaves pairs, or void.
 //   solve(query, found, counts): fills `found` for the pairs that touch, with the centroid in the
-//     common frame. It returns the bits of those that it leaves.
+//     common frame. It returns the bits of those that it leaves; it leaves no pair alone.
+//   solve_left(query, found, counts): the same for pairs that were left, side by side.
 
-// Model `exact`. `FoundOf`: Moments, or PointAndVolume. `leaves`: few pairs of W that have two planes
-// across an axis wait for others of their kind.
-template <template <class> class FoundOf, bool leaves = true>
+// Model `exact`. `FoundOf`: Moments, or PointAndVolume. It leaves few pairs of W that have two planes
+// across an axis.
+template <template <class> class FoundOf>
 struct ExactModelOf {
   template <class T>
   using Found = FoundOf<T>;
-  using Rest = std::conditional_t<leaves, ExactModelOf<FoundOf, false>, void>;
 
   template <class T>
   BC_INLINE unsigned solve(const Query<T>& query, Found<T>& found, Counts& counts) const {
-    return solve_exactly(query, !leaves, found, counts);
+    return solve_exactly(query, false, found, counts);
+  }
+  template <class T>
+  BC_INLINE void solve_left(const Query<T>& query, Found<T>& found, Counts& counts) const {
+    solve_exactly(query, true, found, counts);
   }
 };
 
