@@ -4,7 +4,7 @@
 // Model `exact`: the overlap of pairs that touch.
 //
 // 1. Parallel boxes: by intervals (intervals.hpp).
-// 2. Others, pressed in where they are at exact touch: by the planes that meet the overlap (planes.hpp).
+// 2. Others, pressed in where they are at exact touch: by the planes that meet the overlap (certificate.hpp).
 // 3. Where that is not certain: once more about the centroid that was found, or by clipping
 //    (clipping.hpp).
 #pragma once
@@ -12,8 +12,9 @@
 #include "../kernel.hpp"
 #include "../minimum_depth.hpp"
 #include "../query.hpp"
+#include "certificate.hpp"
+#include "clipping.hpp"
 #include "intervals.hpp"
-#include "planes.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
 
