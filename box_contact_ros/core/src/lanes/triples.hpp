@@ -97,6 +97,16 @@ BC_INLINE Packed spread(Packed a, int k) {
                   : __builtin_shufflevector(a, a, 2, 2, 2, 2);
 }
 
+// Component k as a triple.
+template <class T>
+BC_INLINE Vec<T> repeated(const Vec<T>& a, int k) {
+  return {a[k], a[k], a[k]};
+}
+template <class Packed>
+BC_INLINE Packed repeated(Packed a, int k) {
+  return spread(a, k);
+}
+
 // The sum of the components.
 template <class Three>
 BC_INLINE auto sum(const Three& a) {

@@ -102,7 +102,7 @@ BC_INLINE planes::Certificate<T> overlap_by_planes(const Pair<T>& pair,
   using namespace planes;
   constexpr bool squares = std::is_same_v<Found, Moments<T>>;
   Sums<T> of_p, of_q;
-  Line<T> largest_lever2{};
+  Triple<T> largest_lever2{};
   add_lines<squares, two_sided>(boxes, of_p, of_q, largest_lever2);
   Triple<T> lengths{};
   constexpr auto edges =
@@ -128,13 +128,7 @@ BC_INLINE planes::Certificate<T> overlap_by_planes(const Pair<T>& pair,
     radius = sqrt(max(sum(covariance.diagonal), T{}));
     found.covariance = sym<T>(turned<T>(axes, covariance));
   }
-  T lever2;
-  if constexpr (packed<T>) {
-    lever2 = largest(largest_lever2);
-  } else {
-    lever2 = largest_lever2;
-  }
-  T lever = sum(lengths) * sqrt(lever2);
+  T lever = sum(lengths) * sqrt(largest(largest_lever2));
   Triple<T> normal = p.normal + m * q.normal, area = p.size + abs(m) * q.size;
   Certificate<T> certain =
       certificate<squares>(x_n, normal, area, lever, volume, radius, pair.size, depth);

@@ -30,191 +30,154 @@ BC_INLINE void clip(const N& at, const Slab& slab, const N& inverse, N& back, N&
   to = min(to, width - by);
 }
 
-// The numbers of Q's axes for one line or for three.
+// What is left within the slabs of the lines of a plane of P with the planes across Q's axes.
 template <class T>
-BC_INLINE auto& of_axis(Triple<T>& x, int j) {
-  if constexpr (packed<T>) {
-    return x;
-  } else {
-    return x[j];
-  }
-}
-template <class T>
-BC_INLINE const auto& of_axis(const Triple<T>& x, int j) {
-  if constexpr (packed<T>) {
-    return x;
-  } else {
-    return x[j];
-  }
-}
-
-// For W pairs, one line of a plane of P with one of Q. For a single pair, three: with the planes
-// across all of Q's axes.
-template <class T>
-using Line = std::conditional_t<packed<T>, Triple<T>, T>;
-
-// What is left of the line of two planes within the slabs.
-template <class N>
-struct Piece {
-  N span, middle;            // its length in units of D, and the place of its middle
-  N u, v;                    // g − c f, and f − c g [m]
-  N at_y, at_z, at_k, at_l;  // the line's nearest point to the origin, in P and in Q [m]
+struct Pieces {
+  Triple<T> span, middle;            // lengths in units of D, and the places of the middles
+  Triple<T> u, v;                    // g − c f, and f − c g [m]
+  Triple<T> at_y, at_z, at_k, at_l;  // the lines' nearest points to the origin, in P and in Q [m]
 };
 
-// The line of P's plane s across axis i with Q's plane t across axis j, clipped.
+// The lines of P's plane s across axis i with Q's planes t, clipped.
 template <class T>
-BC_INLINE Piece<Line<T>> clipped_line(const PairOfBoxes<T>& boxes, int i, int s, int j, int t,
-                                      Line<T>& largest_lever2) {
-  using N = Line<T>;
+BC_INLINE Pieces<T> clipped_lines(const PairOfBoxes<T>& boxes, int i, int s, int t,
+                                  Triple<T>& largest_lever2) {
   const Box<T>&p = boxes.p, &q = boxes.q;
   const Planes<T>&of_p = p.planes[s], &of_q = q.planes[t];
   int y = following[i], z = following[y];
-  const Triple<T>&row_i = boxes.rows[i], &by_i = boxes.by_rows[i];
-  auto on = [&](const Triple<T>& x) { return of_axis<T>(x, j); };
-  // Components: of n_g along y and z; of n_f along the axes k and l of Q that follow j.
-  N c = on(row_i), qy = on(boxes.rows[y]), qz = on(boxes.rows[z]);
-  N pk = on(rotated(row_i)), pl = on(rotated_back(row_i));
-  N by_y = on(boxes.by_rows[y]), by_z = on(boxes.by_rows[z]);
-  N by_k = on(rotated(by_i)), by_l = on(rotated_back(by_i));
+  // Components: of n_g along y and z; of n_f along the axes k and l of Q that follow.
+  const Triple<T>&c = boxes.rows[i], &qy = boxes.rows[y], &qz = boxes.rows[z];
+  Triple<T> pk = rotated(c), pl = rotated_back(c);
+  const Triple<T>&by_i = boxes.by_rows[i], &by_y = boxes.by_rows[y], &by_z = boxes.by_rows[z];
+  Triple<T> f = repeated(of_p.place, i);
+  const Triple<T>&g = of_q.place, &scale = boxes.scales[i];
 
-  N f = spread(of_p.place, i), g = on(of_q.place), scale = on(boxes.scales[i]);
-  Piece<N> piece;
-  piece.u = g - c * f;
-  piece.v = f - c * g;
-  N by_q = piece.u * scale, by_p = piece.v * scale;
-  piece.at_y = by_q * qy, piece.at_z = by_q * qz;
-  piece.at_k = by_p * pk, piece.at_l = by_p * pl;
-  N start = min(spread(of_p.start, i), on(of_q.start));
-  // The line's direction: −qz and qy in P, pl and −pk in Q.
-  N back = select<N>(scale < 1.0 / least_sine2, start, splat<N>(nowhere)), to = back;
-  clip(spread(p.from, y) + piece.at_y, spread(p.slab, y), by_z, to, back);
-  clip(spread(p.from, z) + piece.at_z, spread(p.slab, z), by_y, back, to);
-  clip(on(rotated(q.from)) + piece.at_k, on(rotated(q.slab)), by_l, back, to);
-  clip(on(rotated_back(q.from)) + piece.at_l, on(rotated_back(q.slab)), by_k, to, back);
-  piece.span = max(to + back, N{});
-  piece.middle = 0.5 * (to - back);
-  N lever2 = (f * f) * (piece.u * by_q) + (g * g) * (piece.v * by_p);
-  largest_lever2 = max(largest_lever2, select<N>(piece.span > 0.0, lever2, N{}));
-  return piece;
+  Pieces<T> pieces;
+  pieces.u = g - c * f;
+  pieces.v = f - c * g;
+  Triple<T> by_q = pieces.u * scale, by_p = pieces.v * scale;
+  pieces.at_y = by_q * qy, pieces.at_z = by_q * qz;
+  pieces.at_k = by_p * pk, pieces.at_l = by_p * pl;
+  // The lines' directions: −qz and qy in P, pl and −pk in Q.
+  Triple<T> start = min(repeated(of_p.start, i), of_q.start);
+  Triple<T> none = uniform(splat<T>(nowhere)), least = uniform(splat<T>(1.0 / least_sine2));
+  Triple<T> back = choose(least > scale, start, none), to = back;
+  clip(repeated(p.from, y) + pieces.at_y, repeated(p.slab, y), by_z, to, back);
+  clip(repeated(p.from, z) + pieces.at_z, repeated(p.slab, z), by_y, back, to);
+  clip(rotated(q.from) + pieces.at_k, rotated(q.slab), rotated_back(by_i), back, to);
+  clip(rotated_back(q.from) + pieces.at_l, rotated_back(q.slab), rotated(by_i), to, back);
+  pieces.span = max(to + back, Triple<T>{});
+  pieces.middle = 0.5 * (to - back);
+  Triple<T> lever2 = (f * f) * (pieces.u * by_q) + (g * g) * (pieces.v * by_p);
+  Triple<T> zero{};
+  largest_lever2 = max(largest_lever2, choose(pieces.span > zero, lever2, zero));
+  return pieces;
 }
 
-// What this piece adds.
+// What these pieces add.
 template <bool squares, class T>
-BC_INLINE void add_piece(const PairOfBoxes<T>& boxes, int i, int s, int j, int t,
-                         const Piece<Line<T>>& piece, Faces<Line<T>>& face_p,
-                         Weighted<Line<T>, squares>& sums, Faces<Triple<T>>& faces_q) {
-  using N = Line<T>;
+BC_INLINE void add_pieces(const PairOfBoxes<T>& boxes, int i, int s, int t, const Pieces<T>& pieces,
+                          Faces<Triple<T>>& face_p, Weighted<Triple<T>, squares>& sums,
+                          Faces<Triple<T>>& faces_q) {
   const Planes<T>&of_p = boxes.p.planes[s], &of_q = boxes.q.planes[t];
   int y = following[i], z = following[y];
-  const Triple<T>& row_i = boxes.rows[i];
-  auto on = [&](const Triple<T>& x) { return of_axis<T>(x, j); };
-  N qy = on(boxes.rows[y]), qz = on(boxes.rows[z]);
-  N pk = on(rotated(row_i)), pl = on(rotated_back(row_i));
-  N f = spread(of_p.place, i), g = on(of_q.place), span = piece.span, middle = piece.middle;
-  N side = span * (spread(of_p.sign, i) * on(of_q.sign));
-  N area_p = side * piece.u, area_q = side * piece.v;
-  N my = piece.at_y - middle * qz, mz = piece.at_z + middle * qy;
-  N w = f * area_p + g * area_q;
+  const Triple<T>&qy = boxes.rows[y], &qz = boxes.rows[z];
+  Triple<T> pk = rotated(boxes.rows[i]), pl = rotated_back(boxes.rows[i]);
+  Triple<T> f = repeated(of_p.place, i);
+  const Triple<T>&g = of_q.place, &span = pieces.span, &middle = pieces.middle;
+  Triple<T> side = span * (repeated(of_p.sign, i) * of_q.sign);
+  Triple<T> area_p = side * pieces.u, area_q = side * pieces.v;
+  Triple<T> my = pieces.at_y - middle * qz, mz = pieces.at_z + middle * qy;
+  Triple<T> w = f * area_p + g * area_q;
   face_p.area += area_p;
   face_p.next += area_p * my;
   face_p.after += area_p * mz;
-  of_axis<T>(faces_q.area, j) += area_q;
-  of_axis<T>(faces_q.next, j) += area_q * (piece.at_k + middle * pl);
-  of_axis<T>(faces_q.after, j) += area_q * (piece.at_l - middle * pk);
-  N wy = w * my, wz = w * mz;
+  faces_q.area += area_q;
+  faces_q.next += area_q * (pieces.at_k + middle * pl);
+  faces_q.after += area_q * (pieces.at_l - middle * pk);
+  Triple<T> wy = w * my, wz = w * mz;
   sums.w += w;
   sums.y += wy;
   sums.z += wz;
   if constexpr (squares) {
-    N along = (1.0 / 12.0) * (w * (span * span)), along_y = along * qy;
+    Triple<T> along = (1.0 / 12.0) * (w * (span * span)), along_y = along * qy;
     sums.yy += wy * my + along * (qz * qz);
     sums.zz += wz * mz + along_y * qy;
     sums.yz += wy * mz - along_y * qz;
   }
 }
 
-// Put numbers of the lines of P's axis i where they belong, or add them up over Q's axes.
+// Numbers of the lines of each axis of P, added up over Q's axes. A pair alone adds its three axes up
+// side by side, at the end.
 template <class T>
-struct Gathered {
-  Triple<T> by_axis[3];  // of a single pair: three lines of each axis of P
-  Triple<T> total;       // of W pairs
+struct ByAxis {
+  Triple<T> lines[3];
+  Triple<T> total;
 
-  BC_INLINE void put(int i, int j, const Line<T>& x) {
+  BC_INLINE void put(int i, const Triple<T>& x) {
     if constexpr (packed<T>) {
-      by_axis[i] = x;
+      lines[i] = x;
     } else {
-      total[i] = j == 0 ? x : total[i] + x;
+      total[i] = sum(x);
     }
   }
-  BC_INLINE Triple<T> sum() const {
+  BC_INLINE Triple<T> sums() const {
     if constexpr (packed<T>) {
-      return totals<T>(by_axis[0], by_axis[1], by_axis[2]);
+      return totals<T>(lines[0], lines[1], lines[2]);
     } else {
       return total;
     }
   }
 };
 
-// What the lines of P's planes on one side add up to, by P's axes.
+// What the lines of P's planes on one side add up to.
 template <bool squares, class T>
 struct SideSums {
-  Gathered<T> area, next, after, w, y, z, yy, zz, yz;
+  ByAxis<T> area, next, after, w, y, z, yy, zz, yz;
 
-  BC_INLINE void put(int i, int j, const Faces<Line<T>>& face,
-                     const Weighted<Line<T>, squares>& sums) {
-    area.put(i, j, face.area);
-    next.put(i, j, face.next);
-    after.put(i, j, face.after);
-    w.put(i, j, sums.w);
-    y.put(i, j, sums.y);
-    z.put(i, j, sums.z);
+  BC_INLINE void put(int i, const Faces<Triple<T>>& face,
+                     const Weighted<Triple<T>, squares>& sums) {
+    area.put(i, face.area);
+    next.put(i, face.next);
+    after.put(i, face.after);
+    w.put(i, sums.w);
+    y.put(i, sums.y);
+    z.put(i, sums.z);
     if constexpr (squares) {
-      yy.put(i, j, sums.yy);
-      zz.put(i, j, sums.zz);
-      yz.put(i, j, sums.yz);
+      yy.put(i, sums.yy);
+      zz.put(i, sums.zz);
+      yz.put(i, sums.yz);
     }
   }
 };
 
-// The lines of P's planes s across `count` axes with Q's planes. All that belong to one side of Q are
-// clipped before any is added up: few steps then wait for the one before.
+// The lines of P's planes s across the axes from `first` on with Q's planes. All that belong to one side
+// of Q are clipped before any is added up: few steps then wait for the one before.
 template <int count, bool squares, bool two_sided, class T>
 BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, int first, int s,
-                         SideSums<squares, T>& of_side, Sums<T>& of_q, Line<T>& largest_lever2) {
-  constexpr int lines = packed<T> ? 1 : 3;  // of an axis of P
-  auto each_line = [](auto work) __attribute__((always_inline)) {
+                         SideSums<squares, T>& of_side, Sums<T>& of_q, Triple<T>& largest_lever2) {
+  Faces<Triple<T>> faces[count];
+  Weighted<Triple<T>, squares> sums[count];
+  auto is_there = [&](int k) { return boxes.p.planes[s].axes >> (first + k) & 1; };
+  for (int t = 0; t < (two_sided && boxes.q.planes[1].axes ? 2 : 1); ++t) {
+    Pieces<T> pieces[count];
 #pragma GCC unroll 3
     for (int k = 0; k < count; ++k)
+      pieces[k] = is_there(k) ? clipped_lines(boxes, first + k, s, t, largest_lever2) : Pieces<T>{};
 #pragma GCC unroll 3
-      for (int j = 0; j < lines; ++j) work(k, j);
-  };
-  Faces<Line<T>> face[count][lines];
-  Weighted<Line<T>, squares> sums[count][lines];
-  unsigned axes_p = boxes.p.planes[s].axes;
-  for (int t = 0; t < (two_sided && boxes.q.planes[1].axes ? 2 : 1); ++t) {
-    unsigned axes_q = packed<T> || !two_sided ? 7 : boxes.q.planes[t].axes;
-    auto is_there = [&](int k, int j) { return axes_p >> (first + k) & axes_q >> j & 1; };
-    Piece<Line<T>> pieces[count][lines];
-    each_line([&](int k, int j) __attribute__((always_inline)) {
-      pieces[k][j] = is_there(k, j) ? clipped_line(boxes, first + k, s, j, t, largest_lever2)
-                                    : Piece<Line<T>>{};
-    });
-    each_line([&](int k, int j) __attribute__((always_inline)) {
-      if (is_there(k, j))
-        add_piece<squares>(boxes, first + k, s, j, t, pieces[k][j], face[k][j], sums[k][j],
-                           of_q.faces[t]);
-    });
+    for (int k = 0; k < count; ++k)
+      if (is_there(k))
+        add_pieces<squares>(boxes, first + k, s, t, pieces[k], faces[k], sums[k], of_q.faces[t]);
   }
-  each_line([&](int k, int j) __attribute__((always_inline)) {
-    of_side.put(first + k, j, face[k][j], sums[k][j]);
-  });
+#pragma GCC unroll 3
+  for (int k = 0; k < count; ++k) of_side.put(first + k, faces[k], sums[k]);
 }
 
 // All lines of P's planes with Q's. Code that does not fit the first cache takes up to twice the time:
 // no loop over two sides is unrolled, and of W pairs none over P's axes.
 template <bool squares, bool two_sided, class T>
 BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, Sums<T>& of_p, Sums<T>& of_q,
-                         Line<T>& largest_lever2) {
+                         Triple<T>& largest_lever2) {
   int sides_p = two_sided && boxes.p.planes[1].axes ? 2 : 1;
   for (int s = 0; s < sides_p; ++s) {
     SideSums<squares, T> side;
@@ -227,14 +190,14 @@ BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, Sums<T>& of_p, Sums<T>& of
     }
     const Triple<T>& f = boxes.p.planes[s].place;
     Faces<Triple<T>>& faces = of_p.faces[s];
-    faces.area = side.area.sum();
-    faces.next = side.next.sum();
-    faces.after = side.after.sum();
-    Triple<T> wx = f * side.w.sum(), wy = side.y.sum(), wz = side.z.sum();
+    faces.area = side.area.sums();
+    faces.next = side.next.sums();
+    faces.after = side.after.sums();
+    Triple<T> wx = f * side.w.sums(), wy = side.y.sums(), wz = side.z.sums();
     of_p.first += ((wx + rotated_back(wy)) + rotated(wz));
     if constexpr (squares) {
-      of_p.squares.diagonal += ((f * wx + rotated_back(side.yy.sum())) + rotated(side.zz.sum()));
-      of_p.squares.beside += ((side.yz.sum() + rotated(f * wy)) + rotated_back(f * wz));
+      of_p.squares.diagonal += ((f * wx + rotated_back(side.yy.sums())) + rotated(side.zz.sums()));
+      of_p.squares.beside += ((side.yz.sums() + rotated(f * wy)) + rotated_back(f * wz));
     }
   }
 }
