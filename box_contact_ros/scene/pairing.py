@@ -12,7 +12,7 @@ once some pair has the poses of both of its boxes.
 tick     event                                     next      effect
 -------  ----------------------------------------  --------  ---------------------------------
 none     first pose of a stamp                     waiting
-none     pose of a stamp answered without its box  none      TOO_LATE
+none     pose of a stamp that its box missed       none      TOO_LATE
 waiting  pose of a box                             waiting
 waiting  pose nearer than the one of its box       waiting   NO_PARTNER for the earlier one
 waiting  whole, and no box is awaited              answered  a tick, None for a missing box
@@ -20,8 +20,9 @@ waiting  PATIENCE later ticks are whole            answered  a tick, None for a 
 waiting  WAITING_TICKS newer ticks have begun      dropped   NO_PARTNER for each pose
 waiting  time is set back                          dropped   NO_PARTNER for each pose
 ```
-Older whole ticks are answered before it. A tick awaits each box that has no pose in it and may
-still give one:
+Older whole ticks are answered before it. A box misses a tick that is answered without its pose. No
+box misses a tick that is RESET ahead of most boxes, which has the stamp of a wrong clock. A tick
+awaits each box that has no pose in it and may still give one:
 ```
 box                                                               awaited
 ----------------------------------------------------------------  -------
@@ -38,9 +39,12 @@ pose of a box                                      effect
 -------------------------------------------------  ------------------------------------------
 its newest stamp, or one of those remembered       REPEATED: refused
 older than all that are remembered                 OLD: refused
-RESET before its newest, as far behind the others  RESETS: time went back; all poses forgotten
-RESET before its newest, the others are not        the box alone begins anew
+RESET before its newest                            the box alone begins anew
+the same, and another box that began anew behind   RESETS: time went back; all but that other box
+the others is near, or there are no others         begin anew
 ```
+A box that has begun anew behind the others may be the first one after a restart. So its ticks await
+the others, although their newest stamps are later.
 Policy `latest` makes a tick of every pose that is not OLD, with the last pose of each other box. A
 box is stale there if its newest stamp is more than max_age away from that of the pose.
 Why no library does this: docs/contributing/decisions/contact-node.md.
@@ -49,7 +53,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import Counter, deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice
@@ -146,15 +150,20 @@ class Pairing(ABC):
         self._boxes = {box: BoxState() for box in scene.streams}
         self._partners = {box: {box} if box == ALL_BOXES else scene.partners(box)
                           for box in self._boxes}
+        self._behind: set[str] = set()  # boxes that have begun anew behind the others
 
     @abstractmethod
     def add(self, box: str, pose: StampedPose) -> list[Tick]:
         """Take a pose; return the ticks that can be answered now, in their order."""
 
-    def reset(self) -> None:
-        """Forget all poses and stamps, as when time is set back."""
+    def reset(self, kept: Collection[str] = ()) -> None:
+        """Forget all poses and stamps, as when time is set back, but those of kept boxes."""
         for box, state in self._boxes.items():
-            self._boxes[box] = BoxState(came=state.came, heard_at=state.heard_at)
+            if box in kept:
+                state.missed.clear()
+            else:
+                self._boxes[box] = BoxState(came=state.came, heard_at=state.heard_at)
+        self._behind.clear()
 
     def stale(self) -> list[str]:
         """Return the boxes whose newest stamp is more than max_age behind that of another box."""
@@ -181,18 +190,28 @@ class Pairing(ABC):
 
     def _state_at(self, box: str, stamp: int) -> BoxState:
         """Return the state of a box, after a reset if its stamp shows that time was set back."""
+        newest = self._boxes[box].newest
+        if stamp < newest - RESET:
+            self._go_back(box, stamp)
+        elif self._behind and stamp > newest + RESET:
+            self._behind.discard(box)
         state = self._boxes[box]
-        if stamp < state.newest - RESET:
-            others = [other.newest for other in self._boxes.values()
-                      if other is not state and other.newest != NEVER]
-            if others and median(others) - stamp <= RESET:  # its clock was wrong, theirs is not
-                self._boxes[box] = BoxState(missed=state.missed)
-            else:
-                self._count(RESETS, box, stamp)
-                self.reset()
-            state = self._boxes[box]
         state.came = True
         return state
+
+    def _go_back(self, box: str, stamp: int) -> None:
+        """Let a box begin anew, or all boxes if it follows one that has gone back to this time."""
+        others = {name: state.newest for name, state in self._boxes.items()
+                  if name != box and state.newest != NEVER}
+        first = [name for name in self._behind & others.keys()
+                 if abs(others[name] - stamp) <= RESET]
+        if first or not others:
+            self._count(RESETS, box, stamp)
+            self.reset(kept=first)
+            return
+        self._boxes[box] = BoxState(missed=self._boxes[box].missed)
+        if median(others.values()) - stamp > RESET:  # else its clock was wrong, and is right now
+            self._behind.add(box)
 
     def _count(self, reason: str, box: str, stamp: int) -> None:
         """Count a pose, and note it for the log."""
@@ -220,12 +239,17 @@ class StampPairing(Pairing):
         self._has_answered = False
         self._newest_missed = NEVER  # tick that was answered without a box
 
-    def reset(self) -> None:
-        """Forget as Pairing does; poses that wait are dropped and counted."""
-        super().reset()
-        self.counts[NO_PARTNER] += sum(len(tick.poses) for tick in self._waiting.values())
-        self._waiting.clear()
-        self._whole.clear()
+    def reset(self, kept: Collection[str] = ()) -> None:
+        """Forget as Pairing does; poses that wait and are not kept are dropped and counted."""
+        super().reset(kept)
+        waiting, self._waiting = self._waiting, {}
+        for key, tick in waiting.items():
+            if all(pose.stamp in self._boxes[box].taken for box, pose in tick.poses.items()):
+                self._waiting[key] = tick
+                tick.settled = 0
+            else:
+                self.counts[NO_PARTNER] += len(tick.poses)
+                self._whole.pop(key, None)
         self._newest_missed = NEVER
 
     def add(self, box: str, pose: StampedPose) -> list[Tick]:
@@ -311,25 +335,26 @@ class StampPairing(Pairing):
         names = self._scene.streams
         while tick.settled < len(names):
             box = names[tick.settled]
-            if box not in tick.poses and self._may_come(self._boxes[box], key, tick.number):
+            if box not in tick.poses and self._may_come(self._boxes[box], key, tick):
                 return True
             tick.settled += 1
         return False
 
-    def _may_come(self, state: BoxState, key: int, number: int) -> bool:
+    def _may_come(self, state: BoxState, key: int, tick: WaitingTick) -> bool:
         if not state.came:
             return not self._has_answered
-        if state.newest >= key or state.is_late:
+        if state.is_late or (state.newest >= key and self._behind.isdisjoint(tick.poses)):
             return False
         gap = min(state.gaps, default=1)
-        return gap - 1 <= number - state.heard_at < gap + PATIENCE
+        return gap - 1 <= tick.number - state.heard_at < gap + PATIENCE
 
     def _answer(self, key: int) -> Tick:
         """Remove a tick from those that wait, and return its poses."""
         poses = self._waiting.pop(key).poses
         self._whole.pop(key, None)
         self._has_answered = True
-        if len(poses) < len(self._boxes):
+        if len(poses) < len(self._boxes) and key - RESET <= median(
+                state.newest for state in self._boxes.values() if state.newest != NEVER):
             self._newest_missed = max(self._newest_missed, key)
             for box, state in self._boxes.items():
                 if box not in poses:
@@ -346,9 +371,9 @@ class LatestPairing(Pairing):
 
     _can_answer = False  # whether some pair has the poses of both of its boxes
 
-    def reset(self) -> None:
-        """Forget all poses and stamps, as when time is set back."""
-        super().reset()
+    def reset(self, kept: Collection[str] = ()) -> None:
+        """Forget as Pairing does."""
+        super().reset(kept)
         self._can_answer = False
 
     def add(self, box: str, pose: StampedPose) -> list[Tick]:

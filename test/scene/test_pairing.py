@@ -141,7 +141,7 @@ def test_poses_without_partner_are_dropped_and_counted():
 @pytest.mark.parametrize('offset', [-HOUR, -10 * RESET, -RESET, -RESET // 2, -77 * MS, -1, 1,
                                     77 * MS, RESET // 2, RESET, HOUR])
 def test_a_box_whose_clock_is_off_holds_up_nobody(offset):
-    """Box c never agrees. After some ticks, a and b are answered within one period of theirs."""
+    """Box c never agrees. After some ticks, a and b are answered within one period."""
     pairing = StampPairing(scene(), max_age=RESET)
     events = stream('abc', 300, offsets=(0, 0, offset))
     answered = {tick[0]: number // 3 for number, tick in play(pairing, events) if tick[0]}
@@ -159,6 +159,21 @@ def test_one_pose_far_ahead_costs_nothing(ahead):
     ticks = [tick for _, tick in play(pairing, events)]
     assert [tick[0] for tick in ticks] == [START + number * 10 * MS for number in range(100)]
     assert sum(tick[2] is None for tick in ticks) == 1 and pairing.counts == {TOO_LATE: 1}
+
+
+@pytest.mark.parametrize('policy', PAIRINGS.values())
+@pytest.mark.parametrize('pair', ['cF', 'cd'])
+@pytest.mark.parametrize('ahead, behind', [(2, -2), (0, -2), (HOUR // RESET, -HOUR // RESET)])
+def test_a_box_with_two_clocks_costs_an_unrelated_pair_no_tick(policy, pair, ahead, behind):
+    """Box c is stamped by one and the other in turn; a and b are answered within one period."""
+    pairing = policy(scene('abcd', ('ab', pair)), max_age=RESET)
+    events = [(box, stamp + RESET * (behind if number % 2 else ahead) * (box == 'c'))
+              for number in range(1500) for box, stamp in stream('abc', number + 1)[-3:]]
+    answered = {tick[0]: number // 3 for number, tick in play(pairing, events)
+                if tick[0] and tick[0] == tick[1]}
+    delays = [answered[START + number * 10 * MS] - number for number in range(1500 - PATIENCE)]
+    assert max(delays) <= PATIENCE and max(delays[2 * PATIENCE:]) <= 1
+    assert pairing.counts[RESETS] == 0
 
 
 @pytest.mark.parametrize('every', [2, 10, 100])
@@ -240,12 +255,22 @@ def test_time_set_back_begins_anew(policy):
     pairing.add('b', pose(0))
     assert stamps(pairing.add('c', pose(0))) == [0, 0, 0]
     assert pairing.counts[RESETS] == 1
-    assert pairing.rejections[RESETS] == Rejection('a', 0, 5 * RESET + 9 * MS)
+    assert pairing.rejections[RESETS] == Rejection('b', 0, 5 * RESET + 9 * MS)
+
+
+def test_after_a_restart_the_first_box_waits_for_the_second():
+    """Although it has a pair with a fixed box, and the second one has a later stamp."""
+    pairing = StampPairing(scene('ab', ('ab', 'aF')), max_age=RESET)
+    play(pairing, stream('ab', 20))
+    assert not play(pairing, [('a', 0), ('a', MS)])
+    assert play(pairing, [('b', 0), ('b', MS)]) == [(0, [0, 0]), (1, [MS, MS])]
+    assert pairing.counts == {RESETS: 1}
 
 
 def test_what_waited_when_time_was_set_back_is_counted():
     pairing = StampPairing(TWO)
-    play(pairing, [('box_a', 5 * RESET), ('box_b', 5 * RESET), ('box_a', 6 * RESET), ('box_a', 0)])
+    play(pairing, [('box_a', 5 * RESET), ('box_b', 5 * RESET), ('box_a', 6 * RESET)])
+    assert play(pairing, [('box_a', 0), ('box_b', 0)]) == [(1, [0, 0])]
     assert pairing.counts == {RESETS: 1, NO_PARTNER: 1}
 
 
