@@ -11,18 +11,25 @@ import json
 import os
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import yaml
 
 from ..resources import find_file, resource_path
-from ..solver.checks import short_repr
+from ..solver.checks import SHOWN, short_repr
 from .scene_solver import Box, Fault, Pair, Scene
 
 MOST_STREAMS = 1000
 """Boxes with a topic of their own. Each subscription takes a millisecond and 100 kB; an array has
 all poses in one message."""
-PLAIN_INT = re.compile(r'[-+]?(0|[1-9][0-9]*)')
+MOST_BYTES = 2**26
+"""Of a file: 64 MiB, some million boxes. With all aliases written out, a file has at most so many
+nodes: that binds no file without aliases."""
+MOST_DEPTH = 16
+"""Collections within each other; a scene has four. PyYAML's C code fails at some ten thousand."""
+PLAIN_INT = re.compile(r'[-+]?(0|[1-9][0-9]{0,299})')  # float() takes 308 digits
 PLAIN_FLOAT = re.compile(r'[-+]?[0-9]*(\.[0-9]*)?([eE][-+]?[0-9]+)?')
 _WILDCARDS = re.compile(r'[*?[]')
 _ALL = [{'a': '*', 'b': '*'}]  # what `pairs: all` stands for
@@ -48,6 +55,8 @@ def _plain(pattern: re.Pattern[str], read: type) -> Any:
 # YAML 1.1, which PyYAML knows, reads 010 as eight and 1:30 as ninety.
 _Loader.add_constructor('tag:yaml.org,2002:int', _plain(PLAIN_INT, int))
 _Loader.add_constructor('tag:yaml.org,2002:float', _plain(PLAIN_FLOAT, float))
+# A scene has no dates; PyYAML fails at 2026-02-31.
+_Loader.add_constructor('tag:yaml.org,2002:timestamp', _Loader.construct_yaml_str)
 
 
 def read_scene(path: str | os.PathLike[str]) -> Scene:
@@ -57,17 +66,81 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
     Raises SceneError, a ValueError whose words name file and field.
     """
     try:
-        data = yaml.load(find_file(path).read_text('utf-8'), Loader=_Loader)
+        text = _read(find_file(path))
+        _check_yaml(text)
+        return _scene_of(yaml.load(text, Loader=_Loader))
     except OSError as error:
         raise SceneError(f'scene {short_repr(os.fspath(path))} cannot be read: '
                          f'{error.strerror or error}') from error
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
+    except (ValueError, yaml.YAMLError) as error:
         reason = ' '.join(str(error).split())
+        if len(reason) > 2 * SHOWN:  # it shows what is refused
+            reason = f'{reason[:SHOWN]} ... {reason[-SHOWN:]}'
         raise SceneError(f'{path}: {reason}') from error
-    try:
-        return _scene_of(data)
-    except Fault as error:
-        raise SceneError(f'{path}: {error}') from None
+
+
+def _read(path: Path) -> str:
+    """Return the text of a regular file, or raise OSError or ValueError."""
+    if path.exists() and not path.is_file():  # a pipe would be waited for
+        raise OSError('it is not a regular file')
+    with path.open('rb') as file:
+        content = file.read(MOST_BYTES + 1)
+    if len(content) > MOST_BYTES:
+        raise OSError(f'it has more than {MOST_BYTES} bytes')
+    return content.decode('utf-8')
+
+
+@dataclass
+class _Collection:
+    """A list or mapping that is being read."""
+
+    anchor: str | None = None
+    keys: set[str] | None = None  # of a mapping
+    entries: int = 0  # nodes in it so far: keys and values of a mapping in turn
+    nodes: int = 1  # it, and all nodes below it with aliases written out
+
+
+def _check_yaml(text: str) -> None:
+    """Raise YAMLError for what PyYAML reads without a word, or does not survive.
+
+    These are doubled keys, tags, and collections that are nested deeply or repeated by aliases.
+    """
+    open_ones = [_Collection()]
+    nodes: dict[str | None, int] = {}  # below each anchor
+    texts: dict[str | None, str | None] = {}  # of scalars, by anchor
+    for event in yaml.parse(text, Loader=_Loader):
+        if isinstance(event, yaml.CollectionEndEvent):
+            closed = open_ones.pop()
+            open_ones[-1].nodes += closed.nodes
+            nodes[closed.anchor] = closed.nodes
+        if not isinstance(event, yaml.NodeEvent):
+            continue
+        parent, anchor = open_ones[-1], event.anchor
+        value, tag = getattr(event, 'value', None), getattr(event, 'tag', None)  # of a scalar
+        if isinstance(event, yaml.AliasEvent):
+            value = texts.get(anchor)
+            parent.nodes += nodes.get(anchor, 1)
+        elif isinstance(event, yaml.CollectionStartEvent):
+            open_ones.append(_Collection(
+                anchor, set() if isinstance(event, yaml.MappingStartEvent) else None))
+        else:
+            parent.nodes += 1
+            nodes[anchor], texts[anchor] = 1, value
+        parent.entries += 1
+        if tag:
+            raise _refusal(f'a tag, {short_repr(tag)}', event)
+        if len(open_ones) > MOST_DEPTH + 1:
+            raise _refusal(f'more than {MOST_DEPTH} collections are within each other', event)
+        if parent.nodes > MOST_BYTES:
+            raise _refusal(f'aliases stand for more than {MOST_BYTES} nodes', event)
+        if parent.keys is not None and parent.entries % 2 and value is not None:
+            if value in parent.keys:
+                raise _refusal(f'{short_repr(value)} is defined twice', event)
+            parent.keys.add(value)
+
+
+def _refusal(problem: str, event: Any) -> yaml.YAMLError:
+    return yaml.MarkedYAMLError(problem=problem, problem_mark=event.start_mark)
 
 
 def _scene_of(data: Any) -> Scene:

@@ -85,6 +85,8 @@ def _read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Return tensors of credible values and the model card, or raise ValueError."""
     from safetensors import safe_open
 
+    if path.exists() and not path.is_file():  # a pipe would be waited for
+        raise ValueError('it is not a regular file')
     tensors = {}
     with safe_open(path, framework='numpy') as file:
         for name in file.keys():
@@ -98,7 +100,7 @@ def _read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         text = (file.metadata() or {}).get('card', '')
     try:
         card = json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):  # no JSON, or nested deeply
         card = None
     if not isinstance(card, dict):
         raise ValueError('it has no readable model card')

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -76,12 +77,26 @@ def test_patterns_stand_for_pairs_of_which_one_box_moves(scene_of):
     ('[6, 2.4, 0.5]', '[6, 2.4, 1e60]', 'boxes.spreader.size'),
     *(('[6, 2.4, 0.5]', f'[{number}, 2.4, 0.5]', f"'{number}' is not a plain number")
       for number in ('010', '0x10', '1:30', '1_000', '.nan', '.inf', '1:30.5')),
+    ('[6, 2.4, 0.5]', f'[{"1" * 10_000}, 2.4, 0.5]', "1' is not a plain number in"),
+    ('[6, 2.4, 0.5]', f'[{"1" * 400}, 2.4, 0.5]', "1' is not a plain number in"),
+    ('[6, 2.4, 0.5]', '[6, 2.4, 2026-02-31]', "boxes.spreader.size[2]: '2026-02-31' is not of"),
+    ('[6, 2.4, 0.5]', '!!float [6]', "a tag, 'tag:yaml.org,2002:float' in"),
+    ('  spreader:', '  load: {size: [1, 1, 1]}\n  spreader:',
+     "'load' is defined twice in \"<unicode string>\", line 4, column 3"),
+    ('    pose_topic:', '    size: [1, 1, 1]\n    pose_topic:', "'size' is defined twice in"),
+    ('  spreader:', '  &one one: {size: [1, 1, 1]}\n  *one : {size: [2, 2, 2]}\n  spreader:',
+     "'one' is defined twice in"),
+    (GOOD, '[' * 100_000, 'more than 16 collections are within each other in'),
+    (GOOD, '{"a": ' * 100_000, 'more than 16 collections are within each other in'),
+    (GOOD, 'a0: &a0 [1]\n' + ''.join(f'a{i}: &a{i} [{f"*a{i - 1}, " * 10}]\n'
+                                      for i in range(1, 30)),
+     'aliases stand for more than 67108864 nodes in'),
     ('[0, 0, 1.2955, 0, 0, 0, 1]', '[0, 0, 1, 0, 0, 0, 0]', 'boxes.s1.pose: quaternion'),
     ('pose_topic: /crane/spreader', 'pose_topic: 2 crane', 'boxes.spreader.pose_topic: '),
     ('pose_topic: /crane/spreader', 'colour: red', 'boxes.spreader: Additional properties'),
     ('    pose_topic: /crane/spreader\n', '    pose_topic: a\n    pose: [0, 0, 0, 0, 0, 0, 1]\n',
      'boxes.spreader.pose_topic: a box with a pose never moves'),
-    ('size: [6, 2.4, 0.5]', 'size: !!python/tuple [6, 2.4, 0.5]', 'could not determine a'),
+    ('size: [6, 2.4, 0.5]', 'size: !!python/tuple [6, 2.4, 0.5]', 'python/tuple'),
     ('a: spreader', 'a: lorry', "pairs[1].a: 'lorry' is none of the boxes"),
     ('a: spreader', 'a: load', "pairs[1].b: 'load' is the same box as a"),
     ('name: grip', 'name: load_s1', "pairs[1].name: the same name as that of 'load'"),
@@ -103,10 +118,32 @@ def test_a_refusal_names_file_and_field(old, new, words, scene_of):
     assert words in str(refused.value) and 'scene.yaml: ' in str(refused.value)
 
 
+def test_aliases_are_read(scene_of):
+    """Also one within another; what is merged may be overridden."""
+    text = GOOD.replace('load: {size: [12.192, 2.438, 2.591]}', 'load: &load {size: &container '
+                        '[12.192, 2.438, 2.591]}').replace(
+                            '    size: [12.192, 2.438, 2.591]\n', '    <<: *load\n')
+    assert text.count('*') == 1 and scene_of(text) == scene_of(GOOD)
+    assert scene_of(text.replace('*load\n', '*load\n    size: [1, 1, 1]\n')
+                    ).boxes['s1'].size == (1, 1, 1)
+
+
+def test_a_refusal_of_a_long_value_is_short(scene_of):
+    with pytest.raises(SceneError) as refused:
+        scene_of(f'boxes: "{"x" * 100_000}"\npairs: all\n')
+    assert "is not of type 'object'" in str(refused.value) and len(str(refused.value)) < 1000
+
+
 def test_files_that_cannot_be_read(tmp_path):
     (tmp_path / 'latin').write_bytes(b'boxes: \xff')
+    os.mkfifo(tmp_path / 'pipe')
+    with (tmp_path / 'large').open('wb') as file:
+        file.truncate(2**26 + 1)
     for path, words in ((tmp_path / 'none.yaml', 'cannot be read: No such file'),
-                        (tmp_path, 'cannot be read: Is a directory'),
+                        (tmp_path, 'cannot be read: it is not a regular file'),
+                        (tmp_path / 'pipe', 'cannot be read: it is not a regular file'),
+                        (tmp_path / 'large', 'cannot be read: it has more than 67108864 bytes'),
+                        (tmp_path / 'null\0', 'null byte'),
                         (tmp_path / 'latin', "codec can't decode byte")):
         with pytest.raises(SceneError, match=words):
             read_scene(path)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -107,7 +108,8 @@ def test_sizes_that_are_none(tmp_path: Path, sizes: object) -> None:
 
 
 @pytest.mark.parametrize('text', [None, '', '{', '3', '"name"', '[]',
-                                  '[["name", "a pair"]]'])
+                                  '[["name", "a pair"]]', '[' * 100_000, '{"a":' * 100_000,
+                                  '{"sizes": ' + '1' * 10_000 + '}'])
 def test_no_card(tmp_path: Path, text: str | None) -> None:
     metadata = {} if text is None else {'card': text}
     save_file(tensors(), tmp_path / 'x', metadata=metadata)
@@ -224,8 +226,10 @@ def test_a_refusal_is_one_line_without_terminal_codes(tmp_path: Path) -> None:
 def test_no_file(tmp_path: Path) -> None:
     with pytest.raises(WeightsError, match='does not exist'):
         load_weights(tmp_path / 'x')
-    with pytest.raises(WeightsError, match='cannot be read'):
-        load_weights(tmp_path)
+    os.mkfifo(tmp_path / 'pipe')
+    for path in (tmp_path, tmp_path / 'pipe'):
+        with pytest.raises(WeightsError, match='cannot be read: it is not a regular file'):
+            load_weights(path)
     save_file({}, tmp_path / 'y', metadata={'card': json.dumps(card())})
     with pytest.raises(WeightsError, match='holds no network'):
         load_weights(tmp_path / 'y')
