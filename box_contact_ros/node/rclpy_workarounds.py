@@ -11,7 +11,7 @@ import ctypes
 import faulthandler
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from inspect import signature
+from functools import wraps
 from typing import Any
 
 from rclpy.context import Context
@@ -19,7 +19,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
 
-CallbackWithInfo = Callable[[tuple[Any, Mapping[str, Any]]], None]
+CallbackWithInfo = Callable[[Any, Mapping[str, Any]], None]
 RCLError = rclpy_implementation.RCLError
 """Symptom: what the middleware refuses raises a type without a public name.
 Test: test_contact_node.py::test_a_bad_start_is_one_clear_line."""
@@ -47,15 +47,18 @@ def lifecycle_state(node: LifecycleNode) -> str:
     return str(node._state_machine.current_state[1])
 
 
-def with_info(callback: CallbackWithInfo) -> CallbackWithInfo:
-    """Return the callback of a subscription for a message and what is known of it, as a tuple.
+def with_info(callback: CallbackWithInfo) -> Callable[..., None]:
+    """Return the callback of a subscription for a message and what is known of it.
 
-    Symptom: EventsExecutor gives both as a tuple, and only to a callback whose signature has two
-    arguments.
+    Symptom: EventsExecutor gives both as one tuple; the other executors give two arguments.
     Test: test_runtime.py::test_a_message_comes_with_its_time_and_number.
     """
-    callback.__signature__ = signature(lambda message, info: None)  # type: ignore[attr-defined]
-    return callback
+    @wraps(callback)  # rclpy asks for the signature
+    def call(message: Any, info: Mapping[str, Any] | None = None) -> None:
+        if info is None:
+            message, info = message
+        callback(message, info)
+    return call
 
 
 @contextmanager

@@ -95,10 +95,9 @@ class TickAnswerer:
         queue = self._queues[box] = PoseQueue()
         read = self._read_all if box == ALL_BOXES else self._reader.read_pose
 
-        def callback(message: tuple[bytes, Mapping[str, Any]]) -> None:
+        def callback(data: bytes, info: Mapping[str, Any]) -> None:
             if not self.active:
                 return
-            data, info = message
             self._counts['poses'] += 1
             arrived = info['received_timestamp']
             if queue.is_overtaken(info['publication_sequence_number'], arrived):

@@ -31,7 +31,7 @@ QOS_OVERRIDES = QoSOverridingOptions.with_default_policies()  # of poses and of 
 ARRAY_DEPTH = 5
 """Arrays that wait: a node that cannot keep up is late by a few ticks, never by seconds."""
 
-PoseCallback = Callable[[tuple[bytes, Mapping[str, Any]]], None]
+PoseCallback = Callable[[bytes, Mapping[str, Any]], None]
 """Takes the bytes of poses, and what the middleware knows of them."""
 
 

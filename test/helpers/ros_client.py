@@ -186,7 +186,8 @@ class Client:
 
 
 @contextmanager
-def serving(make_node: Callable[[Context], Node]) -> Iterator[Any]:
+def serving(make_node: Callable[[Context], Node],
+            executor_type: Callable[..., Any] = EventsExecutor) -> Iterator[Any]:
     """Serve a node of the package in this process by a thread, with a context of its own.
 
     A contact node is started, unless its parameter autostart is false. That thread sets parameters
@@ -195,7 +196,7 @@ def serving(make_node: Callable[[Context], Node]) -> Iterator[Any]:
     context = Context()
     rclpy.init(context=context)
     node: Any = make_node(context)
-    executor = EventsExecutor(context=context)
+    executor = executor_type(context=context)
     executor.add_node(node)
     stop = Event()
     asked: SimpleQueue[Callable[[], None]] = SimpleQueue()

@@ -15,12 +15,16 @@ from types import SimpleNamespace
 
 import pytest
 from geometry_msgs.msg import PoseStamped
+from raw_client import APART, ORIGIN, TOUCHING
 from rcl_interfaces.srv import ListParameters
+from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from ros_client import Client, serving
+from std_srvs.srv import Trigger
 
 from box_contact_ros.node import contact_node, runtime
 from box_contact_ros.node.contact_node import ContactNode
@@ -190,18 +194,41 @@ def test_two_threads_shut_a_context_down():
         shut_down(SimpleNamespace(try_shutdown=fail, ok=lambda: True))
 
 
-def test_a_message_comes_with_its_time_and_number():
+EXECUTORS = (SingleThreadedExecutor, MultiThreadedExecutor, EventsExecutor)
+
+
+@pytest.mark.parametrize('executor_type', EXECUTORS)
+def test_a_message_comes_with_its_time_and_number(executor_type):
     """By the wall clock; and the number that its publisher gave it."""
     client, came = Client(), []
-    client.node.create_subscription(
-        PoseStamped, 'pose', with_info(lambda given: came.append(given)), 10)
     publisher = client.node.create_publisher(PoseStamped, 'pose', 10)
+
+    def listen(context):
+        node = Node('listener', context=context)
+        node.create_subscription(
+            PoseStamped, 'pose', with_info(lambda message, info: came.append((message, info))), 10)
+        return node
+
     before = time.time_ns()
-    assert client.spin(lambda: len(came) > 1 or publisher.publish(PoseStamped()))
+    with serving(listen, executor_type):
+        assert client.spin(lambda: len(came) > 1 or publisher.publish(PoseStamped()))
     (message, first), (_, second) = came[:2]
     assert isinstance(message, PoseStamped)
     assert before < first['received_timestamp'] <= second['received_timestamp'] <= time.time_ns()
     assert second['publication_sequence_number'] == first['publication_sequence_number'] + 1
+    client.close()
+
+
+@pytest.mark.parametrize('executor_type', EXECUTORS)
+def test_the_node_answers_in_every_executor(executor_type):
+    """Topics and services alike."""
+    client = Client()
+    with serving(lambda context: ContactNode(context), executor_type) as node:
+        client.offer_until_answered(ORIGIN, APART)
+        for _ in range(20):
+            assert client.answer(ORIGIN, TOUCHING)
+        assert client.call(Trigger, 'contact_node/reset', Trigger.Request()).success
+        assert not any(name.startswith('refused') for name in node.counts)
     client.close()
 
 
