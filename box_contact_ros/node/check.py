@@ -17,7 +17,7 @@ from ..scene.scene_solver import SceneSolver
 from ..solver.checks import nearest_name, pose_fault, short_repr, size_fault
 from ..solver.contact_solver import ContactSolver
 from ..solver.models import most_near
-from .messages import contact_message
+from .messages import contact_message, frames_differ
 
 MOST_BOXES = 256
 MOST_PAIRS = 4096
@@ -26,6 +26,8 @@ tenth of a second, most of it for the objects of the response."""
 
 
 Row = tuple[float, ...]  # of numbers of one box
+NO_POSE: Row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+"""Pose of a new message: only the name of the box is given."""
 
 
 class Checker:
@@ -34,6 +36,7 @@ class Checker:
     def __init__(self, solver: SceneSolver) -> None:
         """Take the scene and the model; requests may name the scene's boxes without sizes."""
         self.solver, self._scene, self._model = solver, solver.scene, solver.model
+        self._fixed = {name: tuple(box.pose) for name, box in self._scene.boxes.items() if box.pose}
         self._labels = {(pair.a, pair.b): pair.label for pair in self._scene.pairs}
         self._most_pairs = min(MOST_PAIRS, most_near(str(self._model)))
         self._solver_for = functools.cache(lambda margin: ContactSolver(
@@ -52,11 +55,14 @@ class Checker:
     def _answer(self, request: Check.Request, response: Check.Response) -> None:
         """Fill in contacts; raise ValueError, with field and value, for what is refused."""
         names, places = self._names_and_places(request)
+        if self._scene.frame_id not in ('', request.header.frame_id):
+            raise ValueError('header.frame_id: ' + frames_differ(
+                'the scene', self._scene.frame_id, 'the request', request.header.frame_id))
         if not request.margin >= 0.0:
             raise ValueError(f'margin must be 0 or more, not {request.margin:g}')
         # Normals of pairs apart are computed only where one may be listed.
         solver = self._solver_for(math.inf if request.margin else 0.0)
-        poses, sizes = [_pose(box) for box in request.boxes], self._sizes(request.boxes)
+        poses, sizes = self._poses(request.boxes), self._sizes(request.boxes)
         try:
             contacts = solver.batch(np.array(poses), sizes=np.array(sizes), pairs=places)
         except ValueError:
@@ -91,6 +97,19 @@ class Checker:
         else:
             places = np.stack(np.triu_indices(count, 1), axis=1)
         return list(place_of), places
+
+    def _poses(self, boxes: Sequence[Any]) -> list[Row]:
+        """Return the pose of each box: its own, or the scene's of a box that is fixed there."""
+        poses = [_pose(box) for box in boxes]
+        for number, box in enumerate(boxes if self._fixed else ()):
+            fixed = self._fixed.get(box.name)
+            if fixed is not None:
+                if poses[number] not in (NO_POSE, fixed):
+                    raise ValueError(f'boxes[{number}] {short_repr(box.name)} is fixed in the scene'
+                                     f' at {short_repr(fixed)}, not at {short_repr(poses[number])}:'
+                                     ' leave its pose as a new message has it')
+                poses[number] = fixed
+        return poses
 
     def _sizes(self, boxes: Sequence[Any]) -> list[Row]:
         """Return full extents (3,) [m] of each box: its own, or those of the scene's box."""

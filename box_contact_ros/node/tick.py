@@ -17,10 +17,10 @@ import numpy as np
 
 from ..scene.pairing import NEVER, OVERTAKEN, PAIRINGS, Pairing, StampedPose, Tick
 from ..scene.scene_solver import ALL_BOXES, SceneSolver
-from ..solver.checks import absent_poses, are_poses, pose_fault, short_repr
+from ..solver.checks import absent_poses, are_poses, pose_fault
 from .diagnostics import TickMonitor
 from .message_bytes import VECTOR_BYTES, ContactWriter, PoseReader, aligned, header_bytes
-from .messages import NANOSECONDS, Refused
+from .messages import NANOSECONDS, Refused, frames_differ
 from .parameters import reason_of
 from .topics import PoseCallback, SceneTopics
 
@@ -192,11 +192,7 @@ class TickAnswerer:
         first, frame = ('the scene', scene.frame_id) if scene.frame_id else (
             known[0][0], known[0][1].frame_id)
         box = next(box for box, pose in known if pose is odd)
-        advice = ('the leading slash is the difference'
-                  if frame.lstrip('/') == odd.frame_id.lstrip('/')
-                  else 'publish the poses of all boxes in one frame')
-        return (f'{first} is in frame {short_repr(frame)}, {box} in {short_repr(odd.frame_id)}: '
-                f'{advice}')
+        return frames_differ(first, frame, box, odd.frame_id)
 
     def _refuse(self, error: Exception, topic: str, box: str = '') -> None:
         """Count what was refused, and hand it to the next report."""

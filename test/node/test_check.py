@@ -14,6 +14,7 @@ import pytest
 from raw_client import APART, ORIGIN, TOUCHING
 from rclpy.parameter import Parameter
 from ros_client import Client, serving
+from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 from typed_messages import a_box, a_pair
 
@@ -22,7 +23,7 @@ from box_contact_ros import ContactSolver, SceneSolver
 from box_contact_ros.node.check import MOST_BOXES, MOST_PAIRS, Checker
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import contacts_by_pair
-from box_contact_ros.scene.scene_solver import Box, Pair, Scene
+from box_contact_ros.scene.scene_solver import EVERY_PAIR, Box, Pair, Scene
 
 CUBE = tuple(poses.CUBE)
 SCENE = Scene({name: Box(name, CUBE) for name in ('load', 'stack', 'lorry')},
@@ -62,6 +63,34 @@ def test_boxes_of_the_scene_need_no_size(checker: Checker) -> None:
                      a_box('lorry', TOUCHING), pairs=[a_pair('stack', 'load')])
     entry, = response.contacts.contacts
     assert (entry.pair, entry.box_a, entry.normal.z) == ('stack_load', 'stack', 1.0)
+
+
+FIXED = (10, 0, 1, 0, 0, 0, 1)
+YARD = Scene({'load': Box('load', CUBE), 's1': Box('s1', CUBE, FIXED)}, patterns=EVERY_PAIR,
+             frame_id='yard')
+
+
+@pytest.mark.parametrize('place, depths', [((10, 0, 2.9, 0, 0, 0, 1), [0.1]),
+                                           ((0, 0, 1.9, 0, 0, 0, 1), [])])
+@pytest.mark.parametrize('s1', [ORIGIN, FIXED])
+def test_a_fixed_box_is_where_the_scene_says(place: Any, depths: list[float], s1: Any) -> None:
+    """Without a pose of its own, as a new message is, or with the scene's."""
+    response = asked(Checker(SceneSolver(YARD)), a_box('load', place), a_box('s1', s1),
+                     header=Header(frame_id='yard'))
+    assert response.success
+    assert [entry.depth for entry in response.contacts.contacts] == pytest.approx(depths)
+
+
+@pytest.mark.parametrize('s1, frame, words', [
+    ((10, 0, 1.5, 0, 0, 0, 1), 'yard', "boxes[1] 's1' is fixed in the scene at (10, 0, 1, 0, 0, 0"),
+    ((0, 0, 0, 0, 0, 1, 0), 'yard', 'not at (0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0): leave its pose'),
+    (ORIGIN, 'map', "header.frame_id: the scene is in frame 'yard', the request in 'map': send"),
+    (ORIGIN, '/yard', 'the leading slash is the difference'),
+    (ORIGIN, '', "the request in ''")])
+def test_what_contradicts_the_scene_is_refused(s1: Any, frame: str, words: str) -> None:
+    response = asked(Checker(SceneSolver(YARD)), a_box('load', ORIGIN), a_box('s1', s1),
+                     header=Header(frame_id=frame))
+    assert not response.success and words in response.message
 
 
 def test_near_is_what_is_apart_within_the_margin(checker: Checker) -> None:
