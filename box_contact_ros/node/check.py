@@ -14,7 +14,7 @@ import numpy as np
 from box_contact_msgs.srv import Check
 
 from ..scene.scene_solver import SceneSolver
-from ..solver.checks import nearest_name, pose_fault, short_repr, size_fault
+from ..solver.checks import name_fault, nearest_name, pose_fault, short_repr, size_fault
 from ..solver.contact_solver import ContactSolver
 from ..solver.models import most_near
 from .messages import contact_message, frames_differ
@@ -55,6 +55,8 @@ class Checker:
     def _answer(self, request: Check.Request, response: Check.Response) -> None:
         """Fill in contacts; raise ValueError, with field and value, for what is refused."""
         names, places = self._names_and_places(request)
+        if fault := name_fault(request.header.frame_id):
+            raise ValueError(f'header.frame_id: {fault}')
         if self._scene.frame_id not in ('', request.header.frame_id):
             raise ValueError('header.frame_id: ' + frames_differ(
                 'the scene', self._scene.frame_id, 'the request', request.header.frame_id))
@@ -88,6 +90,8 @@ class Checker:
                              f'most {self._most_pairs} per request: name the pairs that matter')
         place_of: dict[str, int] = {}
         for number, box in enumerate(request.boxes):
+            if fault := name_fault(box.name):
+                raise ValueError(f'boxes[{number}].name: {fault}')
             if place_of.setdefault(box.name, number) != number:
                 raise ValueError(f'boxes[{number}]: {short_repr(box.name)} is the name of '
                                  f'boxes[{place_of[box.name]}], too')

@@ -18,7 +18,7 @@ import numpy as np
 from ..core import LENGTH_MAX, QUATERNION_MAX, QUATERNION_MIN, native
 from ..scene.pairing import StampedPose
 from ..scene.scene_solver import Answer, Pair, Scene
-from ..solver.checks import pose_fault
+from ..solver.checks import MOST_NAME_BYTES, pose_fault
 from .messages import NANOSECONDS, Refused
 
 ENCAPSULATION = 4
@@ -91,6 +91,8 @@ def _parse_frame(data: bytes, length: int, message: str) -> str:
     frame = data[FRAME_AT:FRAME_AT + length]
     if length and frame.find(b'\0') != length - 1:
         raise Refused(f'not a {message}', 'frame_id does not end with its first zero')
+    if length > MOST_NAME_BYTES + 1:  # with its zero
+        raise Refused('bad header', f'frame_id has {length - 1} bytes, more than {MOST_NAME_BYTES}')
     try:
         return frame[:-1].decode('utf-8')
     except UnicodeDecodeError:

@@ -20,7 +20,7 @@ from box_contact_msgs.msg import Contacts
 
 from ..scene.scene_solver import ALL_BOXES, Pair, Scene
 from ..solver.checks import short_repr
-from .rclpy_workarounds import with_info
+from .rclpy_workarounds import RCLError, with_info
 
 MOST_PAIRS_WITH_TOPICS = 1000
 """Two publishers a pair take milliseconds and memory, here and in every process that listens."""
@@ -70,15 +70,21 @@ class SceneTopics:
         if len(labels) < len(pairs):
             raise ValueError(f'scene: {labels.most_common(1)[0][0]} is the name of two pairs: list '
                              'one of them with a name of its own')
+        topics = [topic for pair in pairs for topic in self._topics_of(pair)]
+        for topic in (f'{prefix}contacts', *topics, *scene.sources.values()):
+            try:
+                node.resolve_topic_name(topic)
+            except RCLError as error:
+                raise ValueError(f'topic {short_repr(topic)}: {error}') from error
         self._subscriptions: dict[str, Subscription] = {}
         self.of_pair: dict[tuple[int, int], tuple[Publisher, Publisher]] = {}
         self.contacts = self._publisher(Contacts, f'{prefix}contacts',
                                         qos_overriding_options=QOS_OVERRIDES)
         for pair in pairs:
-            topic = self._topic_of(pair)
+            point, normal = self._topics_of(pair)
             boxes = scene.index_of[pair.a], scene.index_of[pair.b]
-            self.of_pair[boxes] = (self._publisher(PointStamped, f'{topic}/point'),
-                                   self._publisher(Vector3Stamped, f'{topic}/normal'))
+            self.of_pair[boxes] = (self._publisher(PointStamped, point),
+                                   self._publisher(Vector3Stamped, normal))
 
     def subscribe(self, scene: Scene, callback_of: Callable[[str, str], PoseCallback]) -> None:
         """Subscribe to all poses, with the callback for the bytes of a box and its topic."""
@@ -123,8 +129,9 @@ class SceneTopics:
                 return f'{topic} is published with another quality of service: {reason}'
         return f'{topic} has {len(offers)} of {wanted}, silent so far'
 
-    def _topic_of(self, pair: Pair) -> str:
-        return f'{self._prefix}{pair.name}{"/" if pair.name else ""}contact'
+    def _topics_of(self, pair: Pair) -> tuple[str, str]:
+        topic = f'{self._prefix}{pair.name}{"/" if pair.name else ""}contact'
+        return f'{topic}/point', f'{topic}/normal'
 
     def _publisher(self, message: type, topic: str, **options: Any) -> Publisher:
         # Without events: an event that waits in EventsExecutor outlives a publisher that is

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import LENGTH_MAX, native
-from ..solver.checks import as_floats, pose_fault, short_repr, size_fault
+from ..solver.checks import as_floats, name_fault, pose_fault, short_repr, size_fault
 from ..solver.contact import Contact, Contacts
 from ..solver.contact_solver import BY_PLACE, ContactSolver
 from ..solver.models import Model
@@ -90,6 +90,9 @@ class Scene:
     patterns: tuple[Pattern, ...] = ()
 
     def __post_init__(self) -> None:
+        fault = name_fault(self.frame_id)
+        if fault:
+            raise Fault(('frame_id',), fault)
         _check_boxes(self.boxes)
         _check_pairs(self.boxes, self.pairs)
         for number, (a, b) in enumerate(self.patterns):
@@ -259,6 +262,9 @@ class Fault(ValueError):
 def _check_boxes(boxes: Mapping[str, Box]) -> None:
     """Raise Fault for the first thing that is wrong with a box."""
     for name, box in boxes.items():
+        fault = name_fault(name)
+        if fault:
+            raise Fault(('boxes',), fault)
         for key, given, count in (('size', box.size, 3), ('pose', box.pose, 7)):
             if given is not None and (not isinstance(given, tuple | list) or len(given) != count):
                 raise Fault(('boxes', name, key),
@@ -277,6 +283,9 @@ def _check_pairs(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
     """Raise Fault for the first thing that is wrong with listed pairs."""
     for number, pair in enumerate(pairs):
         path = ('pairs', number)
+        fault = name_fault(pair.name)
+        if fault and pair.name != f'{pair.a}_{pair.b}':
+            raise Fault((*path, 'name'), fault)
         for side, name in (('a', pair.a), ('b', pair.b)):
             if name not in boxes:
                 raise Fault((*path, side), f'{short_repr(name)} is none of the boxes')

@@ -20,6 +20,9 @@ from numpy.typing import ArrayLike
 from ..core import LENGTH_MAX, LENGTH_MIN, QUATERNION_MAX, QUATERNION_MIN
 
 SHOWN = 200  # characters of a refused value that an error shows
+MOST_NAME_BYTES = 255
+"""Of the name of a box or pair, and of a frame_id, in UTF-8; ROS's own names have no more. A
+response may repeat a name thousands of times."""
 _REPR = reprlib.Repr()
 _REPR.maxlist = _REPR.maxtuple = 8  # a pose, and whether there is more
 _REPR.maxlevel = 3
@@ -43,6 +46,14 @@ def nearest_name(name: object, known: Iterable[str]) -> str:
     spelled = {name.lower(): name for name in known}
     nearest = ''.join(get_close_matches(str(name)[:SHOWN].lower(), spelled, n=1))
     return nearest and f' (did you mean {spelled[nearest]}?)'
+
+
+def name_fault(name: str) -> str | None:
+    """Return why a text is too long to be a name or a frame_id, or None."""
+    size = len(name.encode(errors='surrogatepass'))
+    if size <= MOST_NAME_BYTES:
+        return None
+    return f'{short_repr(name)} has {size} bytes, more than {MOST_NAME_BYTES}'
 
 
 def pose_fault(pose: Sequence[float] | np.ndarray) -> str | None:

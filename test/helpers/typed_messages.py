@@ -81,6 +81,8 @@ def _stamped(numbers: np.ndarray, header: Header) -> StampedPose:
         raise Refused('bad header', 'a second or more of nanoseconds')
     if '\N{REPLACEMENT CHARACTER}' in header.frame_id:  # what rclpy makes of other bytes
         raise Refused('bad header', 'frame_id is not UTF-8')
+    if len(header.frame_id.encode()) > 255:
+        raise Refused('bad header', 'frame_id is too long')
     return StampedPose(numbers, header.frame_id,
                        header.stamp.sec * NANOSECONDS + header.stamp.nanosec)
 

@@ -111,6 +111,10 @@ GOOD = a_box('p', ORIGIN, CUBE)
 @pytest.mark.parametrize('boxes, fields, words', [
     ([], {}, 'boxes: a request has 2 to 256 boxes, not 0'),
     ([GOOD], {}, 'boxes: a request has 2 to 256 boxes, not 1'),
+    ([a_box('p' * 256, ORIGIN, CUBE), GOOD], {}, "boxes[0].name: 'ppp"),
+    ([a_box('ö' * 128, ORIGIN, CUBE), GOOD], {}, 'has 256 bytes, more than 255'),
+    ([GOOD, a_box('load', ORIGIN)], {'header': Header(frame_id='f' * 256)},
+     "header.frame_id: 'fff"),
     ([GOOD, GOOD], {}, "boxes[1]: 'p' is the name of boxes[0], too"),
     ([GOOD, a_box('laod', ORIGIN)], {},
      "boxes[1] 'laod' has no size, and is no box of the scene (did you mean load?)"),

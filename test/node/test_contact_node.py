@@ -4,6 +4,7 @@
 """The contact node over DDS: in this process and as a process of its own."""
 from __future__ import annotations
 
+import json
 import math
 import signal
 import subprocess
@@ -25,6 +26,7 @@ from box_contact_ros.node.messages import contacts_by_pair
 
 CUBES = {'size_a': [2.0, 2.0, 2.0], 'size_b': [2.0, 2.0, 2.0], 'model': 'exact'}
 PAIR = 'box_a_box_b'
+SIZE = list(PARAMETERS['size_a'].default)
 
 
 def overrides(**values):
@@ -176,7 +178,15 @@ def test_quality_of_service_can_be_overridden(client):
 # --- processes ------------------------------------------------------------------------------------
 
 
-def test_a_bad_start_is_one_clear_line(program):
+def long_topics(folder):
+    """Return the path of a scene of two boxes, whose names make topics too long for ROS."""
+    path = folder / 'scene.yaml'
+    boxes = {letter * 200: {'size': [1, 1, 1]} for letter in 'ab'}
+    path.write_text(json.dumps({'boxes': boxes, 'pairs': 'all'}))
+    return path
+
+
+def test_a_bad_start_is_one_clear_line(program, tmp_path):
     """And status 1."""
     started = [(program('contact_node', *arguments(**values)), words) for values, words in (
         ({'size_a': '[0.0, 2.0, 2.0]'}, 'size_a (0, 2, 2) is not positive'),
@@ -184,6 +194,8 @@ def test_a_bad_start_is_one_clear_line(program):
         ({'model': 'paper', 'size_a': '[1.0, 2.0, 3.0]', 'size_b': '[1.0, 2.0, 3.0]'},
          "use model 'exact'"),
         ({'scene': 'config/scenes/two_boxes.yaml'}, 'size_a (2.0, 2.0, 2.0) has no effect while'),
+        ({'scene': long_topics(tmp_path), 'size_a': SIZE, 'size_b': SIZE},
+         "/contact/point': failed to resolve name: topic length should not exceed"),
         ({'qos_overrides./box_a/pose.subscription.depth': 'deep'}, "'deep' of type 'STRING'"),
         ({'size_a': '{2.0'}, "Couldn't parse"))]
     for running, words in started:

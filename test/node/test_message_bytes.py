@@ -94,6 +94,20 @@ def test_what_cdr_leaves_open_makes_no_difference(order):
                 assert (stamped.frame_id, stamped.stamp) == (frame[:-1].decode(), STAMP)
 
 
+@pytest.mark.parametrize('frame_id, is_read', [
+    ('f' * 255, True), ('f' * 256, False), ('ö' * 127, True), ('ö' * 128, False),
+    ('f' * 4_000_000, False)],
+    ids=['255', '256', '254 of two bytes', '256 of two bytes', '4 MB'])
+def test_a_long_frame_is_refused(frame_id, is_read):
+    """It would be kept. Bytes count, not characters."""
+    wanted = outcome_of(read_pose, pose_stamped(POSE, frame_id, STAMP))
+    assert (len(wanted) > 1) == is_read
+    for read, message in ((PoseReader().read_pose, pose_stamped(POSE, frame_id, STAMP)),
+                          (PoseReader().read_poses, pose_array([POSE], frame_id, STAMP))):
+        outcome = outcome_of(read, bytes(serialize_message(message)))
+        assert outcome[-2:] == (wanted[-2:] if is_read else ('bad header',))
+
+
 @pytest.mark.parametrize('message_type', TYPES)
 def test_mutated_messages_are_read_as_rclpy_reads_them(message_type):
     """3,000 of each type, and each outcome occurs. The long run is `message_fuzz.py` itself."""

@@ -32,6 +32,7 @@ from box_contact_ros.node.messages import make_header
 from box_contact_ros.node.topics import pose_qos
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.scene_solver import ALL_BOXES
+from box_contact_ros.solver.checks import MOST_NAME_BYTES
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = resource_path('msg_schemas')
@@ -168,6 +169,11 @@ def test_shared_definitions_agree():
     assert shared['coordinate']['maximum'] == -shared['coordinate']['minimum'] == LENGTH_MAX
     component = shared['quaternion_component']
     assert component['maximum'] == -component['minimum'] == QUATERNION_MAX
+    scene, request = SCHEMAS['scene.json'], SCHEMAS['check_request.json']
+    for text in (shared['name'], shared['pattern'], scene['properties']['frame_id'],
+                 shared['header']['properties']['frame_id'],
+                 request['properties']['boxes']['items']['properties']['name']):
+        assert text['maxLength'] == MOST_NAME_BYTES
 
 
 # --- live messages --------------------------------------------------------------------------------

@@ -204,6 +204,20 @@ def test_a_pair_that_is_listed_twice_is_refused():
         Scene({name: Box(name, (1, 1, 1)) for name in 'ab'}, (pair, pair))
 
 
+def test_a_name_is_no_longer_than_ros_takes():
+    """Made names of pairs may be: they are two names."""
+    def scene(a, name, frame_id=''):
+        return Scene({each: Box(each, (1, 1, 1)) for each in (a, 'b')}, (Pair(name, a, 'b'),),
+                     frame_id)
+
+    assert scene('a' * 255, f'{"a" * 255}_b').pairs[0].label.endswith('a_b')
+    for arguments, words in ((('a' * 256, ''), r"boxes: 'aaa.* has 256 bytes, more than 255"),
+                             (('a', 'p' * 256), r"pairs\[0\].name: 'ppp"),
+                             (('a', '', 'ö' * 128), "frame_id: 'ööö")):
+        with pytest.raises(ValueError, match=words):
+            scene(*arguments)
+
+
 def test_two_boxes_is_the_solver():
     rng = np.random.default_rng(2)
     solver = SceneSolver(two_boxes(poses.CUBE, poses.CONTAINER))

@@ -107,6 +107,9 @@ def test_patterns_stand_for_pairs_of_which_one_box_moves(scene_of):
     ('a: spreader, b: load', 'a: s1, b: load', 'pairs[1]: the same pair of boxes as that'),
     ('  load: {size: [12.192, 2.438, 2.591]}', '  load: {size: [1, 1, 1], pose: '
      '[0, 0, 9, 0, 0, 0, 1]}', "pairs[0]: 'load' and 's1' are both fixed"),
+    ('frame_id: map', f'frame_id: {"ö" * 128}', 'has 256 bytes, more than 255'),
+    ('name: grip', f'name: {"g" * 256}', 'is too long'),
+    ('load: {', f'{"l" * 256}: {{', 'is too long'),
     ('frame_id: map', 'frame_id: 7', "frame_id: 7 is not of type 'string'"),
     ('boxes:', 'bodies:', 'bodies'), ('boxes:', 'boxes: [', 'line'),
     (GOOD, '7\n', "7 is not of type 'object'"),
