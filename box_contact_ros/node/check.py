@@ -22,12 +22,47 @@ from .messages import contact_message, frames_differ
 MOST_BOXES = 256
 MOST_PAIRS = 4096
 """All pairs of 91 boxes. A request with as many contacts keeps the node from its ticks for about a
-tenth of a second, most of it for the objects of the response."""
+tenth of a second. The objects of the response take most of that."""
+COSTLY = 5e-3
+"""Processor time [s] beyond which a request is costly: half a tick at 100 Hz."""
+PAUSE = 4.0
+"""Pause after a costly request, divided by its time: ticks have four fifths of the node's time."""
 
 
 Row = tuple[float, ...]  # of numbers of one box
 NO_POSE: Row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 """Pose of a new message: only the name of the box is given."""
+
+
+class Throttle:
+    """Keeps clients that ask costly requests without pause from stopping all ticks.
+
+    After a costly request that took T, costly requests are refused for PAUSE · T. Whether a request
+    is costly is judged by the time per pair of the last costly one.
+    """
+
+    def __init__(self) -> None:
+        """Begin without a pause."""
+        self._until = 0.0  # end of the pause [s]
+        self._cheap = 0  # number of pairs that are not costly
+
+    def refusal(self, pairs: int, now: float) -> str | None:
+        """Return why a request of so many pairs is refused now [s], or None."""
+        if now >= self._until or pairs <= self._cheap:
+            return None
+        return (f'busy: ticks come first after a costly request; ask again in '
+                f'{self._until - now:.2g} s, or for at most {self._cheap} pairs')
+
+    def answered(self, pairs: int, cost: float, took: float, now: float) -> None:
+        """Note a request: its processor time, the time that it took, and when it ended [s]."""
+        if cost > COSTLY:
+            self._until, self._cheap = now + PAUSE * took, int(pairs * COSTLY / cost)
+
+
+def pair_count(request: Check.Request) -> int:
+    """Return how many pairs a request asks for."""
+    boxes = len(request.boxes)
+    return len(request.pairs) or boxes * (boxes - 1) // 2
 
 
 class Checker:
@@ -84,7 +119,7 @@ class Checker:
         count = len(request.boxes)
         if not 2 <= count <= MOST_BOXES:
             raise ValueError(f'boxes: a request has 2 to {MOST_BOXES} boxes, not {count}')
-        pairs = len(request.pairs) or count * (count - 1) // 2
+        pairs = pair_count(request)
         if pairs > self._most_pairs:
             raise ValueError(f'pairs: {pairs} are asked for, and model {self._model!r} answers at '
                              f'most {self._most_pairs} per request: name the pairs that matter')

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import gc
 import sys
+import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -38,7 +39,7 @@ from ..scene.scene_file import read_scene
 from ..scene.scene_solver import CONTAINER, Scene, SceneSolver, two_boxes
 from ..solver.checks import short_repr
 from ..solver.models import MODELS, check_model, most_near
-from .check import Checker
+from .check import Checker, Throttle, pair_count
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
 from .parameters import (
     Setting,
@@ -113,6 +114,7 @@ class ContactNode(GuardedNode, LifecycleNode):
         self._topics: SceneTopics | None = None  # from configure to cleanup
         self._answerer: TickAnswerer | None = None  # likewise
         self._checker: Checker | None = None  # of the solver's scene and model
+        self._throttle = Throttle()
         self.add_on_set_parameters_callback(self._set_live)
         self.create_service(Check, '~/check', self.answered(self._check, '~/check'))
         self.create_service(Trigger, '~/reset', self.answered(self._reset, '~/reset'))
@@ -242,7 +244,14 @@ class ContactNode(GuardedNode, LifecycleNode):
         solver = self._answerer.solver
         if self._checker is None or self._checker.solver is not solver:
             self._checker = Checker(solver)
-        return self._checker.answer(request, response)
+        began, used, pairs = time.monotonic(), time.thread_time(), pair_count(request)
+        if refusal := self._throttle.refusal(pairs, began):
+            response.message = refusal
+            return response
+        self._checker.answer(request, response)
+        ended = time.monotonic()
+        self._throttle.answered(pairs, time.thread_time() - used, ended - began, ended)
+        return response
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Forget all poses and stamps: a simulation begins anew."""

@@ -25,6 +25,8 @@ from .topics import SceneTopics
 
 DIAGNOSTICS_SECONDS = 1.0
 REPORT_JITTER = 0.1  # reports may be this much less than DIAGNOSTICS_SECONDS apart [s]
+BUSY_SECONDS = 1.5 * DIAGNOSTICS_SECONDS
+"""A report that comes so long after the last one tells that the node was busy, and poses wait."""
 UNMATCHED_SECONDS = 1.0  # a pair unanswered for this long is worth a warning
 UNANSWERED_SECONDS = 5.0
 """A pair unanswered for this long is an error; so long nobody has to publish after a start."""
@@ -119,10 +121,13 @@ class TickMonitor:
         self._times.clear()
         return load
 
-    def summary(self, *, came: bool, max_age: float) -> Summary:
-        """Return which pairs are not answered; `came`: whether any pose did."""
+    def summary(self, *, came: bool, was_busy: bool, max_age: float) -> Summary:
+        """Return which pairs are not answered.
+
+        came: whether any pose did. was_busy: whether poses may wait that the node could not take.
+        """
         now = time.monotonic()
-        if came:
+        if came or (was_busy and self._heard is not None):
             self._heard = now
         quiet = now - (self._began if self._heard is None else self._heard)
         # Without poses nothing is asked. A simulation may pause.
@@ -180,17 +185,19 @@ class Diagnostics:
         new = self._counts - self._reported
         self._reported = Counter(self._counts)
         load = self._monitor.take_load(lost)
-        summary = self._monitor.summary(came=new['poses'] > 0, max_age=1e-9 * pairing.max_age)
+        summary = self._monitor.summary(
+            came=new['poses'] > 0, was_busy=load.seconds > BUSY_SECONDS,
+            max_age=1e-9 * pairing.max_age)
         unseen = [box for box in pairing.unseen() if box not in self._monitor.refused_boxes]
         stale = self._monitor.absent if scene.pose_array else pairing.stale()
         findings = [] if state != ACTIVE else list(_findings(
             summary, [name.partition(': ')[2] for name in new if name.startswith('refused')],
             unseen, stale, scene, pairing, topics))
         sent = (new['poses'] + load.lost) / len(scene.streams)
-        if state == ACTIVE and load.evaluations:
+        if state == ACTIVE:
             findings += _lateness(load, sent, new[OVERTAKEN])
         self._log(findings)
-        self.publish(findings, state=state, load=load, values={
+        self.publish(findings, state=state, load=load, came=new['poses'] > 0, values={
             'model': solver.model, 'pairs': scene.pair_count, 'stale boxes': ' '.join(stale),
             'boxes that never came': ' '.join(unseen),
             'unanswered pairs': len(summary.unanswered), 'waiting ticks': pairing.waiting_ticks,
@@ -199,8 +206,11 @@ class Diagnostics:
                 count for name, count in new.items() if name.startswith('dropped'))})
 
     def publish(self, findings: Sequence[Finding] = (), *, state: str, load: Load | None = None,
-                values: Mapping[str, Any] | None = None) -> None:
-        """Publish counts, findings and further values; `state` is that of the lifecycle."""
+                came: bool = False, values: Mapping[str, Any] | None = None) -> None:
+        """Publish counts, findings and further values.
+
+        state: that of the lifecycle. came: whether any pose did since the last report.
+        """
         entries: dict[str, Any] = {**self._counts, 'lifecycle state': state, **(values or {})}
         if load:
             entries['rate [1/s]'] = round(load.evaluations / load.seconds)
@@ -212,7 +222,7 @@ class Diagnostics:
             findings = [Finding('state', f'{state}: no pose is answered')]
         level = max((finding.level for finding in findings), default=OK)
         message = '; '.join(finding.message for finding in findings) or (
-            'answering' if load and load.evaluations else 'no poses')
+            'answering' if load and load.evaluations else 'no answers' if came else 'no poses')
         status = DiagnosticStatus(
             level=level, name=f'{self._node.get_fully_qualified_name()}: contacts',
             message=message, hardware_id='none',
@@ -234,13 +244,18 @@ class Diagnostics:
 
 def _lateness(load: Load, sent: float, overtaken: int) -> Iterator[Finding]:
     """Yield that answers are late, or poses left out for newer ones; sent: poses per box."""
+    remedy = ('the node is too slow for these poses; give it a core of its own, list fewer pairs, '
+              'set pair_topics to false, or send poses less often')
+    if not load.evaluations:
+        if overtaken:
+            yield Finding('late', f'answers are late: none for {load.seconds:.1f} s; '
+                                  f'{load.lost + overtaken} poses lost', remedy)
+        return
     age = float(np.median(load.ages[-NEWEST_ANSWERS:]))
     ticks = 1e-3 * age * sent / load.seconds
     if ticks > LATE_TICKS or overtaken:
         yield Finding('late', f'answers are late: {age:.0f} ms, {ticks:.0f} ticks; '
-                              f'{load.lost + overtaken} poses lost',
-                      'the node is too slow for these poses; give it a core of its own, list fewer '
-                      'pairs, set pair_topics to false, or send poses less often')
+                              f'{load.lost + overtaken} poses lost', remedy)
 
 
 def _findings(summary: Summary, refused: Sequence[str], unseen: Sequence[str],

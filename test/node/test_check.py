@@ -20,7 +20,7 @@ from typed_messages import a_box, a_pair
 
 from box_contact_msgs.srv import Check
 from box_contact_ros import ContactSolver, SceneSolver
-from box_contact_ros.node.check import MOST_BOXES, MOST_PAIRS, Checker
+from box_contact_ros.node.check import MOST_BOXES, MOST_PAIRS, Checker, Throttle
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import contacts_by_pair
 from box_contact_ros.scene.scene_solver import EVERY_PAIR, Box, Pair, Scene
@@ -144,6 +144,21 @@ def test_a_large_request_is_refused_at_its_size(checker: Checker) -> None:
     assert 'not 257' in checker.answer(request, Check.Response()).message
 
 
+def test_costly_requests_pause_for_ticks() -> None:
+    """For four times as long as one took; those of fewer pairs, that are not costly, do not."""
+    throttle = Throttle()
+    throttle.answered(4095, 0.005, 1.0, 10.0)
+    assert throttle.refusal(4095, 10.0) is None
+    throttle.answered(4095, 0.05, 0.1, 10.0)
+    assert throttle.refusal(410, 10.0) == (
+        'busy: ticks come first after a costly request; ask again in 0.4 s, or for at most 409 '
+        'pairs')
+    assert throttle.refusal(410, 10.39) and throttle.refusal(410, 10.4) is None
+    assert throttle.refusal(409, 10.0) is None
+    throttle.answered(409, 0.001, 0.001, 10.1)
+    assert throttle.refusal(410, 10.2)
+
+
 def test_a_soup_answers_few_pairs() -> None:
     """Its pairs take up to a third of a second; and it knows no axis of those apart."""
     pytest.importorskip('fcl')
@@ -192,6 +207,19 @@ def test_a_check_leaves_the_ticks_alone(client: Client) -> None:
         assert client.answer(ORIGIN, APART) == {}
         assert not check(client, ORIGIN, [0] * 7).success
         client.ask(ORIGIN, TOUCHING)
+
+
+def test_a_costly_request_right_after_another_is_busy(client: Client) -> None:
+    """A cheap one between the same two is answered."""
+    costly = Check.Request(boxes=[a_box(f'{n}', ORIGIN, CUBE) for n in range(91)])
+    cheap = Check.Request(boxes=costly.boxes[:2])
+    with serving(lambda context: ContactNode(context, parameter_overrides=overrides())):
+        service = client._client_of(Check, 'contact_node/check')
+        futures = [service.call_async(request) for request in (costly, cheap, costly)]
+        assert client.spin(lambda: all(future.done() for future in futures))
+    first, between, second = (future.result() for future in futures)
+    assert len(first.contacts.contacts) == 4095 and between.success
+    assert not second.success and second.message.startswith('busy: ')
 
 
 @pytest.mark.parametrize('by_topics', [False, True])

@@ -59,6 +59,12 @@ def node(program, client):
     return running
 
 
+def environment():
+    """Return this process's environment, with the helpers on Python's path."""
+    return {**os.environ, 'PYTHONPATH': os.pathsep.join(
+        filter(None, (str(HELPERS), os.environ.get('PYTHONPATH'))))}
+
+
 def memory(running):
     """Resident memory of a program [MB]."""
     with open(f'/proc/{running.process.pid}/status') as file:
@@ -245,13 +251,43 @@ while True:
 """
 
 
+GREEDY = """
+from raw_client import ORIGIN
+from ros_client import Client
+from typed_messages import a_box
+from box_contact_msgs.srv import Check
+client = Client()
+service = client._client_of(Check, 'contact_node/check')
+request = Check.Request(boxes=[a_box(f'{n}', ORIGIN, (1, 1, 1)) for n in range(91)])
+asked = [service.call_async(request) for _ in range(8)]
+while True:
+    client.poll()
+    for place, future in enumerate(asked):
+        if future.done():
+            print('answered' if future.result().success else 'refused', flush=True)
+            asked[place] = service.call_async(request)
+"""
+
+
+def test_ticks_beside_a_greedy_client(node, client):
+    """It always has eight costly requests under way. Most are refused, and ticks come between."""
+    with subprocess.Popen([sys.executable, '-c', GREEDY], stdout=subprocess.PIPE, text=True,
+                          env=environment()) as greedy:
+        try:
+            assert greedy.stdout.readline() == 'answered\n'
+            for _ in range(50):
+                client.ask(ORIGIN, TOUCHING)
+        finally:
+            greedy.kill()
+        outcomes = greedy.stdout.read().split()
+    assert 4 * outcomes.count('answered') < outcomes.count('refused')
+
+
 def test_publishers_killed_and_started_again(node, client):
     """Each dies in mid-stream by kill -9: the next one is answered, and so are all others."""
-    environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(
-        filter(None, (str(HELPERS), os.environ.get('PYTHONPATH'))))}
     for _ in range(2):
         with subprocess.Popen([sys.executable, '-c', STREAM], stdout=subprocess.PIPE, text=True,
-                              env=environment) as publisher:
+                              env=environment()) as publisher:
             try:
                 assert publisher.stdout.readline() == 'answered\n'
                 client.spin(lambda: False, 0.5)
