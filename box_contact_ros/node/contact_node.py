@@ -38,7 +38,7 @@ from ..scene.pairing import PAIRINGS, RESETS
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import CONTAINER, Scene, SceneSolver, two_boxes
 from ..solver.checks import short_repr
-from ..solver.models import MODELS, check_model, most_near
+from ..solver.models import MODELS, NATIVE, check_model, most_near
 from .check import Checker, Throttle, pair_count
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
 from .parameters import (
@@ -86,15 +86,26 @@ PARAMETERS = {
     'pair_topics': Setting(True, 'whether pairs have topics of their own next to contacts', flag),
     'autostart': Setting(True, 'whether the node configures and activates itself', flag),
 }
-LIVE = ('model', 'tolerance', 'max_age')
-"""The parameters that may be set while the node runs; none of them touches a topic."""
+
+
+def live_model(name: str, value: Any) -> str:
+    """Check the name of a model that a running node takes: one in C++, ready at once."""
+    if model(name, value) not in NATIVE:
+        raise ValueError(f'{name} {value!r} needs a new start: a running node takes '
+                         f'{" or ".join(NATIVE)}')
+    return str(value)
+
+
+LIVE = {'model': live_model} | {name: PARAMETERS[name].check for name in ('tolerance', 'max_age')}
+"""The parameters that may be set while the node runs, and what they may be then; none of them
+touches a topic."""
 
 
 class ContactNode(GuardedNode, LifecycleNode):
     """Wires parameters, topics, ticks and diagnostics to the states of a lifecycle node.
 
     A node on another method derives from this one. It sets `name`, the `prefix` of its contact
-    topics and its `parameters` (all of these but `model`), and makes the solver.
+    topics and its `parameters` (all of these but `model`), and names the model.
     """
 
     name: ClassVar[str] = 'contact_node'
@@ -126,10 +137,9 @@ class ContactNode(GuardedNode, LifecycleNode):
                           on_clock_change=True), post_callback=self._clock_jumped)
 
     @staticmethod
-    def make_solver(values: Mapping[str, Any], scene: Scene) -> SceneSolver:
-        """Return the solver that checked parameters ask for, or raise ValueError."""
-        return SceneSolver(scene, model=values['model'], margin=values['margin'],
-                           most_near=most_near(values['model']))
+    def model_of(values: Mapping[str, Any]) -> str:
+        """Return the name of the model that checked parameters ask for."""
+        return str(values['model'])
 
     def start(self) -> None:
         """Configure and activate; raise what keeps the node from it."""
@@ -197,7 +207,7 @@ class ContactNode(GuardedNode, LifecycleNode):
             scene = read_scene(values['scene'])
         else:
             scene = two_boxes(values['size_a'], values['size_b'])
-        solver = self.make_solver(values, scene)
+        solver = self._make_solver(values, scene)
         topics = SceneTopics(self, self.prefix, scene, pair_topics=values['pair_topics'])
         try:
             answerer = TickAnswerer(solver, topics, values, self.counts, self._monitor)
@@ -208,16 +218,22 @@ class ContactNode(GuardedNode, LifecycleNode):
         warn_of_unknown(self, self.parameters)
         self._values, self._topics, self._answerer = values, topics, answerer
 
+    def _make_solver(self, values: Mapping[str, Any], scene: Scene) -> SceneSolver:
+        """Return the solver that checked parameters ask for, or raise ValueError."""
+        name = self.model_of(values)
+        return SceneSolver(scene, model=name, margin=values['margin'], most_near=most_near(name))
+
     def _set_live(self, parameters: Sequence[Parameter]) -> SetParametersResult:
         """Take new values of LIVE, all or none; rclpy refuses those that are read-only."""
         try:
-            given = {parameter.name: self.parameters[parameter.name].check(
-                parameter.name, parameter.value)
-                for parameter in parameters if parameter.name in LIVE}
+            checks = LIVE if self._answerer is not None else {
+                name: setting.check for name, setting in self.parameters.items()}
+            given = {parameter.name: checks[parameter.name](parameter.name, parameter.value)
+                     for parameter in parameters if parameter.name in LIVE}
             values = {**self._values, **given}
             if self._answerer is not None and given:
                 if 'model' in given and given['model'] != self._values['model']:
-                    self._answerer.solver = self.make_solver(values, self._answerer.solver.scene)
+                    self._answerer.solver = self._make_solver(values, self._answerer.solver.scene)
                 self._answerer.set_times(values)
         except Exception as error:  # the client would wait for ever
             return SetParametersResult(successful=False, reason=reason_of(error))

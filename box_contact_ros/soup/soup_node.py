@@ -16,8 +16,7 @@ from typing import Any
 from ..node.contact_node import PARAMETERS as CONTACT_PARAMETERS
 from ..node.contact_node import ContactNode, run
 from ..node.parameters import Setting, whole_number
-from ..scene.scene_solver import Scene, SceneSolver
-from ..solver.models import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, most_near
+from ..solver.models import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
 
 PARAMETERS = {
     'divisions': Setting(
@@ -34,11 +33,9 @@ class SoupNode(ContactNode):
     parameters = PARAMETERS
 
     @staticmethod
-    def make_solver(values: Mapping[str, Any], scene: Scene) -> SceneSolver:
-        """Return the solver for a soup of so many divisions."""
-        model = f'soup-{values["divisions"]}'
-        return SceneSolver(scene, model=model, margin=values['margin'],
-                           most_near=most_near(model))
+    def model_of(values: Mapping[str, Any]) -> str:
+        """Return the name of a soup of so many divisions."""
+        return f'soup-{values["divisions"]}'
 
 
 def main(args: Sequence[str] | None = None) -> int:
