@@ -167,8 +167,8 @@ def test_one_pose_far_ahead_costs_nothing(ahead):
 def test_a_box_with_two_clocks_costs_an_unrelated_pair_no_tick(policy, pair, ahead, behind):
     """Box c is stamped by one and the other in turn; a and b are answered within one period."""
     pairing = policy(scene('abcd', ('ab', pair)), max_age=RESET)
-    events = [(box, stamp + RESET * (behind if number % 2 else ahead) * (box == 'c'))
-              for number in range(1500) for box, stamp in stream('abc', number + 1)[-3:]]
+    events = [(box, stamp + RESET * (ahead, behind)[number // 3 % 2] * (box == 'c'))
+              for number, (box, stamp) in enumerate(stream('abc', 1500))]
     answered = {tick[0]: number // 3 for number, tick in play(pairing, events)
                 if tick[0] and tick[0] == tick[1]}
     delays = [answered[START + number * 10 * MS] - number for number in range(1500 - PATIENCE)]
