@@ -42,19 +42,20 @@ BC_INLINE bool solve_pair(const Model& model, const detail::PairNumbers& pair, d
   contact.colliding = q.touching;
   contact.axis = q.pair.swapped ? swapped_axis(q.axis.axis) : q.axis.axis;
   const Triple<double> unknown = uniform(not_a_number);
-  Triple<double> normal = direction_in_common_frame(q.pair, q.axis.normal);
-  // Zeros keep no sign on a swap.
-  normal = select(q.pair.swapped, Triple<double>{} - normal, normal);
   using Found = typename Model::template Found<double>;
   if (!q.touching || std::is_same_v<Found, PointAndVolume<double>>)
     for (double(&row)[3] : contact.covariance) store(unknown, row);
   if (!q.touching) {
-    store(q.axis.separation <= margin ? normal : unknown, contact.normal);
     store(unknown, contact.point);
     contact.volume = 0.0;
-    return true;
+    store(unknown, contact.normal);
+    if (!(q.axis.separation <= margin)) return true;
   }
+  Triple<double> normal = direction_in_common_frame(q.pair, q.axis.normal);
+  // Zeros keep no sign on a swap.
+  normal = select(q.pair.swapped, Triple<double>{} - normal, normal);
   store(normal, contact.normal);
+  if (!q.touching) return true;
   Found overlap;
   model.solve(q, overlap, counts);  // a pair alone is left to nobody
   store(overlap, contact);
