@@ -15,10 +15,16 @@ import logging
 import math
 import socket
 from collections import deque
+from collections.abc import Iterator
+from http import HTTPStatus
+from ipaddress import ip_address
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 import viser
+import websockets.asyncio.server
+from websockets import Headers
 
 from ..node.messages import NANOSECONDS
 from ..scene.scene_solver import Answer
@@ -30,6 +36,8 @@ HISTORY = 12.0  # length [s] of the charts
 ROOM = 0.1  # above the values of a chart, as a share of them
 LEAST_DEPTH, LEAST_FORCE = 1.0, 1.0
 """[mm], [kN]: what charts show at least, not to magnify noise."""
+MESSAGE_LIMIT = 1 << 20
+"""Longest message [bytes] of a browser; the page sends a few hundred."""
 PANEL_WIDTH = 300  # pixels
 GROUND, LINES, SECTIONS = (236, 238, 241), (206, 211, 217), (176, 183, 191)
 GROUND_SIZE = 60.0  # length [m] of the ground at least
@@ -48,7 +56,10 @@ LEGEND = ''.join(f'<span style="white-space:nowrap;color:rgb{colour}">■</span>
 
 
 class Server(viser.ViserServer):
-    """A viser server that opens no public tunnel, which any browser could ask for."""
+    """A viser server that serves its own page alone.
+
+    It opens no public tunnel, which any browser could ask for.
+    """
 
     def __init__(self, host: str, port: int) -> None:
         """Serve at a port, or the next that is free. Raises OSError."""
@@ -57,11 +68,60 @@ class Server(viser.ViserServer):
             pass
         # Browsers open connections on suspicion, and close them unused; that is no error.
         logging.getLogger('websockets').setLevel(logging.CRITICAL)
-        with contextlib.redirect_stdout(io.StringIO()):  # viser greets
-            super().__init__(host, port, 'box_contact_ros', verbose=False)
+        with contextlib.redirect_stdout(io.StringIO()), closed_to_other_sites(host):
+            super().__init__(host, port, 'box_contact_ros', verbose=False)  # viser greets
 
     def request_share_url(self, verbose: bool = True) -> None:
         """Do nothing."""
+
+
+@contextlib.contextmanager
+def closed_to_other_sites(host: str) -> Iterator[None]:
+    """Let a server that viser starts refuse requests of other sites' pages, and large messages.
+
+    viser has no option for either, so its way to serve is wrapped while it starts. Raises
+    RuntimeError if it serves in another way.
+    """
+    serve, wrapped = websockets.asyncio.server.serve, False
+
+    def serve_own_page(*arguments: Any, process_request: Any, **options: Any) -> Any:
+        def answer(connection: Any, request: Any) -> Any:
+            if names_own_page(request.headers, host):
+                return process_request(connection, request)
+            return connection.respond(HTTPStatus.FORBIDDEN, 'Origin or Host is not of this page\n')
+
+        nonlocal wrapped
+        wrapped = True
+        return serve(*arguments, **options | {'process_request': answer,
+                                              'max_size': MESSAGE_LIMIT})
+
+    websockets.asyncio.server.serve = serve_own_page
+    try:
+        yield
+    finally:
+        websockets.asyncio.server.serve = serve
+    if not wrapped:
+        raise RuntimeError('this viser does not serve by websockets.asyncio.server.serve, so '
+                           'its page would be open to every site')
+
+
+def names_own_page(headers: Headers, host: str) -> bool:
+    """Return whether Host and Origin, where given, both name the page; host: what it serves at.
+
+    The page of another site sends its own Origin. A site whose name leads here sends its name as
+    Host, too. No site can take over an address, `localhost`, or this machine's name.
+    """
+    urls = [f'//{name}' for name in headers.get_all('Host')] + headers.get_all('Origin')
+    if not urls:
+        return True
+    try:
+        netloc, = {urlsplit(url).netloc for url in urls}
+        name = urlsplit(f'//{netloc}').hostname or ''
+        if name not in (host.lower(), 'localhost', socket.gethostname().lower()):
+            ip_address(name)
+    except ValueError:  # two names, or one of a stranger
+        return False
+    return True
 
 
 class Page:

@@ -11,6 +11,7 @@ import signal
 import time
 from contextlib import closing
 from dataclasses import replace
+from http.client import HTTPConnection
 
 import numpy as np
 import poses
@@ -29,6 +30,7 @@ import viser
 from browser import chromium, open_page
 from PIL import Image
 from typed_messages import changed, contacts_at, pose_array, pose_stamped
+from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import connect
 
 from box_contact_ros import ContactSolver
@@ -46,7 +48,7 @@ from box_contact_ros.view.listener import (
     read_touching,
 )
 from box_contact_ros.view.page import CUBE as CUBE_CORNERS
-from box_contact_ros.view.page import Page, camera_position, figures
+from box_contact_ros.view.page import Page, Server, camera_position, figures
 from box_contact_ros.view.style import BOX_A, BOX_B, CONTACT, patch_axes, patch_sides
 from box_contact_ros.view.view import ViewNode
 
@@ -334,6 +336,57 @@ def test_no_browser_opens_a_public_tunnel(page, monkeypatch):
             bring(page, tick_of(START, TOUCHING, {PAIR: EXACT}))
             assert client.recv(PATIENCE)
     assert tunnels == []
+
+
+SITE = 'http://box-contact.example:8450'
+
+
+def status_of(page, headers, upgrade=('websocket',)):
+    """Return the status of a request under headers: for the WebSocket, or for the page itself."""
+    with closing(HTTPConnection(page.url.removeprefix('http://'), timeout=PATIENCE)) as client:
+        client.putrequest('GET', '/', skip_host=True)
+        fixed = {'Connection': 'Upgrade', 'Sec-WebSocket-Version': 13,
+                 'Sec-WebSocket-Key': 'AAAAAAAAAAAAAAAAAAAAAA=='}
+        for name, value in [*fixed.items(), *(('Upgrade', name) for name in upgrade), *headers]:
+            client.putheader(name, value)
+        client.endheaders()
+        return client.getresponse().status
+
+
+@pytest.mark.parametrize(('host', 'origin', 'served'), [
+    ('{own}', 'http://{own}', True), ('{own}', SITE, False),
+    ('{own}', 'null', False),  # of a file, or of a frame without rights
+    ('box-contact.example:8450', SITE, False),  # a site whose name leads here
+    ('localhost:9000', 'http://localhost:9000', True),  # through a tunnel
+    ('{own}', 'http://localhost:8450', False), ('[::1', '', False), ('{own}', '', True),
+    ('', '', True), ('', SITE, False)])
+def test_no_page_of_another_site_reads_the_view(page, host, origin, served):
+    """Origin and Host are the page's own, or absent."""
+    own = page.url.removeprefix('http://')
+    headers = [(name, value.format(own=own))
+               for name, value in (('Host', host), ('Origin', origin)) if value]
+    assert status_of(page, headers) == (101 if served else 403)
+    assert status_of(page, headers, upgrade=()) == (200 if served else 403)
+    assert status_of(page, [*headers, ('Origin', SITE)]) == 403  # one of two
+
+
+def test_a_message_of_2_mb_ends_its_connection_alone(page):
+    options = {'subprotocols': [f'viser-v{viser.__version__}'], 'max_size': None, 'proxy': None}
+    with connect(page.url.replace('http', 'ws'), **options) as other:
+        with connect(page.url.replace('http', 'ws'), **options) as client:
+            client.send(msgspec.msgpack.encode([None] * 2_000_000))
+            with pytest.raises(ConnectionClosedError, match='1009'):
+                while client.recv(PATIENCE):
+                    pass
+        bring(page, tick_of(START, TOUCHING, {PAIR: EXACT}))
+        assert other.recv(PATIENCE)
+
+
+def test_a_viser_that_serves_in_another_way_does_not_start(monkeypatch):
+    """Its page would be open to every site."""
+    monkeypatch.setattr('viser.ViserServer.__init__', lambda *arguments, **options: None)
+    with pytest.raises(RuntimeError, match='this viser does not serve by websockets'):
+        Server('127.0.0.1', 8450)
 
 
 in_browser = pytest.mark.skipif(chromium() is None,
