@@ -6,7 +6,7 @@
 `box_a` is the load on the ropes, `box_b` the stack. Each tick publishes both poses under one stamp.
 The node then waits for the answer to them on `contacts`, at most for most of the tick, and
 simulates the tick under the patch of the newest answer. A contact acts from the time at which it
-really came. In lockstep simulated time waits for each answer instead.
+really came. In lockstep simulated time waits for each answer instead, so every landing is the same.
 
 The landing ends 8 s after the first touch. The exit status is 0 only if the stack carries the load
 and no answer was lost.
@@ -40,7 +40,6 @@ from .landing import CORNER_SPEED_LIMIT, ClosedLoop, Landing, LandingRecord, Loo
 FRAME = 'world'  # of the published poses
 OFFER_PERIOD = 0.1  # time between the pairs that only ask whether anyone answers [s]
 ANSWER_SHARE = 0.8  # share of a tick that waits for its answer; the rest is for simulating it
-LOCKSTEP_PATIENCE = 5.0  # time without an answer that ends a run in lockstep [s]
 DRAIN = 1.0  # patience for the last answers [s]
 LOOK_PERIOD = 0.05  # time after which a signal is noticed, at most [s]
 LOOK_RATE = 30.0  # forces published, and looks at the landing's stage, at most [Hz]
@@ -52,6 +51,7 @@ PARAMETERS = {
     'rate': Setting(200.0, 'pairs of poses published per second [Hz]', number(1, 2000)),
     'wait': Setting(30.0, 'patience for a contact node to answer [s]', number(0, 600)),
     'lockstep': Setting(False, 'no real time: every tick waits for its answer', flag),
+    'paced': Setting(False, 'in lockstep, never faster than real time', flag),
 }
 
 
@@ -64,8 +64,8 @@ class CraneNode(GuardedNode):
         super().__init__('crane', context=context, **options)
         values = declare(self, PARAMETERS)
         warn_of_unknown(self, PARAMETERS)
-        self._rate, self._wait, self._lockstep = (
-            values[name] for name in ('rate', 'wait', 'lockstep'))
+        self._rate, self._wait, self._lockstep, self._paced = (
+            values[name] for name in ('rate', 'wait', 'lockstep', 'paced'))
         self._look_every = math.ceil(self._rate / LOOK_RATE)
         self.loop = ClosedLoop(scenario or CraneScenario(), self._rate)
         self._asked: dict[int, LoopState | None] = {}
@@ -100,17 +100,16 @@ class CraneNode(GuardedNode):
     def lower(self, executor: Any) -> None:
         """Run the landing in real time or in lockstep, then wait a moment for the last answers.
 
-        Raises TimeoutError in lockstep when an answer stays away.
+        Raises TimeoutError in lockstep when an answer does not come within `wait` s.
         """
         gc.collect()
         gc.freeze()  # a full collection would hold up the poses for milliseconds
-        patience = LOCKSTEP_PATIENCE if self._lockstep else ANSWER_SHARE / self._rate
-        start = time.perf_counter()
+        patience = self._wait if self._lockstep else ANSWER_SHARE / self._rate
+        due = time.perf_counter()
         stages = Stages(self.loop.record)
         for tick in count():
-            if not self._lockstep:
-                # The schedule is absolute: one tick's lateness is not handed on to the next.
-                self._serve(executor, start + tick / self._rate - time.perf_counter())
+            if self._paced or not self._lockstep:
+                self._serve(executor, due - time.perf_counter())
             stamp = self._publish(self.loop.ask())
             if tick % self._look_every == 0:
                 self._publish_force(stamp)
@@ -118,10 +117,13 @@ class CraneNode(GuardedNode):
                     print(line, flush=True)
             self._serve(executor, patience, lambda: stamp not in self._asked)  # noqa: B023
             if self._lockstep and stamp in self._asked:
-                raise TimeoutError(f'no answer within {LOCKSTEP_PATIENCE:g} s')
+                raise TimeoutError(f'no answer within {self._wait:g} s')
             self.loop.step()
             if self.loop.record.ended:
                 break
+            due += 1.0 / self._rate
+            if self._lockstep:  # the time of a late answer is not made up for
+                due = max(due, time.perf_counter())
         self._serve(executor, DRAIN, lambda: not self._asked)
 
     def _serve(self, executor: Any, seconds: float, done: Callable[[], bool] = lambda: False,

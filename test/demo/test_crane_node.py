@@ -16,9 +16,10 @@ import rclpy
 from rclpy.context import Context
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.parameter import Parameter
+from test_landing import landed
 
 from box_contact_msgs.msg import Contact, Contacts
-from box_contact_ros.demo import crane_node
+from box_contact_ros.demo import crane_node, landing
 from box_contact_ros.demo.crane import CraneScenario
 from box_contact_ros.demo.landing import Landing
 from box_contact_ros.node.messages import make_header
@@ -42,10 +43,11 @@ def contact_node(program):
 
 
 def test_it_lands(program, contact_node):
-    """In lockstep: at rest, no answer lost, exit status 0, and every stage was told."""
+    """In lockstep: with the figures of a landing without ROS, and every stage was told."""
     crane = program('crane', *arguments(lockstep=True))
     assert crane.wait(200) == 0, crane.output
     assert 'PASS: the load is at rest, settled ' in crane.output
+    assert str(landed(CraneScenario(), latency=0.0)) in crane.output
     assert ' contacts, none lost; latency p50 ' in crane.output
     assert 'not met' not in crane.output
     stages = [line.split(' s  ')[1][:12].strip() for line in crane.output.splitlines()
@@ -119,12 +121,13 @@ def test_a_signal_ends_it_soon(program, number, state, lockstep):
 
 
 @pytest.fixture
-def crane():
-    """Return a crane node in this process, in lockstep, with its executor."""
+def crane(request):
+    """Return a crane node in this process, in lockstep, with its executor; param: more values."""
+    values = {'lockstep': True} | getattr(request, 'param', {})
     context = Context()
     rclpy.init(context=context)
-    node = crane_node.CraneNode(context, HARD,
-                                parameter_overrides=[Parameter('lockstep', value=True)])
+    node = crane_node.CraneNode(context, HARD, parameter_overrides=[
+        Parameter(name, value=value) for name, value in values.items()])
     executor = EventsExecutor(context=context)
     executor.add_node(node)
     yield node, executor
@@ -167,8 +170,30 @@ def test_answers_to_nobody_are_not_kept(crane):
     assert node.lost == 1 and not node.latencies and not node.loop._under_way
 
 
-def test_lockstep_ends_when_nobody_answers(crane, monkeypatch):
-    monkeypatch.setattr(crane_node, 'LOCKSTEP_PATIENCE', 0.01)
+@pytest.mark.parametrize('crane', [{'paced': True}], indirect=True)
+def test_paced_lockstep_is_never_faster_than_real_time(crane, monkeypatch):
+    """Nor does it make up for the time of a late answer."""
+    node, executor = crane
+    monkeypatch.setattr(landing, 'DURATION', 0.5)
+    publish, began, late, period = node._publish, [], 40, 1.0 / 200.0
+
+    def publish_and_answer(state):
+        began.append(time.perf_counter())
+        stamp = publish(state)
+        time.sleep(20 * period if state.tick == late else 0.0)
+        node._on_contacts(answer_to(stamp, volume=0.0))
+        return stamp
+
+    monkeypatch.setattr(node, '_publish', publish_and_answer)
+    node.lower(executor)
+    assert len(began) == 100
+    for ticks in (began[:late + 1], began[late + 1:]):
+        assert ticks[-1] - ticks[0] >= (len(ticks) - 2) * period
+    assert began[late + 1] - began[late] >= 20 * period
+
+
+@pytest.mark.parametrize('crane', [{'wait': 0.01}], indirect=True)
+def test_lockstep_ends_when_nobody_answers(crane):
     node, executor = crane
     with pytest.raises(TimeoutError, match='no answer within 0.01 s'):
         node.lower(executor)
@@ -200,12 +225,12 @@ AT_REST = {'settled': 1.234, 'corner_speed': 0.0, 'rope_tension': 0.0, 'force_wo
            'static_tilt': 0.0, 'depth': 0.001, 'gap': 0.0}
 
 
-@pytest.mark.parametrize(('contacts', 'lost', 'landing', 'words'), [
+@pytest.mark.parametrize(('contacts', 'lost', 'figures', 'words'), [
     (7, 0, AT_REST, 'PASS: the load is at rest, settled 1.2 s after the first touch; 7 contacts, '
                     'none lost; latency p50 0.50 ms, p99 0.50 ms'),
     (7, 0, AT_REST | {'static_tilt': 1.0}, 'PASS: the load lies on the stack, not within all lim'),
     (7, 3, AT_REST, 'FAIL: 3 lost answers'),
     (0, 0, {}, 'FAIL: no contacts came, the load did not come to rest on the stack')])
-def test_the_verdict_is_one_line_with_its_reasons(contacts, lost, landing, words):
-    passed, line = crane_node.verdict(Landing(**landing), [0.5e-3] * contacts, lost)
+def test_the_verdict_is_one_line_with_its_reasons(contacts, lost, figures, words):
+    passed, line = crane_node.verdict(Landing(**figures), [0.5e-3] * contacts, lost)
     assert line.startswith(words) and passed == line.startswith('PASS')

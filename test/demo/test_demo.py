@@ -80,9 +80,10 @@ def is_running(pid):
 
 @pytest.fixture
 def programs(monkeypatch):
-    """Return what stands for the programs: Python code by module."""
-    codes = {'node.contact_node': 'import time; time.sleep(100)'}
-    monkeypatch.setattr(demo, 'program', lambda name, **_: ['-c', codes[name]])
+    """Return what stands for the programs: Python code by module, with `values` for parameters."""
+    codes = {'node.contact_node': 'import time; time.sleep(1000)'}
+    monkeypatch.setattr(
+        demo, 'program', lambda name, **values: ['-c', f'values = {values}\n{codes[name]}'])
     return codes
 
 
@@ -91,6 +92,23 @@ def test_its_status_is_that_of_the_crane(status, programs, capfd):
     programs['demo.crane_node'] = f'import sys, time; time.sleep(1.0); sys.exit({status})'
     assert demo.main([]) == status
     assert ('Next: ' in capfd.readouterr().out) is (status == 0)
+
+
+@pytest.mark.parametrize(('arguments', 'waits'), [([], True), (['--real-time'], False)])
+def test_time_waits_for_answers_unless_it_is_told_not_to(arguments, waits, programs, capfd):
+    programs['demo.crane_node'] = 'print(values)'
+    assert demo.main(arguments) == 0
+    assert str({'lockstep': waits, 'paced': waits}) in capfd.readouterr().out
+
+
+def test_a_view_that_is_ended_as_a_landing_ends_names_nothing_next(programs, monkeypatch, capfd):
+    """Its status is that of the signal, as in the middle of a landing."""
+    monkeypatch.setattr(demo, 'LOOK_PERIOD', 1.0)
+    programs |= {'view.view': 'import time; time.sleep(1000)', 'demo.crane_node': (
+        'import os, signal; print("PASS"); os.kill(os.getppid(), signal.SIGINT)')}
+    assert demo.main(['--view']) == 130
+    output = capfd.readouterr().out
+    assert 'PASS' in output and 'Next: ' not in output
 
 
 def test_an_early_end_of_the_node_ends_the_demo(programs, capfd):

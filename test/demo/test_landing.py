@@ -27,9 +27,9 @@ HARD = CraneScenario(rope_angle=3.0, rope_heading=100.0, pitch=2.0, roll=-2.0, y
                      offset=(0.2, 0.4))
 
 
-def landed(scenario, *, rate_hz=200.0, latency=0.002, lost=0.0):
-    """Return what is measured of a landing by exact contacts, of which a share gets lost."""
-    solver = ContactSolver(scenario.size, scenario.stack_size, model='exact')
+def landed(scenario, *, rate_hz=200.0, latency=0.002, lost=0.0, model='exact'):
+    """Return what is measured of a landing by a model's contacts, of which a share gets lost."""
+    solver = ContactSolver(scenario.size, scenario.stack_size, model=model)
     random, loop = np.random.default_rng(2), ClosedLoop(scenario, rate_hz)
     while not loop.record.ended:
         state = loop.ask()

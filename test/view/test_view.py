@@ -29,11 +29,13 @@ import msgspec
 import viser
 from browser import chromium, open_page
 from PIL import Image
+from test_landing import landed
 from typed_messages import changed, contacts_at, pose_array, pose_stamped
 from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import connect
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.demo.crane import CraneScenario
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import NANOSECONDS, Refused, make_header
 from box_contact_ros.node.topics import contact_qos
@@ -472,19 +474,22 @@ def test_two_hundred_boxes_in_a_browser():
 
 @in_browser
 def test_a_landing_in_a_browser(program):
-    """The landing, what is awaited, and again; the model is the one that was asked for."""
+    """The landing, what is awaited, and again; the model is the one that was asked for.
+
+    The browser renders in software and takes all cores. The load lands as it does without ROS.
+    """
     running = program('demo.demo', '--view', '--model', 'mlp')
     url = re.search(r'http://127\.0\.0\.1:\d+', running.wait_for_output('view: http')).group()
     with open_page(url) as tab:
         verdict = 'document.getElementById("verdict")?.innerText'
         for words in ('no contact', 'contact, ', 'waiting for poses', 'no contact'):
             try:
-                tab.wait_for(f'{verdict}?.startsWith({words!r})', 450)
-            except AssertionError as error:
-                # On a busy machine a landing may lose answers; the crane prints why.
+                tab.wait_for(f'{verdict}?.startsWith({words!r})')
+            except AssertionError as error:  # the crane prints why
                 raise AssertionError(f'{error}\nprinted:\n{running.output}') from error
             if words == 'contact, ':
                 assert tab.text('model') == 'mlp'
                 wait_for_drawing(tab, 1e-3)
                 tab.wait_for('parseFloat(document.getElementById("force")?.innerText) > 150')
         assert tab.evaluate(LABELS)
+    assert str(landed(CraneScenario(), latency=0.0, model='mlp')) in running.output
