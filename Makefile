@@ -10,7 +10,7 @@ SHELL := bash
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
 .PHONY: help demo view test check reports docs docs-links tables dist coverage clean
-.PHONY: test-arm test-colcon test-debian13
+.PHONY: test-arm test-colcon test-debian13 test-schemas
 
 # Arguments for the program behind the target: make test ARGS='-k sat -x'
 ARGS ?=
@@ -38,6 +38,7 @@ help:
 	echo 'make test     ruff, mypy and all tests'
 	echo 'make check    linters, and the quick tests of core, solver and scene: a minute'
 	echo 'make test-colcon  the quick tests, as `colcon test` runs them in a workspace'
+	echo 'make test-schemas  the AsyncAPI document, by its own parser, which npm fetches'
 	echo 'make test-arm the library on an emulated 64-bit ARM: the same bits as here'
 	echo 'make test-debian13  make demo, then make test, on a fresh Debian 13 (root)'
 	echo 'make dist     wheel and source distribution in dist/, both installed and tried'
@@ -101,6 +102,14 @@ reports:
 test-colcon:
 	@.ci/setup test
 	exec bash test/package/colcon.sh $(PY) $(ARGS)
+
+test-schemas:
+	@.ci/setup test
+	for program in node npm; do
+	    command -v $$program >/dev/null || {
+	        echo "error: $$program is not installed (apt install nodejs npm)" >&2; exit 1; }
+	done
+	exec $(PY) -m pytest -m network test/node/test_msg_schemas.py $(ARGS)
 
 test-arm:
 	@.ci/setup test

@@ -103,8 +103,12 @@ EXTRAS = {
 """The modules of each extra of setup.py that tests import."""
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the longest files first."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Put the longest files first; leave out what needs the network, unless -m asks for it."""
+    if 'network' not in config.option.markexpr:
+        remote = [item for item in items if item.get_closest_marker('network')]
+        config.hook.pytest_deselected(items=remote)
+        items[:] = [item for item in items if item not in remote]
     items.sort(key=lambda item: FIRST.index(item.path.name) if item.path.name in FIRST
                else len(FIRST))
 

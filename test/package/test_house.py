@@ -5,10 +5,13 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[2]
 NAME = 'box_contact_ros'
@@ -60,6 +63,14 @@ def test_all_nodes_are_guarded() -> None:
                 bases = [base.id for base in node.bases if isinstance(base, ast.Name)]
                 assert bases[:1] == ['GuardedNode'] or not {'Node', 'LifecycleNode'} & set(bases), (
                     f'{file}: {node.name}')
+
+
+@pytest.mark.parametrize(('words', 'fetches'), [((), False), (('-m', 'network'), True)])
+def test_the_suite_needs_no_network(words: tuple[str, ...], fetches: bool) -> None:
+    listed = subprocess.run([sys.executable, '-m', 'pytest', '--collect-only', *words,
+                             'test/node/test_msg_schemas.py'], cwd=ROOT, capture_output=True,
+                            text=True, timeout=PATIENCE).stdout
+    assert 'msg_schemas' in listed and ('asyncapis_own_parser' in listed) == fetches
 
 
 def test_every_source_file_has_a_header() -> None:
