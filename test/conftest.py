@@ -25,7 +25,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from patience import PATIENCE
 
+try:
+    from hypothesis import HealthCheck, settings
+except ModuleNotFoundError:  # an extra; tests that need it are skipped
+    pass
+else:  # a busy machine is no failure
+    settings.register_profile('patient', deadline=None,
+                              suppress_health_check=[HealthCheck.too_slow])
+    settings.load_profile('patient')
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in `nohup make test &`
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -195,14 +204,14 @@ class RunningProgram:
         """Everything the program wrote so far, stdout and stderr together."""
         return self.log.read_text(errors='replace')
 
-    def wait(self, timeout: float = 60.0) -> int:
+    def wait(self, timeout: float = PATIENCE) -> int:
         """Wait for the program to end by itself and return its exit status."""
         try:
             return self.process.wait(timeout)
         except subprocess.TimeoutExpired:
             pytest.fail(f'{self} did not end within {timeout} s; it wrote:\n{self.output}')
 
-    def wait_for_output(self, text: str, timeout: float = 60.0) -> str:
+    def wait_for_output(self, text: str, timeout: float = PATIENCE) -> str:
         """Wait until `text` has been written; return the output."""
         deadline = time.monotonic() + timeout
         while time.monotonic() < deadline:

@@ -227,7 +227,7 @@ def plot(path: Path, results: Sequence[Search]) -> None:
                    label='in use')
         panel.set(title=search.name, xlabel='multiply-adds of the network')
     panels[0, 0].set_ylabel('RMSE over the angles [rad]')
-    panels[0, 0].legend(fontsize=8)
+    panels[0, 0].legend(fontsize=8, loc='upper right')
     figure.savefig(path)
 
 

@@ -185,5 +185,5 @@ def draw_figure_9(path: Path) -> None:
     axes.plot(said[order], '.', color='tab:red', markersize=5, label='modelled')
     axes.set(ylabel='azimuth of the point [rad]', xlabel='pattern of the external set, sorted')
     axes.grid(color='0.9', linewidth=0.6)
-    axes.legend()
+    axes.legend(loc='upper left')
     picture.savefig(path)

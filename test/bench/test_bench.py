@@ -24,7 +24,6 @@ from box_contact_ros.bench.bench import main as bench_main
 from box_contact_ros.node.runtime import GuardedNode, running_node, spin_for
 
 DEEP = QoSProfile(depth=1000)
-PATIENCE = 240.0  # time [s] after which a run hangs
 
 
 def bench(program, *arguments: str):
@@ -46,7 +45,7 @@ def test_a_short_run(program, tmp_path):
     pytest.importorskip('fcl')
     pytest.importorskip('matplotlib')
     running = bench(program, f'--rate 100 --duration 3 --model exact --out {tmp_path}')
-    status = running.wait(PATIENCE)
+    status = running.wait()
     page = (tmp_path / 'bench.md').read_text()
     assert status == ('void' in page), running.output  # on a machine that is too busy
     assert page.startswith('# Bench\n\n![Latencies of each node](bench.png)\n')

@@ -13,6 +13,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 
 from benchmarks import output
 
@@ -39,7 +40,7 @@ def make_reports(folder: Path, *arguments: str) -> tuple[subprocess.CompletedPro
     env = {name: value for name, value in os.environ.items()
            if not name.startswith(('MAKE', 'MFLAGS'))}  # `make test` may be what runs this
     done = subprocess.run(['make', 'reports', 'PY=./python', *arguments], cwd=folder, env=env,
-                          capture_output=True, text=True, timeout=60)
+                          capture_output=True, text=True, timeout=PATIENCE)
     return done, (folder / 'called').read_text().splitlines()
 
 

@@ -41,7 +41,6 @@ def compile_library(compiler: str, folder: Path) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(900)
 @pytest.mark.parametrize('name', BUILDS)
 def test_another_build_has_the_same_bits(name: str, tmp_path: Path) -> None:
     """Verdict, separation and normal of both models; a row of a batch is its single call."""

@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 import poses
 import pytest
+from patience import PATIENCE
 from poses import Pairs, fields
 from test_extremes import random_network
 
@@ -101,7 +102,7 @@ def test_every_instruction_set_gives_the_same_bits(tmp_path: Path) -> None:
                for name in SETS_HERE}
     found = {}
     for name, process in running.items():
-        output, _ = process.communicate(timeout=120)
+        output, _ = process.communicate(timeout=PATIENCE)
         assert process.returncode == 0, output
         found[name] = dict(np.load(tmp_path / f'{name}.npz'))
     assert len({str(one.pop('instruction_set')) for one in found.values()}) == len(SETS_HERE)
@@ -117,14 +118,14 @@ def test_every_instruction_set_gives_the_same_bits(tmp_path: Path) -> None:
 def test_a_forced_instruction_set_is_used(name: str) -> None:
     code = 'from box_contact_ros.core import native; print(native.kernel)'
     process = started(name, '-c', code)
-    assert process.communicate(timeout=60)[0].strip() == name
+    assert process.communicate(timeout=PATIENCE)[0].strip() == name
 
 
 @pytest.mark.parametrize('value', ['avx', 'AVX2', 'none', 'baseline ', '../x', '_baseline'])
 def test_an_unknown_instruction_set_is_refused(value: str) -> None:
     """The message names the variable, the value and the choice."""
     process = started(value, '-c', 'import box_contact_ros')
-    output, _ = process.communicate(timeout=60)
+    output, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
     assert output.strip().endswith(
         f'ImportError: {FORCE} is {value!r}, which is not one of: {", ".join(SETS_HERE)}')

@@ -42,7 +42,6 @@ def test_bad_arguments_are_refused() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(900)
 def test_with_sanitizers(tmp_path: Path) -> None:
     """No access out of bounds and no undefined behaviour in the library and its binding."""
     extension = tmp_path / Path(native.__file__).name

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 
 pytest.importorskip('mujoco')
 
@@ -49,7 +50,7 @@ def test_no_process_outlives_a_demo_that_is_killed():
     with started_demo() as (running, _):
         started = children(running.pid)
         running.kill()
-        deadline = time.monotonic() + 60.0
+        deadline = time.monotonic() + PATIENCE
         while alive := [pid for pid in started if is_running(pid)]:
             assert time.monotonic() < deadline, alive
             time.sleep(0.1)
@@ -114,7 +115,7 @@ def test_a_view_that_is_ended_as_a_landing_ends_names_nothing_next(programs, mon
 def test_an_early_end_of_the_node_ends_the_demo(programs, capfd):
     """In the node's own words."""
     programs |= {'node.contact_node': 'import sys; sys.exit("no room")',
-                 'demo.crane_node': 'import time; time.sleep(100)'}
+                 'demo.crane_node': 'import time; time.sleep(1000)'}
     assert demo.main([]) == 1
     error = capfd.readouterr().err
     assert 'no room' in error and 'demo: contact_node ended early, status 1' in error

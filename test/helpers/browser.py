@@ -21,6 +21,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from patience import PATIENCE
 from websockets.sync.client import ClientConnection, connect
 
 NAMES = ('chromium', 'chromium-browser', 'google-chrome')
@@ -28,9 +29,6 @@ FLAGS = ('--headless=new', '--no-sandbox', '--disable-dev-shm-usage', '--hide-sc
          '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
          '--no-first-run', '--disable-background-networking', '--disable-component-update',
          '--disable-sync', '--mute-audio', '--remote-debugging-port=0')
-START_SECONDS = 60.0
-ANSWER_SECONDS = 120.0
-"""Software rendering on a busy machine takes its time."""
 
 
 def chromium() -> str | None:
@@ -50,7 +48,7 @@ class Tab:
         self._number += 1
         self._connection.send(json.dumps({'id': self._number, 'method': method, 'params': params}))
         while True:
-            message = json.loads(self._connection.recv(timeout=ANSWER_SECONDS))
+            message = json.loads(self._connection.recv(timeout=PATIENCE))
             if message.get('id') == self._number:
                 assert 'error' not in message, message['error']
                 return message['result']
@@ -61,7 +59,7 @@ class Tab:
         assert 'exceptionDetails' not in answer, answer['exceptionDetails']
         return answer['result'].get('value')
 
-    def wait_for(self, expression: str, seconds: float = 60.0) -> Any:
+    def wait_for(self, expression: str, seconds: float = PATIENCE) -> Any:
         """Wait until an expression is true; its value."""
         deadline = time.monotonic() + seconds
         while not (value := self.evaluate(expression)):
@@ -104,17 +102,18 @@ def open_page(url: str, width: int = 1280, height: int = 720, *, flags: Sequence
 
 def _tab_address(browser: subprocess.Popen, profile: Path) -> str:
     """Where the tab is to be talked to: the browser writes its port to a file."""
-    deadline = time.monotonic() + START_SECONDS
+    deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         assert browser.poll() is None, f'the browser ended, status {browser.returncode}'
         try:
             port = (profile / 'DevToolsActivePort').read_text().split()[0]
-            with urllib.request.urlopen(f'http://127.0.0.1:{port}/json/list', timeout=10) as answer:
+            tabs = f'http://127.0.0.1:{port}/json/list'
+            with urllib.request.urlopen(tabs, timeout=PATIENCE) as answer:
                 pages = [page for page in json.load(answer) if page['type'] == 'page']
             return pages[0]['webSocketDebuggerUrl']
         except (OSError, IndexError):
             time.sleep(0.1)
-    raise TimeoutError(f'no browser within {START_SECONDS:g} s')
+    raise TimeoutError(f'no browser within {PATIENCE:g} s')
 
 
 def _end(browser: subprocess.Popen) -> None:

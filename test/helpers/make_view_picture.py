@@ -19,6 +19,7 @@ import time
 from pathlib import Path
 
 from browser import open_page
+from patience import PATIENCE
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -49,7 +50,7 @@ def main() -> None:
                 out, optimize=True)
     finally:
         demo.send_signal(signal.SIGINT)
-        demo.wait(20)
+        demo.wait(PATIENCE)
 
 
 if __name__ == '__main__':

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 import poses
-from ros_client import PATIENCE, Client
+from patience import PATIENCE
+from ros_client import Client
 
 from box_contact_ros.node.messages import NANOSECONDS, contacts_by_pair
 
@@ -53,9 +54,9 @@ class RawClient(Client):
         """
         sent: list[int] = []
         while not any(stamp in self.contacts for stamp in sent):
-            assert len(sent) < 6, 'no answer'
+            assert len(sent) < 60, 'no answer'
             sent.append(self.send(ORIGIN, TOUCHING))
-            self.is_answered(sent[-1], PATIENCE / 6)
+            self.is_answered(sent[-1], PATIENCE / 60)
         stamp = next(stamp for stamp in sent if stamp in self.contacts)
         contact, = contacts_by_pair(self.contacts[stamp]).values()
         assert contact.separation == -0.125 and contact.normal.tolist() == [0, 0, 1]

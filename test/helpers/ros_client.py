@@ -16,6 +16,7 @@ from typing import Any
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
+from patience import PATIENCE
 from rclpy.context import Context
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
@@ -29,9 +30,9 @@ from box_contact_ros.solver.contact import Contact
 
 TWO_BOXES = {'box_a': 'box_a/pose', 'box_b': 'box_b/pose'}
 DEEP = QoSProfile(depth=10_000)
-PATIENCE = 60.0
-"""Time [s] for what has to come: a limit against hanging, no more. Discovery takes a fraction of a
-second; on a busy machine, in a process that has had hundreds of participants, fifteen were seen."""
+DISCOVERY = 20.0
+"""Time [s] after which a client is made again. Discovery takes a fraction of a second; on a busy
+machine, in a process that has had hundreds of participants, fifteen were seen."""
 AHEAD = 20
 """Ticks of a stream that may be unanswered. Of more, a machine that stands still for a moment loses
 poses, which are best effort, and all but the last ten answers."""
@@ -168,9 +169,9 @@ class Client:
 
         Once in some hundred times Fast DDS finds none until the client is made again.
         """
-        for _ in range(3):
+        for _ in range(round(PATIENCE / DISCOVERY)):
             service = self.node.create_client(service_type, name)
-            if self.spin(service.service_is_ready, PATIENCE / 3):
+            if self.spin(service.service_is_ready, DISCOVERY):
                 # It may be ready before the way back is: an answer is lost then.
                 self.spin(lambda: False, 0.2)
                 return service
@@ -234,7 +235,7 @@ def serving(make_node: Callable[[Context], Node],
         yield node
     finally:
         stop.set()
-        thread.join(10)
+        thread.join(PATIENCE)
         executor.shutdown()
         node.destroy_node()
         context.try_shutdown()

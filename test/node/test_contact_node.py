@@ -17,7 +17,7 @@ import pytest
 from raw_client import APART, ORIGIN, TOUCHING
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from ros_client import PATIENCE, Client, serving
+from ros_client import Client, serving
 
 from box_contact_msgs.msg import Contacts
 from box_contact_ros import ContactSolver
@@ -200,7 +200,7 @@ def test_a_bad_start_is_one_clear_line(program, tmp_path):
         ({'qos_overrides./box_a/pose.subscription.depth': 'deep'}, "'deep' of type 'STRING'"),
         ({'size_a': '{2.0'}, "Couldn't parse"))]
     for running, words in started:
-        assert running.wait(120) == 1, running.output
+        assert running.wait() == 1, running.output
         last = running.output.splitlines()[-1]
         assert last.startswith('error: ') and words in running.output
         assert 'Traceback' not in running.output
@@ -225,7 +225,7 @@ print(run(Node, None, ['--ros-args', '-p', 'size_a:=[0.0, 1.0, 1.0]']))
 def test_ends_cleanly(program, number, pauses):
     """Also under a second signal, at once or while the node leaves the network."""
     running = program('contact_node', *arguments())
-    running.wait_for_output('ready', 120)
+    running.wait_for_output('ready')
     running.signal(number)
     for pause in pauses:
         time.sleep(pause)
@@ -238,7 +238,7 @@ def test_ends_cleanly(program, number, pauses):
 def test_signalled_until_it_has_ended(program, number):
     """A KeyboardInterrupt in EventsExecutor aborts a process, and late SIGTERMs kill it."""
     running = program('contact_node', *arguments())
-    running.wait_for_output('ready', 120)
+    running.wait_for_output('ready')
     while running.process.poll() is None:
         running.signal(number)
         time.sleep(0.0002)
@@ -264,9 +264,9 @@ def test_node_killed_and_restarted(program, client):
     """
     for _ in range(2):
         running = program('contact_node', *arguments())
-        running.wait_for_output('ready', 120)
+        running.wait_for_output('ready')
         client.offer_until_answered(ORIGIN, APART)
         assert client.are_answered(stream(client, 2.0))
         stream(client, 0.2)
         running.signal(signal.SIGKILL)
-        running.wait(PATIENCE)
+        running.wait()

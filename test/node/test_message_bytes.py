@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from message_fuzz import STRICTER, TYPES, fuzz, outcome_of
 from rclpy.serialization import deserialize_message, serialize_message
@@ -187,7 +187,6 @@ def a_contact(draw):
                    draw(FLOATS), np.array(draw(st.tuples(three, three, three))))
 
 
-@settings(deadline=None)
 @given(st.data(), STAMPS, FRAMES, st.integers(0, 4), st.integers(0, 2), st.integers(0, 3))
 def test_answers_are_written_alike(data, stamp, frame_id, touching, close, stale):
     """Decoded, the bytes are the objects.

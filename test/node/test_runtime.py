@@ -15,6 +15,7 @@ from types import SimpleNamespace
 
 import pytest
 from geometry_msgs.msg import PoseStamped
+from patience import PATIENCE
 from raw_client import APART, ORIGIN, TOUCHING
 from rcl_interfaces.srv import ListParameters
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
@@ -89,7 +90,7 @@ with runtime.running_node(lambda context: Hanging('hanging', context=context)):
 def test_an_end_that_hangs_is_ended():
     """Although it has Python's lock; the traceback says where it hangs."""
     done = subprocess.run([sys.executable, '-c', HANGING], capture_output=True, text=True,
-                          timeout=50)
+                          timeout=PATIENCE)
     assert done.returncode == 1 and 'destroy_node' in done.stderr
 
 
@@ -163,7 +164,7 @@ signal.raise_signal(number)
 def test_a_signal_falls_nowhere(number, when, words):
     """It shuts the context down, and what fails at that tells which signal it was."""
     done = subprocess.run([sys.executable, '-c', SIGNALLED, str(int(number)), when],
-                          capture_output=True, text=True, timeout=50)
+                          capture_output=True, text=True, timeout=PATIENCE)
     assert (done.returncode, done.stdout) == (0, words), done.stderr
 
 

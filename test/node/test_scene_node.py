@@ -15,9 +15,10 @@ import pytest
 from geometry_msgs.msg import PoseArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
+from patience import PATIENCE
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
-from ros_client import DEEP, PATIENCE, Client, serving, stamp_of
+from ros_client import DEEP, Client, serving, stamp_of
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 from typed_messages import pose_array

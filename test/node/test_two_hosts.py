@@ -16,6 +16,7 @@ import uuid
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 
 HELPERS = Path(__file__).resolve().parents[1] / 'helpers'
 SUBNET = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'}
@@ -72,10 +73,10 @@ def test_simulator_and_node_on_two_hosts(program, hosts):
     here, there = hosts
     node = program('contact_node', '--ros-args', '-p', 'size_a:=[2.0, 2.0, 2.0]',
                    '-p', 'size_b:=[2.0, 2.0, 2.0]', env=SUBNET, within=there)
-    node.wait_for_output('ready', 120)
+    node.wait_for_output('ready')
     paths = os.pathsep.join(filter(None, (str(HELPERS), os.environ.get('PYTHONPATH'))))
     simulator = subprocess.run(
-        [*here, sys.executable, '-c', SIMULATOR], capture_output=True, text=True, timeout=300,
+        [*here, sys.executable, '-c', SIMULATOR], capture_output=True, text=True, timeout=PATIENCE,
         env={**os.environ, **SUBNET, 'PYTHONPATH': paths})
     assert simulator.returncode == 0, simulator.stderr
     node.signal(signal.SIGTERM)

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 
 ROOT = Path(__file__).parents[2]
 SOURCES = [str(ROOT / name) for name in
@@ -25,8 +26,8 @@ def run(linter: str, *words: str) -> None:
     """Run a linter in a process of its own: flake8 forks, and other tests have left threads."""
     if not importlib.util.find_spec(linter):
         pytest.skip(f'{linter} is not installed')
-    done = subprocess.run([sys.executable, '-m', f'{linter}.main', *words], text=True, timeout=240,
-                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    done = subprocess.run([sys.executable, '-m', f'{linter}.main', *words], text=True,
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=PATIENCE)
     assert done.returncode == 0, done.stdout
 
 

@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import pytest
+from patience import PATIENCE
 
 RUN = """
 import re, sys
@@ -76,5 +77,5 @@ def test_installed_without_extras(names, beside, program, setup_arguments, tmp_p
         requirement for name in names for requirement in setup_arguments['extras_require'][name])]
     script = RUN.format(needed=needed, program=program)
     done = subprocess.run([sys.executable, '-c', script], cwd=tmp_path, capture_output=True,
-                          text=True, timeout=300)
+                          text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stderr

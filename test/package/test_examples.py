@@ -14,6 +14,7 @@ import time
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / 'docs' / 'examples'
@@ -39,7 +40,7 @@ def test_example(name: str, program, tmp_path: Path) -> None:
     """Figures agree to the printed digits; shorter runs print as many lines in the same words."""
     pytest.importorskip(NEEDS.get(name, 'numpy'))
     if name in CLIENTS:
-        program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready', 120)
+        program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready')
     command = [str(EXAMPLES / name)]
     if name in QUICK:
         module = name.removesuffix('.py')
@@ -47,8 +48,8 @@ def test_example(name: str, program, tmp_path: Path) -> None:
     # A simulator that is started anew repeats the stamps of its last run.
     for _ in range(2 if name in CLIENTS else 1):
         done = subprocess.run(
-            [sys.executable, *command], cwd=tmp_path, capture_output=True, text=True, timeout=120,
-            env=os.environ | {'PYTHONPATH': os.pathsep.join(
+            [sys.executable, *command], cwd=tmp_path, capture_output=True, text=True,
+            timeout=PATIENCE, env=os.environ | {'PYTHONPATH': os.pathsep.join(
                 [str(EXAMPLES), os.environ.get('PYTHONPATH', '')])})
         assert done.returncode == 0, done.stderr
     printed, expected = done.stdout.splitlines(), shown(name)
@@ -62,22 +63,22 @@ def test_record(program, tmp_path: Path) -> None:
     """What the lockstep client sends and is answered, read again; the printed counts are true."""
     pytest.importorskip('box_contact_msgs.msg')
     rosbag2 = pytest.importorskip('rosbags.rosbag2')
-    program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready', 120)
+    program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready')
     log = tmp_path / 'log'
     with log.open('w') as errors:
         recorder = subprocess.Popen([sys.executable, EXAMPLES / 'record.py', tmp_path / 'run'],
                                     stdout=subprocess.PIPE, stderr=errors, text=True)
-    deadline = time.monotonic() + 120.0
+    deadline = time.monotonic() + PATIENCE
     try:
         # The recorder may not have met all publishers at first.
         hears_all = False
         while not hears_all and time.monotonic() < deadline:
             hears_all = log.read_text().count('hears') == 3  # and is sent a whole run
             subprocess.run([sys.executable, EXAMPLES / 'lockstep_client.py'], check=True,
-                           timeout=120)
+                           timeout=PATIENCE)
     finally:
         recorder.send_signal(signal.SIGINT)
-        output, _ = recorder.communicate(timeout=60)
+        output, _ = recorder.communicate(timeout=PATIENCE)
     assert recorder.returncode == 0 and 'Traceback' not in log.read_text()
     with rosbag2.Reader(tmp_path / 'run') as bag:
         counts = {c.topic: c.msgcount for c in bag.connections}

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 from conftest import PROGRAMS
+from patience import PATIENCE
 
 import box_contact_ros
 from box_contact_ros import resources
@@ -102,7 +103,7 @@ def _run(*command: str, **env: str) -> subprocess.CompletedProcess[str]:
         env={**os.environ, **env},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE,
     )
 
 

@@ -30,6 +30,7 @@ import pytest
 import yaml
 from conftest import PROGRAMS
 from geometry_msgs.msg import PoseStamped
+from patience import PATIENCE
 
 from benchmarks import hard_poses, judge
 from box_contact_msgs.msg import Box
@@ -77,9 +78,9 @@ def commands() -> list[str]:
 # --- what is done with a command ------------------------------------------------------------------
 
 
-def run(*words: str, timeout: float = 120.0, **env: str) -> str:
+def run(*words: str, **env: str) -> str:
     """Run a program of this Python's environment; its output. Fails unless the status is 0."""
-    done = subprocess.run(words, cwd=ROOT, env=os.environ | env, text=True, timeout=timeout,
+    done = subprocess.run(words, cwd=ROOT, env=os.environ | env, text=True, timeout=PATIENCE,
                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     assert done.returncode == 0, f'{words}: {done.stdout}'
     return done.stdout
@@ -97,7 +98,7 @@ def make(words: list[str], **_) -> None:
            if not name.startswith(('MAKE', 'MFLAGS'))}  # `make test` may be what runs this
     here = words[words.index('make') + 1:]
     done = subprocess.run(['make', '-n', *here], cwd=ROOT, env=env, capture_output=True,
-                          text=True, timeout=60)
+                          text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stderr
     if here[0] == 'demo' and len(here) > 1:  # what ARGS hands on
         arguments = shlex.split(here[1].partition('=')[2])
@@ -120,11 +121,11 @@ def start(words: list[str], program, **_) -> None:
     name, arguments = program_and_arguments(words)
     assert name in PROGRAMS
     if name == 'contact_node':
-        program(name, *arguments).wait_for_output('ready', 120)
+        program(name, *arguments).wait_for_output('ready')
     elif name == 'crane' and '--help' not in arguments:
-        program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready', 120)
+        program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready')
         crane = program(name, *arguments, '-p', 'lockstep:=true', '-p', 'rate:=100')
-        assert crane.wait(200) == 0, crane.output
+        assert crane.wait() == 0, crane.output
     else:
         known = help_of(f'box_contact_ros.{PROGRAMS[name]}')
         for word in arguments:
@@ -325,7 +326,7 @@ def test_python_example(text, lines, program, tmp_path, monkeypatch):
     if 'rclpy' in text:
         scene = ['-p', f'scene:={ROOT}/config/scenes/yard_bay.yaml'] if 'crane/' in text else []
         program('contact_node', '--ros-args', '-p', 'model:=exact', *scene).wait_for_output(
-            'ready', 120)
+            'ready')
     with contextlib.redirect_stdout(io.StringIO()) as printed:
         exec(compile(text, 'example', 'exec'), {'__name__': 'example'})
     assert printed.getvalue().splitlines() == lines

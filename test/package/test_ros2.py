@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 from conftest import RunningProgram
+from patience import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = 'box_contact_ros'
@@ -24,8 +25,8 @@ Start = Callable[..., RunningProgram]
 
 
 def run(*words: str) -> subprocess.CompletedProcess[str]:
-    """Run `ros2` to its end, at most a minute."""
-    return subprocess.run(['ros2', *words], text=True, timeout=60, stdout=subprocess.PIPE,
+    """Run `ros2` to its end."""
+    return subprocess.run(['ros2', *words], text=True, timeout=PATIENCE, stdout=subprocess.PIPE,
                           stderr=subprocess.STDOUT)
 
 
@@ -99,7 +100,7 @@ def test_launch_of_a_contact_node(ros2: Start) -> None:
 def test_launch_of_a_crane(ros2: Start) -> None:
     """It lands, and ends the node with it; without MuJoCo, one line names what is missing."""
     launched = ros2('launch', PACKAGE, LAUNCH_FILES[1], 'lockstep:=true', 'rate:=100')
-    status = launched.wait(240)
+    status = launched.wait()
     if importlib.util.find_spec('mujoco'):
         assert status == 0 and 'at rest' in launched.output
     else:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from box_contact_ros.scene import scene_file
@@ -165,7 +165,6 @@ JSON = st.recursive(st.none() | st.booleans() | st.floats() | st.integers() | st
                                          'poses']), inner, max_size=4), max_leaves=12)
 
 
-@settings(deadline=None)
 @given(st.one_of(st.text(max_size=200), JSON.map(json.dumps),
                  st.tuples(st.integers(0, len(GOOD)), st.text(max_size=5)).map(
                      lambda edit: GOOD[:edit[0]] + edit[1] + GOOD[edit[0]:])))

@@ -27,7 +27,7 @@ ABOVE = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
 TURN = np.array([0.1, -0.2, 0.3, 0.9]) / np.linalg.norm([0.1, -0.2, 0.3, 0.9])
 TILTED = np.r_[0.3, 0.2, 2.0, TURN]
 
-few = settings(max_examples=200, derandomize=True, deadline=None)
+few = settings(max_examples=200, derandomize=True)
 every_model = pytest.mark.parametrize('model', MODELS)
 
 
@@ -55,7 +55,7 @@ def assert_sound(contact):
         assert np.isnan(contact.normal).all() and np.isnan(contact.point).all()
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.lists(st.tuples(*[st.floats(width=64) | st.sampled_from(
     [LENGTH_MAX, -2 * LENGTH_MAX, QUATERNION_MIN, QUATERNION_MAX, 0.0])] * 7),
                 min_size=1, max_size=5))

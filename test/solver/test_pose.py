@@ -15,7 +15,7 @@ quaternions = st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(
     lambda q: np.hypot(*q[:2]) > 0.1).map(np.array)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(quaternions, quaternions)
 def test_products(p, q):
     """A product of quaternions is the product of their rotation matrices, of any length."""

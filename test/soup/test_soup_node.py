@@ -125,7 +125,7 @@ def test_the_contact_node_knows_the_soup_too():
 def test_starts_at_its_worst_and_ends_cleanly(program):
     """With the most triangles it is ready in time, and ends with status 0."""
     running = program('soup_node', '--ros-args', '-p', 'divisions:=64')
-    running.wait_for_output('ready', 120)
+    running.wait_for_output('ready')
     assert "model 'soup-64'" in running.output
     running.signal(signal.SIGINT)
     assert running.wait() == 0

@@ -12,9 +12,10 @@ import numpy as np
 import poses
 import pytest
 import yaml
+from patience import PATIENCE
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
-from ros_client import PATIENCE, Client, serving
+from ros_client import Client, serving
 from typed_messages import changed, contacts_at
 from visualization_msgs.msg import Marker, MarkerArray
 

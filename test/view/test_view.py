@@ -18,9 +18,10 @@ import poses
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import WrenchStamped
+from patience import PATIENCE
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
-from ros_client import PATIENCE, Client, serving
+from ros_client import Client, serving
 
 pytest.importorskip('viser')
 pytest.importorskip('mujoco')
@@ -420,7 +421,6 @@ LAST = f'{CHARTS}.map(c => c.data[1].at(-1)).sort()'
 LABELS = f'{CHARTS}.every(c => c.axes.every(a => a._splits?.length > 1) && c.scales.x.max == 0)'
 
 
-@pytest.mark.timeout(600)
 @in_browser
 @pytest.mark.parametrize('width', [800, 1280])
 def test_the_page_in_a_browser(page, width):
@@ -448,7 +448,6 @@ def test_the_page_in_a_browser(page, width):
         tab.wait_for('document.getElementById("verdict").innerText == "waiting for poses"')
 
 
-@pytest.mark.timeout(600)
 @in_browser
 def test_two_hundred_boxes_in_a_browser():
     """All are drawn, in map coordinates too, and all contacts."""
