@@ -16,6 +16,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import sysconfig
 from collections.abc import Iterator
 from ctypes import POINTER, byref, c_bool, c_double, c_int, c_int32, c_int64, c_size_t
 from pathlib import Path
@@ -23,6 +24,7 @@ from pathlib import Path
 import numpy as np
 import poses
 import pytest
+from patience import PATIENCE
 from poses import Pairs
 
 from box_contact_ros import Body, ContactSolver, PatchForces
@@ -45,18 +47,29 @@ EXAMPLE_SAYS = [
 
 
 def run(*words: object, **environment: str) -> str:
-    done = subprocess.run([str(word) for word in words], env={**os.environ, **environment},
-                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=280)
+    done = subprocess.run(list(map(str, words)), env={**os.environ, **environment}, text=True,
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=PATIENCE)
     assert done.returncode == 0, done.stdout[-4000:]
     return done.stdout
 
 
 def tool(name: str) -> str:
-    """Return the path of a program, or skip."""
-    path = shutil.which(name)
+    """Return the path of a program, which may be in the environment's bin alone, or skip."""
+    path = shutil.which(name) or shutil.which(name, path=sysconfig.get_path('scripts'))
     if not path:
         pytest.skip(f'{name} is not installed')
     return path
+
+
+def test_tools_of_the_environment_are_found(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where its bin is not in PATH, as under make."""
+    program = tmp_path / 'cmake'
+    program.touch(0o755)
+    monkeypatch.setenv('PATH', '')
+    monkeypatch.setattr(sysconfig, 'get_path', lambda name: str(tmp_path))
+    monkeypatch.setattr(pytest, 'skip', pytest.fail)
+    assert tool('cmake') == str(program)
 
 
 # --- C, and a language that calls C ---------------------------------------------------------------
@@ -219,7 +232,7 @@ def test_without_exceptions(tmp_path: Path) -> None:
 
 def configure(source: Path, folder: Path, *options: str, **environment: str) -> None:
     run(tool('cmake'), '-S', source, '-B', folder, *options, **environment)
-    run('cmake', '--build', folder, '--parallel', **environment)
+    run(tool('cmake'), '--build', folder, '--parallel', **environment)
 
 
 def test_by_find_package_of_pip(tmp_path: Path) -> None:
@@ -238,7 +251,8 @@ def test_by_find_package_of_pip(tmp_path: Path) -> None:
         'find_package(box_contact_ros 0.1.0 EXACT REQUIRED)\n'
         'find_package(box_contact_ros 99 QUIET)\n'
         'if(box_contact_ros_FOUND)\n  message(FATAL_ERROR found)\nendif()\n')
-    run('cmake', '-S', tmp_path, '-B', tmp_path / 'versions', f'-DCMAKE_PREFIX_PATH={places}')
+    run(tool('cmake'), '-S', tmp_path, '-B', tmp_path / 'versions',
+        f'-DCMAKE_PREFIX_PATH={places}')
 
 
 def test_versions_agree(setup_arguments: dict) -> None:
@@ -353,7 +367,7 @@ def test_a_plain_installation(tmp_path: Path, from_source: tuple[str, ...], kind
     prefix = tmp_path / 'prefix'
     configure(ROOT, tmp_path / 'library', *from_source, f'-DBUILD_SHARED_LIBS={kind}',
               '-DCMAKE_INSTALL_LIBDIR=lib')
-    run('cmake', '--install', tmp_path / 'library', '--prefix', prefix)
+    run(tool('cmake'), '--install', tmp_path / 'library', '--prefix', prefix)
     configure(EXAMPLE, tmp_path / 'example', f'-DCMAKE_PREFIX_PATH={prefix}')
     assert example(tmp_path / 'example' / 'first_contact') == EXAMPLE_SAYS
     found = run(tool('pkg-config'), '--cflags', '--libs', 'box_contact',

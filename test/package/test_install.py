@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from test_library import tool
 
 from box_contact_ros.core import instruction_sets
 
@@ -155,13 +156,12 @@ def test_kernels_share_no_symbol(installed: Installation) -> None:
 
 def test_cmake_finds_the_library(installed: Installation, tmp_path: Path) -> None:
     """By `--cmakedir`; the example runs."""
-    if not shutil.which('cmake'):
-        pytest.skip('cmake is not installed')
+    cmake = tool('cmake')
     folder = run(installed.bin / 'python', '-m', NAME, '--cmakedir', cwd=tmp_path).strip()
     assert Path(folder).is_relative_to(installed.folder)
-    run('cmake', '-S', ROOT / 'docs' / 'examples' / 'cpp', '-B', tmp_path, f'-D{NAME}_DIR={folder}',
+    run(cmake, '-S', ROOT / 'docs' / 'examples' / 'cpp', '-B', tmp_path, f'-D{NAME}_DIR={folder}',
         cwd=tmp_path)
-    run('cmake', '--build', tmp_path, cwd=tmp_path)
+    run(cmake, '--build', tmp_path, cwd=tmp_path)
     assert 'batch: 1 0, volumes 0.030 0.000 m3' in run(tmp_path / 'first_contact', cwd=tmp_path)
 
 
