@@ -26,7 +26,7 @@ import numpy as np
 
 from box_contact_ros.core import FORCE, instruction_sets, native
 
-from . import output
+from . import output, settled
 from .output import markdown_table, percentiles
 from .pose_sets import FLUSH, LOADS, SETS, Pairs, drawn
 from .timing import by_round, pinned, usable_cores
@@ -39,7 +39,11 @@ QUICK_CONTACTS, QUICK_PASSES = 2_000, 3
 EACH = ('exact', 'mlp')
 PERCENTS = {'p50': 50, 'p99.9': 99.9, 'slowest': 100}
 MIXED = 'containers, 20 % touching'
+SHOWN = f'settled by {settled.OURS}', 'containers'
+"""Sets whose times the page shows in nanoseconds."""
 UNIT = 'mjc_BoxBox, single'
+OURS = tuple(f'exact {finds}, {way}' for way in ('single', 'batch')
+             for finds in ('volume', 'covariance'))
 CALLS_FOLDER = Path(__file__).with_name('native_calls')
 CORE = Path(native.__file__).parent  # with the library and its headers
 OPTIONAL = {'coal': 'pip install coal cmeel-eigen', 'bullet': 'apt install libbullet-dev'}
@@ -124,14 +128,19 @@ def calls_shown(missing: Sequence[str]) -> str:
 
 
 def sets(count: int) -> dict[str, Pairs]:
-    """Return `count` pairs of each set, and containers, a fifth of them in contact."""
+    """Return recorded pairs of goods at rest, and `count` pairs of each drawn set.
+
+    Last, containers, a fifth of them in contact.
+    """
+    recorded = {name: pairs.rows(slice(count))
+                for name, pairs in settled.by_engine(settled.read()).items()}
     by_name = {name: drawn(make, np.random.default_rng([3, place]), count)
                for place, (name, make) in enumerate((SETS | LOADS | FLUSH).items())}
     mixed = by_name['containers']
     apart = np.random.default_rng(3).random(len(mixed.pose_b)) < 0.8
     pose_b = mixed.pose_b.copy()
     pose_b[apart, :3] *= 1.5
-    return {**by_name, MIXED: mixed._replace(pose_b=pose_b)}
+    return {**recorded, **by_name, MIXED: mixed._replace(pose_b=pose_b)}
 
 
 def run(program: Path, pairs: Pairs, instruction_set: str, *arguments: object) -> list[str]:
@@ -212,10 +221,18 @@ def contestants_table(times: OnSet) -> str:
 
 
 def sets_table(by_set: Mapping[str, OnSet]) -> str:
-    """Return the ratio to `UNIT` of each contestant on each set."""
-    return markdown_table(['', *by_set], [
-        [name, *(f'{ratio(times, name):.2f}' for times in by_set.values())]
-        for name in next(iter(by_set.values()))])
+    """Return a row per set: the ratio to `UNIT` of each contestant."""
+    contestants = list(next(iter(by_set.values())))
+    return markdown_table(['', *contestants], [
+        [name, *(f'{ratio(times, one):.2f}' for one in contestants)]
+        for name, times in by_set.items()])
+
+
+def scenes_table(by_scene: Mapping[str, Pairs], times: Mapping[str, OnSet]) -> str:
+    """Return a row per recorded scene: the ratios to `UNIT` of calls and batches of `exact`."""
+    return markdown_table(['scene', 'contacts', *OURS], [
+        [name, f'{len(by_scene[name].size)}', *(f'{ratio(here, one):.2f}' for one in OURS)]
+        for name, here in times.items()])
 
 
 def slowest_table(times: Mapping[str, np.ndarray]) -> str:
@@ -281,11 +298,15 @@ def main(args: Sequence[str] | None = None) -> int:
             for of_set, chosen in tqdm(by_set.items(), desc='native', unit='set'):
                 for name in names:
                     found[name][of_set] = timed(program, chosen, name, rounds=rounds, calls=calls)
+            by_scene = settled.by_scene(settled.read())
+            scenes = {name: timed(program, chosen, names[-1], rounds=rounds, calls=calls)
+                      for name, chosen in tqdm(by_scene.items(), desc='scenes', unit='scene')}
             del by_set[MIXED]  # its contacts are those of containers
             contacts = {name: each_contact(program, by_set, name, count, passes) for name in names}
     tables = '\n\n'.join(
-        f'## {name}\n\nContainers:\n\n{contestants_table(by_set["containers"])}\n\n'
-        f'Relative to `mjc_BoxBox`, by set:\n\n{sets_table(by_set)}'
+        f'## {name}\n\nRelative to `mjc_BoxBox`, by set:\n\n{sets_table(by_set)}\n\n'
+        + '\n\n'.join(f'{of_set[0].upper()}{of_set[1:]}:\n\n{contestants_table(by_set[of_set])}'
+                      for of_set in SHOWN)
         for name, by_set in found.items())
     versions = [f'MuJoCo {metadata.version("mujoco")}', *(
         f'{name.capitalize()} {package_config(name, "--modversion")}' for name in OPTIONAL
@@ -293,9 +314,11 @@ def main(args: Sequence[str] | None = None) -> int:
     output.write_page(
         folder, 'native', args, machine=output.machine(), rounds=rounds, calls=calls, pairs=pairs,
         tables=tables, slowest=slowest_table(contacts[names[-1]]), slowest_set=names[-1],
+        scenes=scenes_table(by_scene, scenes),
         passes=passes, code=calls_shown(missing), engines=', '.join(versions), missing=''.join(
             f'\n\nLeft out: {name.capitalize()} is not installed with its headers '
             f'(`{OPTIONAL[name]}`).' for name in missing))
+    found[names[-1]].update(scenes)
     output.write_csv(folder / 'native.csv', [*csv_rows(found), *contact_rows(contacts)],
                      about=output.machine())
     print(tables)

@@ -6,7 +6,8 @@
 `python -m benchmarks.stacks` runs every scene by `PatchForces`, at several steps, rates and
 latencies, and by MuJoCo with contacts of its own. Both begin with the same boxes, and get the same
 outside forces. The program prints and writes stacks.md and stacks.csv. The exit status is 1 if a
-scene of ours does not come to rest with answers at each step of 1 ms.
+scene of ours does not come to rest with answers at each step of 1 ms. `--record FILE` writes the
+pairs of all scenes to a file instead, as they were placed and after they have settled.
 
 Lengths in m, masses in kg, times in s.
 """
@@ -18,6 +19,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 
@@ -25,7 +27,7 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.scene.laws import GRAVITY
 from box_contact_ros.solver.pose import rotation_matrix
 
-from . import output
+from . import output, settled
 from .loops import (
     FLOOR,
     MUJOCO,
@@ -37,7 +39,7 @@ from .loops import (
     near_pairs,
     steps,
 )
-from .pose_sets import CONTAINER, turned
+from .pose_sets import CONTAINER, Pairs, turned
 from .scenes import packing_plans
 
 LOST_SPEED = 100.0  # a run with a faster corner is over [m/s]
@@ -310,6 +312,35 @@ QUICK = 5  # `--quick` runs every so-many-th scene
 
 CONVERGED = Timing(0.0001, 10_000.0, 0.0)
 
+# --- recording ------------------------------------------------------------------------------------
+
+
+def recorded(make: Callable[[], Scene], timing: Timing | None, engine: str) -> settled.Recorded:
+    """Return the pairs of a scene whose bounding boxes overlap: at its start, and at its end."""
+    scene = make()
+    boxes, states = scene.boxes, []
+    for loop in steps(scene, timing):
+        if loop.tick == 0:
+            states.append((settled.PLACED, boxes.pose.copy(), near_pairs(boxes, 0.0)))
+    states.append((engine, boxes.pose, near_pairs(boxes, 0.0)))
+    parts = [(pose[pairs], boxes.size[pairs], [name] * len(pairs)) for name, pose, pairs in states]
+    pose, size, engines = (np.concatenate(columns) for columns in zip(*parts))
+    return settled.Recorded(Pairs(pose[:, 0], pose[:, 1], size[:, 0], size[:, 1]),
+                            np.full(len(engines), scene.name), engines)
+
+
+def record(file: Path, scenes: Sequence[Callable[[], Scene]]) -> None:
+    """Write the pairs of some scenes: as placed, and as ours and MuJoCo settle them."""
+    parts = []
+    for make in scenes:
+        ours, theirs = recorded(make, TIMINGS[0], settled.OURS), recorded(make, None, 'MuJoCo')
+        parts += [ours, theirs.rows(theirs.engine != settled.PLACED)]
+        print(ours.scene[0], len(ours.scene), flush=True)
+    pairs = Pairs(*(np.concatenate(columns) for columns in zip(*(part.pairs for part in parts))))
+    scene, engine = (np.concatenate(names) for names in zip(*(part[1:] for part in parts)))
+    settled.write(file, settled.Recorded(pairs, scene, engine))
+
+
 # --- the report -----------------------------------------------------------------------------------
 
 
@@ -346,9 +377,14 @@ def main(args: Sequence[str] | None = None) -> int:
     """Run all scenes, print and write; 1 if one of ours moves with answers at each step."""
     parser = output.report_parser(
         'stacks', __doc__, out='stacks.md and stacks.csv', quick=f'every {QUICK}th scene')
+    parser.add_argument('--record', type=Path, metavar='FILE', help='write pairs, and no report')
     options = parser.parse_args(args)
+    chosen = SCENES[::QUICK if options.quick else 1]
+    if options.record:
+        record(options.record, chosen)
+        return 0
     folder, ours = output.results_folder(parser, options), str(TIMINGS[0])
-    scenes = {scene().name: scene for scene in SCENES[::QUICK if options.quick else 1]}
+    scenes = {scene().name: scene for scene in chosen}
     found: dict[str, dict[str, Outcome]] = {}
     for name, make in scenes.items():
         found[name] = {str(timing): run(make, timing) for timing in TIMINGS}

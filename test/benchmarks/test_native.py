@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import native
+from benchmarks import native, settled
 from benchmarks.pose_sets import FLUSH, LOADS, SETS, Pairs
 from box_contact_ros.core import instruction_sets
 
@@ -84,12 +84,14 @@ def test_a_wrong_verdict_is_counted(containers: Pairs) -> None:
 
 @needs_compiler
 def test_quick_run(tmp_path: Path) -> None:
-    """Every set and instruction set; the page shows the code of each call that was compiled."""
+    """Every set, scene and instruction set; the page shows the code of each call."""
     pytest.importorskip('mujoco')
     assert native.main(['--quick', '--out', str(tmp_path)]) == 0
     with (tmp_path / 'native.csv').open(encoding='utf-8') as file:
         rows = list(csv.DictReader(file))
-    assert {row['set'] for row in rows} == {*SETS, *LOADS, *FLUSH, native.MIXED}
+    recorded = settled.read()
+    assert {row['set'] for row in rows} == {
+        *SETS, *LOADS, *FLUSH, native.MIXED, *settled.by_engine(recorded), *recorded.scene}
     assert {row['by_unit'] for row in rows if row['contestant'] == native.UNIT} == {'1'}
     text = (tmp_path / 'native.md').read_text('utf-8')
     for call in ('bc_collide(', 'bc_collide_rows(', 'mj_geomDistance(', 'box_box('):

@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip('mujoco')
 
-from benchmarks import stacks
+from benchmarks import settled, stacks
 from benchmarks.loops import MUJOCO, TIMINGS, Boxes, Scene, Timing, corner_speeds, steps
 from benchmarks.stacks import ORDERS, off_centre, ratio, run, sideways, slope, stays
 from box_contact_ros.scene.laws import GRAVITY
@@ -66,3 +66,16 @@ def test_the_program(monkeypatch: pytest.MonkeyPatch, tmp_path: Path,
     assert '| falls | **' in (tmp_path / 'stacks.md').read_text()
     with (tmp_path / 'stacks.csv').open() as file:
         assert [row['way'] for row in csv.DictReader(file)] == [*map(str, TIMINGS), MUJOCO]
+
+
+def test_pairs_are_recorded(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Those whose bounding boxes overlap, as placed and by each engine; they touch at rest."""
+    monkeypatch.setattr(stacks, 'SCENES', (partial(stacks.tower, 2),))
+    assert stacks.main(['--record', str(tmp_path / 'pairs.npz')]) == 0
+    found = settled.read(tmp_path / 'pairs.npz')
+    assert set(found.scene) == {'tower of 2'}
+    assert set(found.engine) == {settled.PLACED, settled.OURS, 'MuJoCo'}
+    sets = settled.by_engine(found)
+    for name in (settled.PLACED, f'settled by {settled.OURS}'):
+        assert len(sets[name].size) == 2
+    assert len(settled.by_scene(found)['tower of 2'].size) == 2

@@ -216,8 +216,8 @@ COLUMNS = (
        0.06934627527088572, -0.6699530857427856, -0.7342430326056912)),
      ((1.1001268510936384, 5.145611642899582, 0.5189853541614936),
       (0.14199844396911854, 0.13223909082101476, 2.6488273527072463))))
-"""Pairs whose overlap is a column, thin along two axes, and whose covariance planes had wrong by 1.9,
-2.0 and 4.6 times its bound. The third one needed clipping by an older rule."""
+"""Pairs whose overlap is a column, thin along two axes. Planes had their covariances wrong by 1.9,
+2.0 and 4.6 times the bound; the third one was clipped by an older rule."""
 
 
 def needles(rng, n, aspect):

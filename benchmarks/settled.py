@@ -1,0 +1,71 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Pairs of boxes as a simulator asks for them all day: goods at rest, recorded.
+
+settled.npz has 12,978 pairs whose bounding boxes overlap, of 20 scenes: stacks, walls, piles,
+grids, and five real orders of BED-BPP (Kagerer et al., 2023, MIT). Each scene was recorded as it
+was placed, and after it had settled with steps of 1 ms by `PatchForces`, MuJoCo 4.0.0 and Bullet
+(pybullet 3.2.7).
+`python -m benchmarks.stacks --record FILE` records the scenes of `stacks` anew.
+"""
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from .pose_sets import Pairs
+
+FILE = Path(__file__).with_suffix('.npz')
+PLACED, OURS = 'as placed', 'PatchForces'
+
+
+class Recorded(NamedTuple):
+    """n pairs, and for each the names (n,) of its scene and of what settled it."""
+
+    pairs: Pairs
+    scene: np.ndarray
+    engine: np.ndarray
+
+    def rows(self, chosen: np.ndarray) -> Recorded:
+        """Return some of the pairs."""
+        return Recorded(self.pairs.rows(chosen), self.scene[chosen], self.engine[chosen])
+
+
+def read(file: Path = FILE) -> Recorded:
+    """Read recorded pairs."""
+    with np.load(file) as arrays:
+        return Recorded(Pairs(*(arrays[name] for name in Pairs._fields)),
+                        arrays['scene_names'][arrays['scene']],
+                        arrays['engine_names'][arrays['engine']])
+
+
+def write(file: Path, recorded: Recorded) -> None:
+    """Write recorded pairs."""
+    (scene_names, scene), (engine_names, engine) = (
+        np.unique(names, return_inverse=True) for names in (recorded.scene, recorded.engine))
+    np.savez_compressed(file, **recorded.pairs._asdict(), scene_names=scene_names,
+                        scene=scene.astype(np.uint8), engine_names=engine_names,
+                        engine=engine.astype(np.uint8))
+
+
+def by_engine(recorded: Recorded) -> dict[str, Pairs]:
+    """Return the pairs that touch by what settled them, ours first; last, all pairs apart."""
+    touch = recorded.pairs.contacts().colliding
+    engines = sorted(set(recorded.engine), key=lambda name: (name != OURS, name == PLACED, name))
+    sets = {PLACED if name == PLACED else f'settled by {name}':
+            recorded.pairs.rows(touch & (recorded.engine == name)) for name in engines}
+    return {**sets, 'recorded, apart': recorded.pairs.rows(~touch)}
+
+
+def by_scene(recorded: Recorded) -> dict[str, Pairs]:
+    """Return the pairs of each scene that touch after `PatchForces`, else as they were placed."""
+    touching = recorded.rows(recorded.pairs.contacts().colliding)
+    found = {}
+    for name in sorted(set(recorded.scene)):
+        here = touching.rows(touching.scene == name)
+        ours = here.rows(here.engine == OURS)
+        found[str(name)] = (ours if len(ours.scene) else here).pairs
+    return found
