@@ -14,17 +14,20 @@ namespace {
 using detail::Kernel;
 
 #if defined(__AVX512F__)
+#define KERNEL kernel_avx512
 constexpr int lanes = 8;
-constexpr const char* title = "AVX-512";
+constexpr const char *name = "avx512", *title = "AVX-512";
 #elif defined(__AVX2__)
+#define KERNEL kernel_avx2
 constexpr int lanes = 4;
-constexpr const char* title = "AVX2";
+constexpr const char *name = "avx2", *title = "AVX2";
 #else
+#define KERNEL kernel_baseline
 constexpr int lanes = 2;
 #if defined(__aarch64__)
-constexpr const char* title = "NEON";
+constexpr const char *name = "baseline", *title = "NEON";
 #else
-constexpr const char* title = "baseline";
+constexpr const char *name = "baseline", *title = "baseline";
 #endif
 #endif
 
@@ -42,23 +45,18 @@ bool pair_by(const float* network, const detail::PairNumbers& pair, double margi
   return solve_pair(model_of<M>(network), pair, margin, contact, counts);
 }
 template <class M>
-long rows_by(const float* network, const Rows& rows, long begin, long end,
-             const Results& results, Counts& counts) {
+long rows_by(const float* network, const Rows& rows, long begin, long end, const Results& results,
+             Counts& counts) {
   return solve_rows<Lanes<double, lanes>>(model_of<M>(network), rows, begin, end, results, counts);
 }
-
-#define NAME_OF(set) #set
-#define NAME(set) NAME_OF(set)
-#define KERNEL_OF(set) kernel_##set
-#define KERNEL(set) KERNEL_OF(set)
 
 }  // namespace
 }  // namespace box_contact::BOX_CONTACT_SET
 
 namespace box_contact::detail {
 
-const Kernel KERNEL(BOX_CONTACT_SET) = {
-    NAME(BOX_CONTACT_SET),
+const Kernel KERNEL = {
+    name,
     title,
     lanes,
     {{pair_by<ExactPointModel>, pair_by<ExactModel>}, {pair_by<MlpPointModel>, pair_by<MlpModel>}},
