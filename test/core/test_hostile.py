@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 from test_library import LIBRARY, Query, Results, Rows, run, tool
 
-from box_contact_ros.core import native
+from box_contact_ros.core import instruction_sets, native
 
 CORE = Path(__file__).resolve().parents[2] / 'box_contact_ros' / 'core'
 BAD_ARGUMENT = 1
@@ -105,6 +105,34 @@ def test_null_pointers(library: CLibrary) -> None:
             assert b'is a null pointer' in library.bc_error_text()
     for name in ('bc_patch_forces_destroy', 'bc_patch_forces_reset', 'bc_patch_forces_bodies'):
         getattr(library, name)(None)
+
+
+SIZES_BELOW_ZERO = """
+#include "query.hpp"
+
+using namespace box_contact::BOX_CONTACT_SET;
+
+int main() {
+  Query<double> asked;
+  const Vec<double> size{-1.0, -1.0, -1.0};
+  const Pose<double> a{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}};
+  const Pose<double> b{{0.1, 0.2, 0.9}, {0.0, 0.0, 0.0, 1.0}};
+  query(a, b, size, size, asked);
+  return asked.pair.valid || asked.axis.axis < 0 || asked.axis.axis > 14;
+}
+"""
+
+
+def test_sizes_below_zero_have_an_axis(tmp_path: Path) -> None:
+    """They are refused after the test of axes, where a tolerance below zero left no best axis."""
+    if 'avx2' not in instruction_sets():
+        pytest.skip('a single pair is a vector of the machine from AVX2 on')
+    source, program = tmp_path / 'sizes.cpp', tmp_path / 'sizes'
+    source.write_text(SIZES_BELOW_ZERO)
+    run(tool('g++'), '-std=c++17', '-O1', '-Wno-psabi', '-march=x86-64-v3', '-ffp-contract=off',
+        '-fsanitize=undefined', '-fno-sanitize-recover=all', f'-I{CORE / "src"}', source, '-o',
+        program)
+    run(program)
 
 
 def test_numbers_of_nothing(library: CLibrary) -> None:

@@ -158,7 +158,8 @@ BC_INLINE void prepare(const Pose<T>& a, const Pose<T>& b, const Vec<T>& size_a,
   pair.b_in_a = transpose(pair.a_in_b);
   pair.axes_a = transpose(first);
   pair.axes_b = transpose(other);
-  pair.size = largest(max(given_a, given_b));
+  // A size below zero is refused, but tolerances are made of it before: no axis would be the best.
+  pair.size = abs(largest(max(given_a, given_b)));
   T reach = largest(max(abs(at_a), abs(at_b)));
   pair.touch = contact_ulps * ulp(max(reach, pair.size));
   pair.valid = valid;
