@@ -1,13 +1,14 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// Print what the library answers for a list of pairs, for comparison with another build of it.
+// Print what the library answers for a list of pairs, and where a tower ends, for comparison with
+// another build of it.
 //
 // usage: answers PAIRS
 //
 // PAIRS has a line for each pair: two poses and two sizes, 20 numbers. The program prints a line for
-// each pair and model: verdict, separation and normal. The exit status is 1 if a row of a batch has
-// other bits than its single call.
+// each pair and model: verdict, separation and normal. Then it prints a line for each body of the tower:
+// pose and velocity. The exit status is 1 if a row of a batch has other bits than its single call.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -17,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "box_contact/box_contact.hpp"
+#include "box_contact/force.hpp"
 
 using box_contact::Contact;
 using box_contact::Pose;
@@ -84,6 +85,54 @@ long print_answers(const Pairs& pairs, box_contact::Model model) {
   return different;
 }
 
+// Print where cubes on the ground end that stand askew: after 400 steps of 5 ms, each with an answer.
+// test_builds.py has the same loop in Python.
+void print_tower() {
+  constexpr int count = 12;  // with the ground
+  const double h = 0.005;
+  std::vector<box_contact::Body> bodies(count, {600.0, {100.0, 100.0, 100.0}});
+  std::vector<Size> sizes(count, {1.0, 1.0, 1.0});
+  std::vector<Pose> poses(count, {{0.0, 0.0, -0.5}, {0.0, 0.0, 0.0, 1.0}});
+  std::vector<box_contact::Velocity> velocities(count, box_contact::Velocity{});
+  std::vector<box_contact::Wrench> weights(count, {{0.0, 0.0, -9.81 * 600.0}, {}});
+  std::vector<std::int64_t> pairs;
+  bodies[0] = {0.0, {}}, weights[0] = {};
+  sizes[0] = {20.0, 20.0, 1.0};
+  for (int k = 1; k < count; ++k) {
+    poses[k] = {{0.03 * (k % 3), 0.02 * (k % 2), k - 0.499}, {0.0, 0.0, 0.01 * k, 1.0}};
+    pairs.insert(pairs.end(), {k - 1, k});
+  }
+  constexpr int rows = count - 1;
+  double separation[rows], normal[3 * rows], point[3 * rows], volume[rows], covariance[9 * rows];
+  box_contact::Patches answer{};
+  answer.size = sizeof answer, answer.count = rows, answer.pairs = pairs.data();
+  answer.separation = separation, answer.normal = normal, answer.point = point;
+  answer.volume = volume, answer.covariance = covariance;
+  box_contact::PatchForces forces(bodies);
+  for (int step = 0; step < 400; ++step) {
+    box_contact::collide({poses, poses, sizes, sizes, pairs},
+                         {nullptr, separation, normal, point, volume, covariance});
+    forces.hold(answer, poses);
+    forces.step(h, poses, velocities, weights, velocities);
+    for (int k = 1; k < count; ++k) {
+      const double *v = velocities[k].linear, *w = velocities[k].angular;
+      double *q = poses[k].quaternion, x = q[0], y = q[1], z = q[2], s = q[3];
+      for (int i = 0; i < 3; ++i) poses[k].position[i] += h * v[i];
+      q[0] += 0.5 * h * (w[0] * s + (w[1] * z - w[2] * y));
+      q[1] += 0.5 * h * (w[1] * s + (w[2] * x - w[0] * z));
+      q[2] += 0.5 * h * (w[2] * s + (w[0] * y - w[1] * x));
+      q[3] -= 0.5 * h * (w[0] * x + (w[1] * y + w[2] * z));
+    }
+  }
+  for (int k = 0; k < count; ++k) {
+    for (double number : poses[k].position) std::printf("%a ", number);
+    for (double number : poses[k].quaternion) std::printf("%a ", number);
+    for (double number : velocities[k].linear) std::printf("%a ", number);
+    for (double number : velocities[k].angular) std::printf("%a ", number);
+    std::puts("");
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -91,6 +140,7 @@ int main(int argc, char** argv) {
   const Pairs pairs = read_pairs(argv[1]);
   const long different = print_answers(pairs, box_contact::Model::exact) +
                          print_answers(pairs, box_contact::Model::mlp);
+  print_tower();
   if (different) std::fprintf(stderr, "%ld rows differ from their single calls\n", different);
   return different != 0;
 }

@@ -374,7 +374,9 @@ class PatchForces {
       for (Block& block : blocks_) {
         Moving &a = moving_[size_t(block.a)], &b = moving_[size_t(block.b)];
         if (std::max(a.changed, b.changed) < iteration - 1) continue;
-        if (std::max(rub(block), press(block, block.*rows)) <= least_change) continue;
+        double pressed = press(block, block.*rows);  // friction is bounded by what presses now
+        double rubbed = rub(block);
+        if (std::max(pressed, rubbed) <= least_change) continue;
         is_solved = false;
         if (a.inverse_mass > 0.0) a.changed = iteration;
         if (b.inverse_mass > 0.0) b.changed = iteration;
