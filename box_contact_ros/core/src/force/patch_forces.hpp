@@ -31,7 +31,11 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// Angular frequency of a soft constraint times the step [1]: a quarter turn. A box that rests on a
+// A window is at least the one before divided by this, and a step begins with at most so many times the
+// impulses of a window [1]. What iterations leave is as large in a step of 1 ns as in one of 5 ms:
+// divided by the step it would be any force.
+constexpr double window_growth = 2.0;
+// Angular frequency of a soft constraint times the window [1]: a quarter turn. A box that rests on a
 // whole face is 0.4·g·step² deep.
 constexpr double soft_frequency = 1.57;
 // The same times half a period and the latency of an answer [1]. With 2 a container at 50 Hz and 5 ms
@@ -49,7 +53,8 @@ constexpr double overdue_periods = 3.0;
 // jittered tower of 20 sways for 8 s.
 constexpr double least_change = 1e-8;
 
-// The patch of a pair, where it was asked for, and the impulses that its rows gave in the last step.
+// The patch of a pair, where it was asked for, and the impulses that its rows gave in the last window:
+// in the last step, and before it if that was short.
 struct Patch {
   int32_t a, b;  // places of the bodies, a < b
   Placed asked_a, asked_b;
@@ -153,7 +158,9 @@ class PatchForces {
             bc_velocity* after, bc_wrench* wrenches) {
     begin(h, poses, velocities, outside);
     blocks_.resize(patches_.size());
-    double ratio = clock_.step > 0.0 ? h / clock_.step : 1.0;
+    double before = clock_.window;
+    clock_.window = std::max(h, before / window_growth);
+    double ratio = before > 0.0 ? std::min(h / before, window_growth) : 1.0;
     for (size_t k = 0; k < patches_.size(); ++k) {
       prepare(patches_[k], h, blocks_[k]);
       warm_start(patches_[k], ratio, blocks_[k]);
@@ -169,9 +176,9 @@ class PatchForces {
     for (size_t k = 0; k < bodies_.size(); ++k)
       relaxed_[k] = {relaxed_[k].linear + moving_[k].linear,
                      relaxed_[k].angular + moving_[k].angular};
-    for (size_t k = 0; k < patches_.size(); ++k) store(blocks_[k], patches_[k]);
+    double kept = before > 0.0 ? (clock_.window - h) / before : 0.0;
+    for (size_t k = 0; k < patches_.size(); ++k) store(blocks_[k], kept, patches_[k]);
     if (clock_.since >= 0.0) clock_.since += h;
-    clock_.step = h;
   }
 
   // Visit all of the state: whole numbers, single structs, and rows of structs.
@@ -199,7 +206,7 @@ class PatchForces {
   struct Clock {
     double since = -1.0;  // the last answer [s]; below 0: there was none
     double period = 0.0;  // between answers, as told or between the last two [s]
-    double step = 0.0;    // the last one [s]
+    double window = 0.0;  // the time in which the patches' impulses were given [s]
   };
 
   template <class Condition>
@@ -313,7 +320,7 @@ class PatchForces {
     block.relaxed = {{0.0, 0.0, 0.0}, {is_apart ? -depth / h : 0.0, 0.0, 0.0}, inverse(pressed)};
     block.pushing = block.relaxed;
     if (is_apart || patch.age > overdue_periods * std::max(clock_.period, h)) return;
-    double frequency = soft_frequency / h;
+    double frequency = soft_frequency / clock_.window;
     double bearable = late_frequency / (patch.late + 0.5 * clock_.period);
     bool is_late = bearable < frequency, is_spring = patch.stiffness > 0.0;
     if (is_late) frequency = bearable;
@@ -339,23 +346,36 @@ class PatchForces {
     return inverse(pressed);
   }
 
-  // Give the impulses of the last step again, as they are about the point of this one.
-  void warm_start(const Patch& patch, double ratio, Block& block) {
+  // The impulses of the last window, about the point of this step.
+  void remember(const Patch& patch, const Block& block, Vec<double>& press, Vec<double>& rub) const {
     const Rectangle& shape = block.shape;
     Vec<double> moved = patch.given_at - places_[size_t(patch.a)].position - block.arm_a;
     Vec<double> rock = patch.rock + cross(moved, patch.press * patch.normal);
     double spin = patch.spin + dot(patch.normal, cross(moved, patch.slip));
-    block.press = ratio * Vec<double>{patch.press,
-                                      clamp(dot(rock, shape.axis_1), patch.press * shape.half_2),
-                                      clamp(dot(rock, shape.axis_2), patch.press * shape.half_1)};
-    block.rub = ratio * Vec<double>{dot(patch.slip, shape.axis_1), dot(patch.slip, shape.axis_2),
-                                    shape.radius > 0.0 ? spin / shape.radius : 0.0};
-    bound(block.rub, block.friction * block.press[0]);
+    press = {patch.press, clamp(dot(rock, shape.axis_1), patch.press * shape.half_2),
+             clamp(dot(rock, shape.axis_2), patch.press * shape.half_1)};
+    rub = {dot(patch.slip, shape.axis_1), dot(patch.slip, shape.axis_2),
+           shape.radius > 0.0 ? spin / shape.radius : 0.0};
+    bound(rub, block.friction * press[0]);
+  }
+
+  // Give `ratio` of them again.
+  void warm_start(const Patch& patch, double ratio, Block& block) {
+    remember(patch, block, block.press, block.rub);
+    block.press = ratio * block.press;
+    block.rub = ratio * block.rub;
     give_press(block, block.press);
     give_rub(block, block.rub);
   }
 
-  void store(const Block& block, Patch& patch) const {
+  // Keep the impulses of this step, and `kept` of those before.
+  void store(Block& block, double kept, Patch& patch) const {
+    if (kept > 0.0) {
+      Vec<double> press, rub;
+      remember(patch, block, press, rub);
+      block.press += kept * press;
+      block.rub += kept * rub;
+    }
     const Rectangle& shape = block.shape;
     patch.press = block.press[0];
     patch.rock = block.press[1] * shape.axis_1 + block.press[2] * shape.axis_2;

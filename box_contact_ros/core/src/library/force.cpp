@@ -56,7 +56,7 @@ bc_status read_bodies(const bc_body* given, int64_t count, std::vector<Body>& bo
   return BC_OK;
 }
 
-constexpr int64_t state_format = 0x3146504342;  // "BCPF1"
+constexpr int64_t state_format = 0x3246504342;  // "BCPF2"
 
 int64_t state_size(const PatchForces& forces) {
   size_t size = 0;
