@@ -270,14 +270,17 @@ class PatchForces {
                 {}, 0};
       if (!body.is_free()) continue;
       moving.inverse_inertia = inverse_inertia_of(body, places_[k]);
-      Vec<double> torque = gyroscopic_torque(body, places_[k], moving.angular);
-      if (outside) {
-        torque = torque + vector(outside[k].torque);
-        moving.linear = moving.linear + (h * body.inverse_mass) * vector(outside[k].force);
-      }
-      moving.linear = moving.linear + relaxed_[k].linear;
-      moving.angular = moving.angular + relaxed_[k].angular + h * (moving.inverse_inertia * torque);
+      moving.angular += places_[k].axes * coasting(k, h, moving.angular) + relaxed_[k].angular;
+      moving.linear += relaxed_[k].linear;
+      if (!outside) continue;
+      moving.linear += (h * body.inverse_mass) * vector(outside[k].force);
+      moving.angular += h * (moving.inverse_inertia * vector(outside[k].torque));
     }
+  }
+
+  // How a body's angular velocity changes in a step without any torque; in its own frame.
+  Vec<double> coasting(size_t k, double h, const Vec<double>& angular) const {
+    return gyroscopic_change(bodies_[k], transposed_times(places_[k].axes, angular), h);
   }
 
   void prepare(const Patch& patch, double h, Block& block) const {
@@ -512,8 +515,8 @@ class PatchForces {
     Vec<double> linear = moving_[k].linear - vector(velocity.linear);
     Vec<double> angular = vector(velocity.angular), turned = moving_[k].angular - angular;
     Vec<double> force = (1.0 / (h * body.inverse_mass)) * linear;
-    Vec<double> torque = axes * (transposed_times(axes, (1.0 / h) * turned) / body.inverse_inertia) -
-                         gyroscopic_torque(body, places_[k], angular);
+    Vec<double> driven = transposed_times(axes, turned) - coasting(k, h, angular);
+    Vec<double> torque = axes * (((1.0 / h) * driven) / body.inverse_inertia);
     if (outside) {
       force = force - vector(outside->force);
       torque = torque - vector(outside->torque);

@@ -39,12 +39,12 @@ inline Vec<double> vector_at(const double* numbers) {
 }
 inline Vec<double> vector(const double (&numbers)[3]) { return vector_at(numbers); }
 
-// The inverse of a symmetric positive definite matrix, by its cofactors. A singular one gives zero.
+// The inverse of a matrix, by its cofactors. One whose determinant is not positive gives zero.
 inline Mat<double> inverse(const Mat<double>& m) {
   Vec<double> r0 = row(m, 0), r1 = row(m, 1), r2 = row(m, 2), c0 = cross(r1, r2);
   double determinant = dot(r0, c0), s = determinant > 0.0 ? 1.0 / determinant : 0.0;
   Vec<double> x = s * c0, y = s * cross(r2, r0), z = s * cross(r0, r1);
-  return {{{x[0], x[1], x[2]}, {y[0], y[1], y[2]}, {z[0], z[1], z[2]}}};
+  return {{{x[0], y[0], z[0]}, {x[1], y[1], z[1]}, {x[2], y[2], z[2]}}};
 }
 
 // Two unit vectors across a unit normal.
@@ -82,11 +82,28 @@ inline Mat<double> inverse_inertia_of(const Body& body, const Placed& placed) {
   return m;
 }
 
-// −ω × (I·ω), in the common frame.
-inline Vec<double> gyroscopic_torque(const Body& body, const Placed& placed,
-                                     const Vec<double>& angular) {
-  Vec<double> own = transposed_times(placed.axes, angular);
-  return placed.axes * cross(own / body.inverse_inertia, own);
+// How much the angular velocity ω of a body that nothing touches changes in a step h; all in its frame.
+//
+// Implicit midpoint, which keeps the energy, by two Newton steps: I·Δ = −h·ω̄ × I·ω̄ with ω̄ = ω + Δ/2.
+// An explicit step gains energy without bound. What Newton leaves of the energy is scaled off.
+inline Vec<double> gyroscopic_change(const Body& body, const Vec<double>& angular, double h) {
+  const Vec<double>& inverse_inertia = body.inverse_inertia;
+  Vec<double> ones{1.0, 1.0, 1.0}, inertia = ones / inverse_inertia;
+  // Euler's equations: the rate of ω0 is share[0]·ω1·ω2, and so on.
+  Vec<double> share = Vec<double>{inertia[1] - inertia[2], inertia[2] - inertia[0],
+                                  inertia[0] - inertia[1]} * inverse_inertia;
+  Vec<double> change{0.0, 0.0, 0.0};
+  for (int newton = 0; newton < 2; ++newton) {
+    Vec<double> mean = angular + 0.5 * change, x = (0.5 * h) * share;
+    Vec<double> rate = share * Vec<double>{mean[1] * mean[2], mean[2] * mean[0], mean[0] * mean[1]};
+    Mat<double> slope{{{1.0, -x[0] * mean[2], -x[0] * mean[1]},
+                       {-x[1] * mean[2], 1.0, -x[1] * mean[0]},
+                       {-x[2] * mean[1], -x[2] * mean[0], 1.0}}};
+    change = change - inverse(slope) * (change - h * rate);
+  }
+  Vec<double> after = angular + change;
+  double energy = dot(inertia * angular, angular), found = dot(inertia * after, after);
+  return found > 0.0 ? std::sqrt(energy / found) * after - angular : change;
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET::force
