@@ -65,6 +65,8 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
     A path that leads to no file from here may be one of the package's own, config/scenes/….
     Raises SceneError, a ValueError whose words name file and field.
     """
+    if not isinstance(path, str | os.PathLike) or not _is_name(os.fspath(path)):
+        raise SceneError(f'path must be that of a file, not {short_repr(path)}')
     try:
         text = _read(find_file(path))
         _check_yaml(text)
@@ -141,6 +143,10 @@ def _check_yaml(text: str) -> None:
 
 def _refusal(problem: str, event: Any) -> yaml.YAMLError:
     return yaml.MarkedYAMLError(problem=problem, problem_mark=event.start_mark)
+
+
+def _is_name(path: str | bytes) -> bool:
+    return isinstance(path, str) and '\0' not in path
 
 
 def _scene_of(data: Any) -> Scene:

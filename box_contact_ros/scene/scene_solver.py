@@ -15,12 +15,21 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 
 from ..core import LENGTH_MAX, native
-from ..solver.checks import as_floats, name_fault, pose_fault, short_repr, size_fault
+from ..solver.checks import (
+    as_floats,
+    as_number,
+    as_whole,
+    is_row,
+    name_fault,
+    pose_fault,
+    short_repr,
+    size_fault,
+)
 from ..solver.contact import Contact, Contacts
 from ..solver.contact_solver import BY_PLACE, ContactSolver
 from ..solver.models import Model
@@ -48,6 +57,24 @@ class Box:
     size: tuple[float, ...]  # three full extents [m]
     pose: tuple[float, ...] | None = None  # `x y z qx qy qz qw` in the common frame, of a fixed box
     pose_topic: str = ''  # where a moving box's poses come from
+
+    def __post_init__(self) -> None:
+        def refuse(field: str, reason: str) -> NoReturn:
+            raise Fault(('boxes', str(self.name), field), reason)
+
+        if not isinstance(self.name, str):
+            refuse('name', f'must be text, not {short_repr(self.name)}')
+        for field, given, count in (('size', self.size, 3), ('pose', self.pose, 7)):
+            if not is_row(given, count) and not (given is None and field == 'pose'):
+                refuse(field, f'must be a tuple of {count} numbers, not {short_repr(given)}')
+        if fault := size_fault(self.size):
+            refuse('size', fault)
+        if not isinstance(self.pose_topic, str):
+            refuse('pose_topic', f'must be text, not {short_repr(self.pose_topic)}')
+        if self.pose and self.pose_topic:
+            refuse('pose_topic', f'{short_repr(self.pose_topic)}: a box with a pose never moves')
+        if self.pose and (fault := pose_fault(self.pose)):
+            refuse('pose', fault)
 
 
 class Pair(NamedTuple):
@@ -90,10 +117,7 @@ class Scene:
     patterns: tuple[Pattern, ...] = ()
 
     def __post_init__(self) -> None:
-        fault = name_fault(self.frame_id)
-        if fault:
-            raise Fault(('frame_id',), fault)
-        _check_boxes(self.boxes)
+        _check_kinds(self)
         _check_pairs(self.boxes, self.pairs)
         for number, (a, b) in enumerate(self.patterns):
             _check_pattern(self, number, self.matching(a), self.matching(b))
@@ -259,24 +283,30 @@ class Fault(ValueError):
         self.path, self.reason = path, reason
 
 
-def _check_boxes(boxes: Mapping[str, Box]) -> None:
-    """Raise Fault for the first thing that is wrong with a box."""
-    for name, box in boxes.items():
-        fault = name_fault(name)
-        if fault:
-            raise Fault(('boxes',), fault)
-        for key, given, count in (('size', box.size, 3), ('pose', box.pose, 7)):
-            if given is not None and (not isinstance(given, tuple | list) or len(given) != count):
-                raise Fault(('boxes', name, key),
-                            f'must be a tuple of {count} numbers, not {short_repr(given)}')
-        fault = size_fault(box.size)
-        if fault:
-            raise Fault(('boxes', name, 'size'), fault)
-        if box.pose and box.pose_topic:
-            raise Fault(('boxes', name, 'pose_topic'), 'a box with a pose never moves')
-        fault = pose_fault(box.pose) if box.pose else None
-        if fault:
-            raise Fault(('boxes', name, 'pose'), fault)
+def _check_kinds(scene: Scene) -> None:
+    """Raise Fault for the first field of a scene that is of another kind."""
+    def check(is_kind: bool, path: KeyPath, kind: str, value: object) -> None:
+        if not is_kind:
+            raise Fault(path, f'must be {kind}, not {short_repr(value)}')
+
+    check(isinstance(scene.boxes, Mapping), ('boxes',), 'boxes by name', scene.boxes)
+    for name, box in scene.boxes.items():
+        check(isinstance(name, str), ('boxes',), 'boxes by name', scene.boxes)
+        check(isinstance(box, Box), ('boxes', name), 'a Box', box)
+    for part in ('pairs', 'patterns'):
+        rows = getattr(scene, part)
+        check(isinstance(rows, tuple | list), (part,), f'a tuple of {part}', rows)
+        for number, row in enumerate(rows):
+            check(isinstance(row, Pair) if part == 'pairs' else len(row) == 2, (part, number),
+                  'a Pair' if part == 'pairs' else 'the names a and b', row)
+            for value in row:
+                check(isinstance(value, str), (part, number), 'of text', row)
+    check(isinstance(scene.frame_id, str), ('frame_id',), 'text', scene.frame_id)
+    check(isinstance(scene.pose_array, bool), ('pose_array',), 'True or False', scene.pose_array)
+    for path, names in ((('frame_id',), (scene.frame_id,)), (('boxes',), scene.boxes)):
+        for name in names:
+            if fault := name_fault(name):
+                raise Fault(path, fault)
 
 
 def _check_pairs(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
@@ -368,8 +398,12 @@ class SceneSolver:
         margin: up to which separation pairs apart are listed [m].
         most_near: pairs that a tick may leave to the model; of more, it raises TooManyNear.
         """
+        if not isinstance(scene, Scene):
+            raise ValueError(f'scene must be a Scene, not {short_repr(scene)}')
+        margin = as_number(margin, 'margin')
         if not 0.0 <= margin <= LENGTH_MAX:
             raise ValueError(f'margin must lie within 0 and {LENGTH_MAX:g} m, not {margin:g}')
+        most_near = as_whole(most_near, 'most_near', 0, sys.maxsize)
         self.scene = scene
         self.model = model
         self.margin = margin
@@ -439,12 +473,16 @@ class SceneSolver:
         """Take the poses of the moving boxes."""
         if native.write_poses(self._poses, self._moving, poses):  # those of every node
             return
+        is_array = isinstance(poses, np.ndarray) and poses.ndim > 0
+        if not is_array and (not isinstance(poses, Sequence) or isinstance(poses, str)):
+            raise ValueError('poses must be a list of a pose or None for each box that moves, not '
+                             f'{short_repr(poses)}')
         if len(poses) != len(self._moving):
             raise ValueError(f'{len(poses)} poses, but {len(self._moving)} boxes move: '
                              f'{short_repr(list(self.scene.moving))}; give a list of a pose or '
                              'None for each')
         if isinstance(poses, np.ndarray):
-            self._poses[self._moving] = as_floats(poses, 'poses', 'poses (n, 7)', (None, 7))
+            self._poses[self._moving] = as_floats(poses, 'poses', 'rows (n, 7)', (None, 7))
             return
         for name, index, pose in zip(self.scene.moving, self._moving, poses):
             self._poses[index] = NOWHERE if pose is None else as_floats(

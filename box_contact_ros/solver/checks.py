@@ -11,6 +11,7 @@ import math
 import numbers
 import reprlib
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from difflib import get_close_matches
 from typing import Any
 
@@ -105,6 +106,25 @@ def size_fault(size: Sequence[float] | np.ndarray) -> str | None:
     return None
 
 
+def as_number(value: Any, name: str) -> float:
+    """Return a number as a float; ValueError for anything else, a boolean as well."""
+    if type(value) is float:
+        return value
+    if isinstance(value, np.ndarray) and not value.shape:
+        value = value[()]
+    if isinstance(value, numbers.Real) and not isinstance(value, bool):
+        with suppress(OverflowError):
+            return float(value)
+    raise ValueError(f'{name} must be a number, not {short_repr(value)}')
+
+
+def as_whole(value: Any, name: str, low: int, high: int) -> int:
+    """Return a whole number from `low` to `high`; ValueError for anything else."""
+    if isinstance(value, int | np.integer) and not isinstance(value, bool) and low <= value <= high:
+        return int(value)
+    raise ValueError(f'{name} must be a whole number from {low} to {high}, not {short_repr(value)}')
+
+
 def as_floats(value: ArrayLike, name: str, shapes: str, *accepted: tuple[int | None, ...],
               ) -> np.ndarray:
     """Return `value` as a contiguous float64 array of an `accepted` shape (None: any length).
@@ -126,8 +146,8 @@ def as_floats(value: ArrayLike, name: str, shapes: str, *accepted: tuple[int | N
     raise ValueError(f'{name} must be {shapes}, not an array of shape {array.shape}')
 
 
-def as_places(value: ArrayLike, name: str, count: int) -> np.ndarray:
-    """Return pairs of places (n, 2) among `count` rows as a contiguous int64 array."""
+def as_pairs(value: ArrayLike, name: str) -> np.ndarray:
+    """Return pairs of whole numbers (n, 2) as a contiguous int64 array."""
     try:
         array = _as_array(value)
     except (TypeError, ValueError, OverflowError):
@@ -137,12 +157,18 @@ def as_places(value: ArrayLike, name: str, count: int) -> np.ndarray:
     whole = array.dtype.kind in 'iu' or array.size == 0
     if not whole or array.ndim != 2 or array.shape[1] != 2:
         raise ValueError(f'{name} must be whole numbers (n, 2), not {short_repr(value)}')
+    return np.require(array, np.int64, ('C', 'A'))  # of 2^63 and more, it makes negative numbers
+
+
+def as_places(value: ArrayLike, name: str, count: int) -> np.ndarray:
+    """Return pairs of places (n, 2) among `count` rows as a contiguous int64 array."""
+    array = as_pairs(value, name)
     outside = ((array < 0) | (array >= count)).any(axis=1)
     if outside.any():
         row = int(np.argmax(outside))
         raise ValueError(f'{name}[{row}] is {tuple(array[row].tolist())}, but there are {count} '
                          'poses')
-    return np.require(array, np.int64, ('C', 'A'))
+    return array
 
 
 def _as_array(value: ArrayLike) -> np.ndarray:
@@ -160,6 +186,12 @@ def _holds_numbers(array: np.ndarray) -> bool:
     if array.dtype.kind == 'O':  # also what integers beyond 64 bits come as
         return all(isinstance(v, numbers.Real) and not isinstance(v, bool) for v in array.flat)
     return array.dtype.kind in 'fiu'
+
+
+def is_row(value: object, count: int) -> bool:
+    """Return whether a value is a tuple or list of so many real numbers."""
+    return isinstance(value, tuple | list) and len(value) == count and all(
+        isinstance(v, numbers.Real) and not isinstance(v, bool) for v in value)
 
 
 def as_size(size: ArrayLike, name: str) -> np.ndarray:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import native
+from .checks import short_repr
 
 Contact = native.Contact
 
@@ -35,6 +36,10 @@ class Contacts(NamedTuple):
     @classmethod
     def of(cls, contacts: Sequence[Contact]) -> Contacts:
         """Return single contacts as arrays."""
+        for number, contact in enumerate(contacts):
+            if not isinstance(contact, Contact):
+                raise ValueError(f'contacts[{number}] must be a Contact, not {short_repr(contact)}')
+
         def column(name: str, kind: type, *shape: int) -> np.ndarray:
             values = [getattr(contact, name) for contact in contacts]
             return np.array(values, kind).reshape(len(values), *shape)

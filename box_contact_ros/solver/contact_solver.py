@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import native
-from .checks import as_floats, as_places, as_size, pose_fault, short_repr, size_fault
+from .checks import (
+    as_floats,
+    as_number,
+    as_places,
+    as_size,
+    as_whole,
+    pose_fault,
+    short_repr,
+    size_fault,
+)
 from .contact import Contact, Contacts, without_patch
 from .mlp import NETWORK, core_numbers, load_mlp
 from .models import NATIVE, Model, check_model, make_model
@@ -45,7 +55,7 @@ class ContactSolver(native.PairSolver):
     def __init__(self, size_a: ArrayLike, size_b: ArrayLike, *, model: str | Model = 'exact',
                  weights: str | None = None, margin: float = 0.0) -> None:
         row_a, row_b = as_size(size_a, 'size_a'), as_size(size_b, 'size_b')
-        margin = as_floats(margin, 'margin', 'a number', ()).item()
+        margin = as_number(margin, 'margin')
         if not margin >= 0.0:
             raise ValueError(f'margin must be 0 or more, not {margin:g}')
         if weights is not None and not isinstance(weights, (str, os.PathLike)):
@@ -112,8 +122,9 @@ class ContactSolver(native.PairSolver):
 
         Raises ValueError, with field and value, for what is refused.
         """
-        if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
-            raise ValueError(f'threads must be a whole number from 1 on, not {short_repr(threads)}')
+        threads = as_whole(threads, 'threads', 1, sys.maxsize)
+        if not isinstance(patch, (bool, np.bool_)):
+            raise ValueError(f'patch must be True or False, not {short_repr(patch)}')
         if pairs is not None:
             if poses_b is not None or size_a is not None or size_b is not None:
                 raise ValueError('pairs are places in poses and sizes: batch(poses, sizes=…, '
@@ -144,8 +155,6 @@ class ContactSolver(native.PairSolver):
     def _solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
                names: Names, threads: int = 1, patch: bool = True,
                places: np.ndarray | None = None) -> Contacts:
-        if threads > 1:
-            threads = min(int(threads), 1 + len(a if places is None else places))
         if self._model is None:
             contacts, refused = self.solve(a, b, size_a, size_b, threads, bool(patch), places)
         else:

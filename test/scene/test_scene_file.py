@@ -95,7 +95,7 @@ def test_patterns_stand_for_pairs_of_which_one_box_moves(scene_of):
     ('pose_topic: /crane/spreader', 'pose_topic: 2 crane', 'boxes.spreader.pose_topic: '),
     ('pose_topic: /crane/spreader', 'colour: red', 'boxes.spreader: Additional properties'),
     ('    pose_topic: /crane/spreader\n', '    pose_topic: a\n    pose: [0, 0, 0, 0, 0, 0, 1]\n',
-     'boxes.spreader.pose_topic: a box with a pose never moves'),
+     "boxes.spreader.pose_topic: 'a': a box with a pose never moves"),
     ('size: [6, 2.4, 0.5]', 'size: !!python/tuple [6, 2.4, 0.5]', 'python/tuple'),
     ('a: spreader', 'a: lorry', "pairs[1].a: 'lorry' is none of the boxes"),
     ('a: spreader', 'a: load', "pairs[1].b: 'load' is the same box as a"),
@@ -146,7 +146,7 @@ def test_files_that_cannot_be_read(tmp_path):
                         (tmp_path, 'cannot be read: it is not a regular file'),
                         (tmp_path / 'pipe', 'cannot be read: it is not a regular file'),
                         (tmp_path / 'large', 'cannot be read: it has more than 67108864 bytes'),
-                        (tmp_path / 'null\0', 'null byte'),
+                        (tmp_path / 'null\0', 'path must be that of a file'),
                         (tmp_path / 'latin', "codec can't decode byte")):
         with pytest.raises(SceneError, match=words):
             read_scene(path)

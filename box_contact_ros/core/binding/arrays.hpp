@@ -52,6 +52,13 @@ inline long whole_of(PyObject* number) {
   long value = PyLong_AsLong(number);
   return value == -1 && PyErr_Occurred() ? throw PythonError{} : value;
 }
+inline double number_of(PyObject* number, const char* name) {
+  double value = PyFloat_AsDouble(number);
+  if (value != -1.0 || !PyErr_Occurred()) return value;
+  PyErr_Clear();
+  PyErr_Format(PyExc_ValueError, "%s must be a number, not %.200R", name, number);
+  throw PythonError{};
+}
 inline bool truth_of(PyObject* object) {
   int truth = PyObject_IsTrue(object);
   return truth < 0 ? throw PythonError{} : truth > 0;
@@ -82,7 +89,16 @@ void check_shape(const Array<Number>& given, const char* name, Shape shape) {
     fits = wanted == any_length || wanted == given.length(int(axis));
   }
   if (fits) return;
-  PyErr_Format(PyExc_ValueError, "%s has the wrong shape", name);
+  Owned wanted(made(PyTuple_New(Py_ssize_t(shape.size()))));
+  for (size_t axis = 0; axis < shape.size(); ++axis) {
+    npy_intp length = shape.begin()[axis];
+    PyTuple_SET_ITEM(
+        wanted.get(), Py_ssize_t(axis),
+        made(length == any_length ? PyUnicode_FromString("n") : PyLong_FromSsize_t(length)));
+  }
+  Owned found(made(PyObject_GetAttrString(given.object.get(), "shape")));
+  PyErr_Format(PyExc_ValueError, "%s must be an array of shape %S, not %S", name, wanted.get(),
+               found.get());
   throw PythonError{};
 }
 
@@ -98,12 +114,26 @@ bool is_plain(PyObject* object) {
 template <class Number>
 Array<Number> read(PyObject* argument, const char* name, Shape shape) {
   static_assert(!std::is_same_v<Number, bool>);
-  Array<Number> array(
-      is_plain<Number>(argument)  // NumPy takes five times as long to see it
-          ? Py_NewRef(argument)
-          : PyArray_FROM_OTF(argument, numpy_type<Number>, NPY_ARRAY_CARRAY_RO));
+  PyObject* converted = is_plain<Number>(argument)  // NumPy takes five times as long to see it
+                            ? Py_NewRef(argument)
+                            : PyArray_FROM_OTF(argument, numpy_type<Number>, NPY_ARRAY_CARRAY_RO);
+  if (!converted &&
+      (PyErr_ExceptionMatches(PyExc_TypeError) || PyErr_ExceptionMatches(PyExc_ValueError))) {
+    PyErr_Clear();  // NumPy's words have no name
+    PyErr_Format(PyExc_ValueError, "%s must be an array of numbers, not %.200R", name, argument);
+  }
+  Array<Number> array(converted);
   check_shape(array, name, shape);
   return array;
+}
+// Take one that is such an array, or None, as it is: no code of Python's runs. Another kind of object
+// gives false.
+template <class Number>
+bool read_plain(PyObject* argument, Array<Number>& array) {
+  if (argument == Py_None) return true;
+  if (!is_plain<Number>(argument)) return false;
+  array = Array<Number>(Py_NewRef(argument));
+  return true;
 }
 // The same, or None.
 template <class Number>

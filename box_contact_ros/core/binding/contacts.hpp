@@ -38,16 +38,18 @@ inline PyObject* contact_covariance(PyObject* self, void*) {
 }
 
 inline PyObject* contact_new(PyTypeObject* type, PyObject* args, PyObject* keywords) {
-  PyObject *normal_given, *point_given, *covariance_given;
+  PyObject *separation_given, *normal_given, *point_given, *volume_given, *covariance_given;
   int colliding;
   bc_contact contact{};
   contact.axis = -1;
   static const char* names[] = {"colliding", "separation", "normal", "point",
                                 "volume",    "covariance", "axis",   nullptr};
-  if (!PyArg_ParseTupleAndKeywords(args, keywords, "pdOOdO|i:Contact", const_cast<char**>(names),
-                                   &colliding, &contact.separation, &normal_given, &point_given,
-                                   &contact.volume, &covariance_given, &contact.axis))
+  if (!PyArg_ParseTupleAndKeywords(args, keywords, "pOOOOO|i:Contact", const_cast<char**>(names),
+                                   &colliding, &separation_given, &normal_given, &point_given,
+                                   &volume_given, &covariance_given, &contact.axis))
     return nullptr;
+  contact.separation = number_of(separation_given, "separation");
+  contact.volume = number_of(volume_given, "volume");
   contact.colliding = colliding != 0;
   auto normal = read<double>(normal_given, "normal", {3});
   auto point = read<double>(point_given, "point", {3});
