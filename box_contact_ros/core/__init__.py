@@ -37,6 +37,12 @@ LENGTH_MIN, LENGTH_MAX = native.LENGTH_MIN, native.LENGTH_MAX
 """Least extent, and largest extent or coordinate, that are accepted [m]."""
 QUATERNION_MIN, QUATERNION_MAX = native.QUATERNION_MIN, native.QUATERNION_MAX
 """Least and largest norm of a quaternion that are accepted."""
+MASS_MIN, MASS_MAX = native.MASS_MIN, native.MASS_MAX
+"""Least and largest mass [kg] and moment of inertia [kg m²] that are accepted."""
+INERTIA_SLACK = native.INERTIA_SLACK
+"""By how much of it a moment of inertia may exceed the sum of the two others."""
+THREADS_MAX = native.THREADS_MAX
+"""Most threads that a batch is accepted with."""
 DEPTH_FLOOR = native.DEPTH_FLOOR
 """Least depth to which boxes are pressed together before the overlap is taken [of the size]."""
 NETWORK_FORMAT = native.NETWORK_FORMAT

@@ -11,6 +11,9 @@ LENGTH_MIN: float
 LENGTH_MAX: float
 QUATERNION_MIN: float
 QUATERNION_MAX: float
+MASS_MIN: float
+MASS_MAX: float
+INERTIA_SLACK: float
 CONTACT_ULPS: float
 DEPTH_FLOOR: float
 
@@ -18,6 +21,7 @@ NETWORK_FORMAT: int
 FEATURES: int
 OUTPUTS: int
 UNITS_MAX: int
+THREADS_MAX: int
 
 kernel: str
 instruction_set: str
@@ -66,9 +70,9 @@ class PatchForces:
     def hold(self, pairs: ArrayLike, separation: ArrayLike, normal: ArrayLike, point: ArrayLike,
              volume: ArrayLike, covariance: ArrayLike, poses: ArrayLike,
              friction: ArrayLike | None, surface: ArrayLike | None, stiffness: ArrayLike | None,
-             age: float, period: float, /) -> None: ...
+             age: float, period: float, /) -> bool: ...
     def step(self, dt: float, poses: ArrayLike, velocities: ArrayLike, outside: ArrayLike | None,
-             as_wrenches: bool, /) -> np.ndarray: ...
+             as_wrenches: bool, /) -> Any: ...  # an array, or None
     def forget(self, body: int, /) -> None: ...
     def reset(self) -> None: ...
     def save(self) -> bytes: ...

@@ -23,7 +23,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core import native
+from ..core import INERTIA_SLACK, LENGTH_MAX, MASS_MAX, MASS_MIN, native
+from ..solver.checks import as_floats, as_number, as_pairs, as_size, as_whole, short_repr
 from ..solver.contact import Contacts
 
 GRAVITY = 9.81
@@ -31,6 +32,8 @@ GRAVITY = 9.81
 
 FRICTION = 0.5
 """Coulomb's μ [1], steel on steel, dry."""
+
+_MOST = 2**31 - 1  # an int of C
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,16 +43,37 @@ class Body:
     mass     [kg]; 0: no force moves it, but it may move by its velocity
     inertia  principal moments (3,) about the box's own axes through the centre of mass [kg m²]
     centre   of mass (3,), in the box's own frame [m]
+
+    Raises ValueError, with field and value, for a mass outside 1e-50 to 1e50 kg, moments of inertia
+    that no body has, and a centre that is not finite.
     """
 
     mass: float
     inertia: Sequence[float] | np.ndarray
     centre: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0)
 
+    def __post_init__(self) -> None:
+        mass = as_number(self.mass, 'mass')
+        if mass and not MASS_MIN <= mass <= MASS_MAX:
+            raise ValueError(f'mass must be 0, or within {MASS_MIN:g} to {MASS_MAX:g} kg, not '
+                             f'{mass:g}')
+        inertia = as_floats(self.inertia, 'inertia', 'three principal moments', (3,))
+        words = f'inertia ({", ".join(f"{moment:g}" for moment in inertia)})'
+        is_moment = (MASS_MIN <= inertia) & (inertia <= MASS_MAX) | ((mass == 0.0) & (inertia == 0))
+        if not is_moment.all():
+            raise ValueError(f'{words} is not within {MASS_MIN:g} to {MASS_MAX:g} kg m²')
+        if inertia.sum() < (2.0 - INERTIA_SLACK) * inertia.max():
+            raise ValueError(f'{words} has a moment that exceeds the sum of the others')
+        centre = as_floats(self.centre, 'centre', 'three coordinates', (3,))
+        if not (np.abs(centre) <= LENGTH_MAX).all():
+            raise ValueError(f'centre ({", ".join(f"{x:g}" for x in centre)}) is not finite, or '
+                             f'exceeds {LENGTH_MAX:g} m')
+
     @classmethod
     def of_box(cls, size: Sequence[float] | np.ndarray, mass: float) -> Self:
         """Return the body of a box of full extents (3,) [m] and of one density."""
-        squares = np.square(np.asarray(size, dtype=float))
+        squares = np.square(as_size(size, 'size')[0])
+        mass = as_number(mass, 'mass')
         return cls(mass=mass, inertia=mass / 12.0 * (squares.sum() - squares))
 
 
@@ -68,7 +92,10 @@ class PatchForces:
         in a step, at most; relaxations: more of them, which remove the speed of pushing out.
         ValueError: names the field and its value.
         """
-        self._native = native.PatchForces(*_columns(bodies), iterations, relaxations, friction)
+        self._native = native.PatchForces(
+            *_columns(bodies), as_whole(iterations, 'iterations', 1, _MOST),
+            as_whole(relaxations, 'relaxations', 0, _MOST),
+            as_number(friction, 'friction'))
 
     def set_bodies(self, bodies: Sequence[Body]) -> None:
         """Change masses, add bodies at the end, or drop bodies there with their patches."""
@@ -85,22 +112,34 @@ class PatchForces:
         of the bodies, as of a belt. stiffness: (k,) [N/m]; 0 is as stiff as step and answers bear.
         age: how long ago the answer was asked for [s]. period: from one question to the next [s];
         0 is the time since the answer before.
-        ValueError: a contact without a patch, or a pair that comes twice; nothing changes then.
+        ValueError: names field and value, such as a contact without a patch, or a pair that comes
+        twice; nothing changes then.
         """
-        if not np.size(pairs):  # NumPy takes an empty list for floats
-            pairs = np.empty((0, 2), np.int64)
-        self._native.hold(pairs, contacts.separation, contacts.normal, contacts.point,
-                          contacts.volume, contacts.covariance, poses, friction, surface_velocity,
-                          stiffness, age, period)
+        if not isinstance(contacts, Contacts):
+            raise ValueError(f'contacts must be Contacts, not {short_repr(contacts)}')
+        times = as_number(age, 'age'), as_number(period, 'period')
+        if self._native.hold(pairs, contacts.separation, contacts.normal, contacts.point,
+                             contacts.volume, contacts.covariance, poses, friction,
+                             surface_velocity, stiffness, *times):
+            return  # all are plain arrays
+        self._native.hold(
+            as_pairs(pairs, 'pairs'), _as_rows(contacts.separation, 'separation'),
+            _as_rows(contacts.normal, 'normal', 3), _as_rows(contacts.point, 'point', 3),
+            _as_rows(contacts.volume, 'volume'), _as_rows(contacts.covariance, 'covariance', 3, 3),
+            _as_rows(poses, 'poses', 7),
+            None if friction is None else _as_rows(friction, 'friction'),
+            None if surface_velocity is None else _as_rows(surface_velocity, 'surface_velocity', 3),
+            None if stiffness is None else _as_rows(stiffness, 'stiffness'), *times)
 
     def step(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
              wrenches: ArrayLike | None = None) -> np.ndarray:
         """Return the velocities (n, 6) with which the bodies move during a step of `dt` [s].
 
         wrenches: all but those of contacts, gravity among them. Call `step` or `wrenches` once
-        a step.
+        a step. Steps of less than 1 s may differ in length.
+        ValueError: names field and value; nothing changes then.
         """
-        return self._native.step(dt, poses, velocities, wrenches, False)
+        return self._step(dt, poses, velocities, wrenches, False)
 
     def wrenches(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
                  wrenches: ArrayLike | None = None) -> np.ndarray:
@@ -108,11 +147,21 @@ class PatchForces:
 
         They are constant over the step, and lead to the velocities that `step` would return.
         """
-        return self._native.step(dt, poses, velocities, wrenches, True)
+        return self._step(dt, poses, velocities, wrenches, True)
+
+    def _step(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
+              wrenches: ArrayLike | None, as_wrenches: bool) -> np.ndarray:
+        dt = as_number(dt, 'dt')
+        found = self._native.step(dt, poses, velocities, wrenches, as_wrenches)
+        if found is None:  # they are not all plain arrays
+            found = self._native.step(
+                dt, _as_rows(poses, 'poses', 7), _as_rows(velocities, 'velocities', 6),
+                None if wrenches is None else _as_rows(wrenches, 'wrenches', 6), as_wrenches)
+        return found
 
     def forget(self, body: int) -> None:
         """Forget the patches of one body, which was put elsewhere."""
-        self._native.forget(body)
+        self._native.forget(as_whole(body, 'body', 0, _MOST))
 
     def reset(self) -> None:
         """Forget all patches."""
@@ -125,6 +174,8 @@ class PatchForces:
     @classmethod
     def from_bytes(cls, state: bytes) -> Self:
         """Return the forces of a state; ValueError: other bytes."""
+        if not isinstance(state, bytes):
+            raise ValueError(f'state must be bytes, not {short_repr(state)}')
         forces = object.__new__(cls)
         forces._native = native.PatchForces.load(state)
         return forces
@@ -136,7 +187,18 @@ class PatchForces:
 
 def _columns(bodies: Sequence[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return masses (n,), inertias (n, 3) and centres (n, 3)."""
+    if not isinstance(bodies, Sequence):
+        raise ValueError(f'bodies must be a sequence of Body, not {short_repr(bodies)}')
+    for k, body in enumerate(bodies):
+        if not isinstance(body, Body):
+            raise ValueError(f'bodies[{k}] must be a Body, not {short_repr(body)}')
     n = len(bodies)
     return (np.array([body.mass for body in bodies], dtype=float).reshape(n),
             np.array([body.inertia for body in bodies], dtype=float).reshape(n, 3),
             np.array([body.centre for body in bodies], dtype=float).reshape(n, 3))
+
+
+def _as_rows(value: ArrayLike, name: str, *shape: int) -> np.ndarray:
+    """Return a row for each body or contact; C++ compares how many there are."""
+    shapes = f'({", ".join(("n", *map(str, shape)))})' if shape else '(n,)'
+    return as_floats(value, name, f'an array {shapes}', (None, *shape))

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core import native
+from ..core import THREADS_MAX, native
 from .checks import (
     as_floats,
     as_number,
@@ -122,7 +121,7 @@ class ContactSolver(native.PairSolver):
 
         Raises ValueError, with field and value, for what is refused.
         """
-        threads = as_whole(threads, 'threads', 1, sys.maxsize)
+        threads = as_whole(threads, 'threads', 1, THREADS_MAX)
         if not isinstance(patch, (bool, np.bool_)):
             raise ValueError(f'patch must be True or False, not {short_repr(patch)}')
         if pairs is not None:

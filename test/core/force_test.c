@@ -88,6 +88,55 @@ static void drop(void) {
   bc_patch_forces_destroy(copy);
 }
 
+/* What no body has, by the words of its refusal. */
+static void check_bodies(void) {
+  static const struct {
+    bc_body body;
+    const char* words;
+  } table[] = {{{1e-300, {1, 1, 1}, {0}}, "mass of body 0 must be 0, or within 1e-50 to 1e50 kg"},
+               {{INFINITY, {1, 1, 1}, {0}}, "not inf"},
+               {{-1, {1, 1, 1}, {0}}, "not -1"},
+               {{1, {1, 1, 100}, {0}}, "inertia of body 0 is (1, 1, 100)"},
+               {{1, {1, 0, 1}, {0}}, "not (1, 0, 1)"},
+               {{0, {NAN, 0, 0}, {0}}, "not (nan, 0, 0)"},
+               {{1, {1, 1, 1}, {0, 2e50, 0}}, "centre[0] has 2e+50"}};
+  bc_patch_forces* forces;
+  for (size_t k = 0; k < sizeof table / sizeof *table; ++k) {
+    check(bc_patch_forces_create(&table[k].body, 1, NULL, &forces) == BC_BAD_ARGUMENT && !forces,
+          "no body");
+    check(strstr(bc_error_text(), table[k].words) != NULL, table[k].words);
+  }
+}
+
+/* An answer and a step that change nothing, by the words of their refusals. */
+static void check_answers(bc_patch_forces* forces, const bc_pose* poses) {
+  bc_contact good, contact;
+  memset(&good, 0, sizeof good);
+  good.separation = -1.0, good.normal[2] = 1.0, good.volume = 1.0;
+  for (int k = 0; k < 3; ++k) good.covariance[k][k] = 0.1;
+  bc_patches answer = answer_of(&contact);
+  contact = good;
+  check(bc_patch_forces_hold(forces, &answer, poses) == BC_OK, "a contact");
+  contact.normal[2] = 2.0;
+  check(bc_patch_forces_hold(forces, &answer, poses) == BC_BAD_ARGUMENT, "a normal of 2");
+  check(strstr(bc_error_text(), "normal[0] (0, 0, 2) has the length 2, not 1") != NULL,
+        "its words");
+  contact = good, contact.covariance[1][1] = -0.1;
+  check(bc_patch_forces_hold(forces, &answer, poses) == BC_BAD_ARGUMENT, "no covariance");
+  check(strstr(bc_error_text(), "covariance[0] (0.1, 0, 0; 0, -0.1, 0") != NULL, "its words");
+  contact = good, answer.age = 1e60;
+  check(bc_patch_forces_hold(forces, &answer, poses) == BC_BAD_ARGUMENT, "an age");
+  bc_velocity velocities[2];
+  memset(velocities, 0, sizeof velocities);
+  check(bc_patch_forces_step(forces, 1.0, poses, velocities, NULL, NULL, NULL) == BC_BAD_ARGUMENT,
+        "a second");
+  check(strstr(bc_error_text(), "below 1 s, not 1") != NULL, "its words");
+  velocities[1].angular[2] = 1e60;
+  check(bc_patch_forces_step(forces, 0.1, poses, velocities, NULL, NULL, NULL) == BC_BAD_ARGUMENT,
+        "too fast");
+  check(strstr(bc_error_text(), "velocities[1] has 1e+60") != NULL, "its words");
+}
+
 static void check_refusals(void) {
   bc_patch_forces* forces = (bc_patch_forces*)&bodies;
   bc_force_options options = BC_DEFAULT_FORCE_OPTIONS;
@@ -98,12 +147,14 @@ static void check_refusals(void) {
   check(bc_patch_forces_create(NULL, 1, NULL, &forces) == BC_BAD_ARGUMENT && !forces, "no bodies");
   options.friction = NAN;
   check(bc_patch_forces_create(bodies, 2, &options, &forces) == BC_BAD_ARGUMENT, "no friction");
-  check(strstr(bc_error_text(), "friction must be 0 or more, not nan") != NULL, "its words");
+  check(strstr(bc_error_text(), "friction must be within 0 and 1e50, not nan") != NULL,
+        "its words");
   options.size = 0;
   check(bc_patch_forces_create(bodies, 2, &options, &forces) == BC_BAD_ABI, "another struct");
   check(bc_patch_forces_create(bodies, 2, NULL, &forces) == BC_OK, "the usual options");
   check(bc_patch_forces_hold(forces, &answer, NULL) == BC_BAD_ARGUMENT, "no poses");
   check(bc_patch_forces_hold(forces, &answer, poses) == BC_OK, "a contact apart");
+  check_answers(forces, poses);
   answer.normal = NULL;
   check(bc_patch_forces_hold(forces, &answer, poses) == BC_BAD_ARGUMENT, "no normals");
   answer.size = sizeof answer + 1;
@@ -117,6 +168,7 @@ static void check_refusals(void) {
 
 int main(void) {
   drop();
+  check_bodies();
   check_refusals();
   printf("%d failures\n", failures);
   return failures != 0;

@@ -80,6 +80,9 @@ static void check_rows(void) {
   check(bc_collide_rows(&rows, NULL, &results, 1, &refused) == BC_BAD_ROWS && refused == 1,
         "a place without a pose");
   check(strstr(bc_error_text(), "but there are 3 poses") != NULL, "its words");
+  check(bc_collide_rows(&rows, NULL, &results, 1025, NULL) == BC_BAD_ARGUMENT, "1,025 threads");
+  check(strstr(bc_error_text(), "threads must be within 1 and 1024, not 1025") != NULL,
+        "its words");
   rows.size_count_b = 2;
   check(bc_collide_rows(&rows, NULL, &results, 1, NULL) == BC_BAD_ARGUMENT, "two sizes");
   rows.size = 0;

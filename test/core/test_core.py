@@ -216,17 +216,16 @@ def test_threads_name_the_first_row_that_is_refused(model: str, bad: tuple[int, 
 
 
 @every_model
-@pytest.mark.parametrize('threads', [0, -1, True, 1.0, 2.5, '2', None, [2], np.nan])
+@pytest.mark.parametrize('threads', [0, -1, 1025, 2**70, True, 1.0, '2', None, [2], np.nan])
 def test_threads_that_are_none_are_refused(model: str, threads: object) -> None:
     with pytest.raises(ValueError, match='^threads must be '):
         solve(a_solver(model), MIXED.first(3), threads)
 
 
 def test_more_threads_than_rows() -> None:
-    """Whatever whole number it is."""
-    pairs = MIXED.first(2000)
+    pairs = MIXED.first(200)
     solver = a_solver('exact')
-    for threads in (2001, 2**31, 2**70, np.uint8(200)):
+    for threads in (201, 1024, np.uint8(255)):
         assert_same_bits(solve(solver, pairs, threads), solve(solver, pairs))
 
 

@@ -146,10 +146,10 @@ def networks_that_no_file_has() -> None:
         refused(ValueError, native.PairSolver, 'mlp', UNIT, UNIT, np.zeros(count, np.float32))
 
 
-def threads_below_one() -> None:
-    """Nobody would solve the rows."""
+def threads_that_are_none() -> None:
+    """Nobody would solve the rows; or more than any machine has."""
     one = np.ones((1, 3))
-    for threads in (0, -1, -2**63):
+    for threads in (0, -1, -2**63, 1025, 2**62):
         refused(ValueError, exact().solve, rows(), rows(), one, one, threads)
 
 
@@ -292,7 +292,7 @@ def random_calls(seed: int, rounds: int) -> None:
 
 if __name__ == '__main__':
     for attack in (places_of_no_box, rows_of_no_array, arrays_too_short, bounds_without_an_order,
-                   networks_that_no_file_has, threads_below_one, extreme_numbers,
+                   networks_that_no_file_has, threads_that_are_none, extreme_numbers,
                    pairs_changed_meanwhile):
         attack()
     random_calls(*map(int, sys.argv[1:]))

@@ -434,48 +434,9 @@ def test_other_bytes_are_refused() -> None:
                     state[:8] + (body - 1).to_bytes(8, 'little') + state[16:]):
         with pytest.raises(ValueError, match='bytes'):
             PatchForces.from_bytes(damaged)
-    with pytest.raises(TypeError):
-        PatchForces.from_bytes('text')  # type: ignore[arg-type]
 
 
 def test_reset_forgets_all() -> None:
     world = World(pose(z=0.5)).run(50)
     world.forces.reset()
     assert np.abs(world.wrenches()).max() < 1e-9
-
-
-# --- refusals -------------------------------------------------------------------------------------
-
-
-def test_refusals() -> None:
-    """Bad input is named, and changes nothing."""
-    world = World(pose(z=0.5)).run(50)
-    contacts, before = world.contacts(), bytes(world.forces)
-    far = world.poses * [1, 1, 1, 0, 0, 0, 0]
-
-    def hold(pairs=world.pairs, poses=world.poses, field='volume', value=None, **rows):
-        given = contacts if value is None else contacts._replace(**{field: np.array([value])})
-        world.forces.hold(pairs, given, poses, **rows)
-
-    twice = Contacts(*(np.concatenate([rows, rows]) for rows in contacts))
-    for call, words in (
-            (lambda: hold(value=math.nan), 'no patch'),
-            (lambda: hold(pairs=[(0, 2)]), 'no body 2'),
-            (lambda: hold(pairs=[(1, 1)]), 'both boxes are body 1'),
-            (lambda: world.forces.hold([(0, 1), (1, 0)], twice, world.poses), 'twice'),
-            (lambda: hold(poses=far), 'quaternion'),
-            (lambda: hold(friction=[-1.0]), 'friction'),
-            (lambda: hold(friction=[0.5, 0.5]), 'friction'),
-            (lambda: hold(stiffness=[math.nan]), 'stiffness'),
-            (lambda: hold(age=-1.0), 'age'),
-            (lambda: world.forces.step(0.0, world.poses, world.velocities), 'dt'),
-            (lambda: world.forces.step(STEP, world.poses[:1], world.velocities), 'poses'),
-            (lambda: world.forces.step(STEP, world.poses, world.velocities + math.inf), 'velocity'),
-            (lambda: world.forces.forget(2), 'no body 2'),
-            (lambda: world.forces.set_bodies([Body(mass=-1.0, inertia=(1, 1, 1))]), 'mass'),
-            (lambda: PatchForces([Body(mass=1.0, inertia=(1, 0, 1))]), 'inertia'),
-            (lambda: PatchForces([], iterations=0), 'iterations'),
-            (lambda: PatchForces([], friction=-0.1), 'friction')):
-        with pytest.raises(ValueError, match=words):
-            call()
-    assert bytes(world.forces) == before

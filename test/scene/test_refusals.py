@@ -12,11 +12,13 @@ import numpy as np
 import pytest
 
 from box_contact_ros import (
+    Body,
     Box,
     Contact,
     Contacts,
     ContactSolver,
     Pair,
+    PatchForces,
     Scene,
     SceneSolver,
     read_scene,
@@ -24,12 +26,25 @@ from box_contact_ros import (
 
 UNIT = (1.0, 1.0, 1.0)
 POSE = np.array([0.0, 0, 0, 0, 0, 0, 1])
-POSES = np.tile(POSE, (2, 1))
+POSES, STILL = np.tile(POSE, (2, 1)), np.zeros((2, 6))
 SOLVER = ContactSolver(UNIT, UNIT)
+BODY = Body.of_box(UNIT, 1.0)
+FORCES = PatchForces([BODY, BODY])
+CONTACTS = SOLVER.batch(POSES[:1], POSES[1:])
 BOXES = {name: Box(name, UNIT) for name in 'ab'}
 PAIR = Pair.between('a', 'b')
 SCENE = SceneSolver(Scene(BOXES, (PAIR,)))
-NAN = math.nan
+NAN, INF = math.nan, math.inf
+
+
+def body(mass: Any = 1.0, inertia: Any = UNIT, **more: Any) -> Body:
+    return Body(mass=mass, inertia=inertia, **more)
+
+
+def hold(pairs: Any = ((0, 1),), contacts: Any = CONTACTS, poses: Any = POSES, *,
+         field: str = '', value: Any = None, **more: Any) -> None:
+    given = contacts._replace(**{field: np.array([value], float)}) if field else contacts
+    FORCES.hold(pairs, given, poses, **more)
 
 
 def scene(boxes: Any = BOXES, pairs: Any = (PAIR,), **more: Any) -> Scene:
@@ -50,10 +65,70 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: SOLVER.batch(POSES, POSES, size_a=(1, '2', 3)), 'size_a', "(1, '2', 3)"),
     (lambda: SOLVER.batch(POSES, pairs=[(0, 2)]), 'pairs[0]', '(0, 2)'),
     (lambda: SOLVER.batch(POSES, pairs=[(0.0, 1.0)]), 'pairs', '(0.0, 1.0)'),
+    (lambda: SOLVER.batch(POSES, POSES, threads=1025), 'threads', '1025'),
+    (lambda: SOLVER.batch(POSES, POSES, threads=10**30), 'threads', '1' + 20 * '0'),
     (lambda: SOLVER.batch(POSES, POSES, patch='no'), 'patch', "'no'"),
     (lambda: Contact(True, 'deep', UNIT, UNIT, 1.0, np.eye(3)), 'separation', "'deep'"),
     (lambda: Contact(True, -1.0, ('x', 0, 0), UNIT, 1.0, np.eye(3)), 'normal', "('x', 0, 0)"),
     (lambda: Contacts.of([None]), 'contacts[0]', 'None'),
+
+    (lambda: body(mass='1'), 'mass', "'1'"),
+    (lambda: body(mass=1e-300), 'mass', '1e-300'),
+    (lambda: body(mass=2e50), 'mass', '2e+50'),
+    (lambda: body(mass=-1), 'mass', '-1'),
+    (lambda: body(mass=NAN), 'mass', 'nan'),
+    (lambda: body(inertia=(1, 1)), 'inertia', '(2,)'),
+    (lambda: body(inertia=(1, 1, 100)), 'inertia', '(1, 1, 100)'),
+    (lambda: body(inertia=(1, 0, 1)), 'inertia', '(1, 0, 1)'),
+    (lambda: body(inertia=(1, 1, '1')), 'inertia', "(1, 1, '1')"),
+    (lambda: body(centre=(0, 0, INF)), 'centre', '(0, 0, inf)'),
+    (lambda: Body.of_box((1, 2, -1), 1), 'size', '(1, 2, -1)'),
+    (lambda: Body.of_box(UNIT, '1'), 'mass', "'1'"),
+    (lambda: PatchForces(None), 'bodies', 'None'),
+    (lambda: PatchForces([BODY, 1]), 'bodies[1]', '1'),
+    (lambda: PatchForces([], friction=-0.5), 'friction', '-0.5'),
+    (lambda: PatchForces([], friction='ice'), 'friction', "'ice'"),
+    (lambda: PatchForces([], iterations=0), 'iterations', '0'),
+    (lambda: PatchForces([], iterations=2**40), 'iterations', str(2**40)),
+    (lambda: PatchForces([], relaxations=1.5), 'relaxations', '1.5'),
+    (lambda: FORCES.set_bodies([None]), 'bodies[0]', 'None'),
+    (lambda: FORCES.forget(2), 'body', '2'),
+    (lambda: FORCES.forget('a'), 'body', "'a'"),
+    (lambda: PatchForces.from_bytes('text'), 'state', "'text'"),
+    (lambda: PatchForces.from_bytes(b'text'), 'state', '4 bytes'),
+
+    (lambda: hold([(0.0, 1.0)]), 'pairs', '(0.0, 1.0)'),
+    (lambda: hold([(0, 2)]), 'pairs[0]', 'no body 2'),
+    (lambda: hold([(1, 1)]), 'pairs[0]', 'body 1'),
+    (lambda: hold([(0, 1), (1, 0)], Contacts(*(np.repeat(rows, 2, axis=0) for rows in CONTACTS))),
+     'pairs', 'twice'),
+    (lambda: hold(contacts=None), 'contacts', 'None'),
+    (lambda: hold(poses=POSES[:1]), 'poses', '(1, 7)'),
+    (lambda: hold(poses=POSES * [1, 1, 1, 0, 0, 0, 0]), 'poses[0]', '(0, 0, 0, 0)'),
+    (lambda: hold(field='normal', value=(0, 0, 2)), 'normal[0]', '(0, 0, 2)'),
+    (lambda: hold(field='normal', value=(0, 0, 1 + 2e-6)), 'normal[0]', '(0, 0, 1)'),
+    (lambda: hold(field='covariance', value=-np.eye(3)), 'covariance[0]', '(-1, '),
+    (lambda: hold(field='covariance', value=np.diag([1, 1, -1e-8])), 'covariance[0]', '-1e-08'),
+    (lambda: hold(field='covariance', value=np.eye(3) + [[0, 1e-3, 0], [0] * 3, [0] * 3]),
+     'covariance[0]', '0.001'),
+    (lambda: hold(field='covariance', value=np.zeros((3, 3))), 'covariance[0]', '(0, 0, 0'),
+    (lambda: hold(field='volume', value=-1), 'volume', '-1'),
+    (lambda: hold(field='point', value=(0, 0, NAN)), 'point[0]', 'nan'),
+    (lambda: hold(friction=['1']), 'friction', "['1']"),
+    (lambda: hold(friction=[-1.0]), 'friction[0]', '-1'),
+    (lambda: hold(stiffness=[INF]), 'stiffness[0]', 'inf'),
+    (lambda: hold(surface_velocity=[(0, 0, NAN)]), 'surface_velocity[0]', 'nan'),
+    (lambda: hold(surface_velocity=[(0, 0)]), 'surface_velocity', '(1, 2)'),
+    (lambda: hold(age='1'), 'age', "'1'"),
+    (lambda: hold(period=-0.1), 'period', '-0.1'),
+    (lambda: FORCES.step(1.0, POSES, STILL), 'dt', '1'),
+    (lambda: FORCES.step(0.0, POSES, STILL), 'dt', '0'),
+    (lambda: FORCES.step('1', POSES, STILL), 'dt', "'1'"),
+    (lambda: FORCES.step(0.1, POSES[:1], STILL), 'poses', '(1, 7)'),
+    (lambda: FORCES.step(0.1, POSES, STILL + INF), 'velocities[0]', 'inf'),
+    (lambda: FORCES.step(0.1, POSES, STILL + 1e200), 'velocities[0]', '1e+200'),
+    (lambda: FORCES.wrenches(0.1, POSES, STILL, STILL + NAN), 'wrenches[0]', 'nan'),
+    (lambda: FORCES.wrenches(0.1, POSES, STILL[:, :5]), 'velocities', '(2, 5)'),
 
     (lambda: Box('a', (1, 2, -1)), 'boxes.a.size', '(1, 2, -1)'),
     (lambda: Box('a', ('1', '2', '3')), 'boxes.a.size', "('1', '2', '3')"),
@@ -81,8 +156,8 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
 
 
 def test_a_refusal_names_field_and_value() -> None:
-    """Whatever is refused is a ValueError of one line."""
-    missing = []
+    """Whatever is refused is a ValueError of one line; and the forces are as they were."""
+    before, missing = bytes(FORCES), []
     for call, field, value in TABLE:
         with pytest.raises(ValueError) as refusal:
             call()
@@ -90,3 +165,60 @@ def test_a_refusal_names_field_and_value() -> None:
         if not (field in text and value in text and '\n' not in text):
             missing.append((field, value, text))
     assert not missing
+    assert bytes(FORCES) == before
+
+
+class Traitor:
+    """Rows of numbers that change the bodies when NumPy reads them."""
+
+    def __init__(self, forces: PatchForces, rows: np.ndarray) -> None:
+        self.forces, self.rows = forces, rows
+
+    def __array__(self, *_: Any, **__: Any) -> np.ndarray:
+        self.forces.set_bodies([BODY] * (4000 if self.rows.shape[1] == 7 else 1))
+        return self.rows
+
+
+def test_bodies_that_change_while_arrays_are_read() -> None:
+    """Rows are counted after all is converted: more bodies would read and write past the arrays."""
+    for call in (lambda forces: forces.step(0.1, Traitor(forces, POSES), STILL),
+                 lambda forces: forces.step(0.1, POSES, Traitor(forces, STILL)),
+                 lambda forces: forces.wrenches(0.1, POSES, STILL, Traitor(forces, STILL)),
+                 lambda forces: forces.hold([(0, 1)], CONTACTS, Traitor(forces, POSES))):
+        with pytest.raises(ValueError, match='poses must be an array of shape'):
+            call(PatchForces([BODY, BODY]))
+
+
+def test_the_limits_themselves_are_accepted() -> None:
+    """Bodies of 1e-50 and 1e50 kg, moments of a rod, a normal and a covariance that are rounded."""
+    light, heavy = (Body(mass=mass, inertia=(mass, mass, mass)) for mass in (1e-50, 1e50))
+    rod = body(inertia=(1.0, 1.0, 2.0 * (1.0 + 4e-10)))
+    thin = CONTACTS._replace(normal=np.array([(0, 0, 1.0 + 5e-7)]),
+                             covariance=np.array([np.diag([1.0, 1.0, -1e-9])]))
+    for bodies in ([light, heavy], [light, light], [heavy, heavy], [rod, rod]):
+        forces = PatchForces(bodies)
+        forces.hold([(0, 1)], thin, POSES)
+        for dt in (1e-50, np.nextafter(1.0, 0.0), np.float32(0.1)):
+            assert np.isfinite(forces.step(dt, POSES, STILL)).all()
+        assert bytes(PatchForces.from_bytes(bytes(forces))) == bytes(forces)
+    SOLVER.batch(POSES, POSES, threads=1024)
+
+
+def test_a_saved_state_keeps_the_limits() -> None:
+    """Each number of a state replaced by NaN, by minus 1e200 and by zero: refused, or harmless."""
+    forces = PatchForces([BODY, BODY])
+    forces.hold([(0, 1)], CONTACTS, POSES)
+    forces.step(0.01, POSES, STILL)
+    state, head = bytes(forces), 3 * 8
+    refused = 0
+    for at in range(head, len(state), 8):
+        for number in (NAN, -1e200, 0.0):
+            try:
+                changed = PatchForces.from_bytes(
+                    state[:at] + np.float64(number).tobytes() + state[at + 8:])
+            except ValueError as error:
+                assert 'state' in str(error)
+                refused += number != 0.0
+            else:
+                assert np.isfinite(changed.step(0.01, POSES, STILL)).all()
+    assert refused > 1.8 * (len(state) - head) / 8

@@ -55,6 +55,15 @@ inline PyObject* forces_set_bodies(PyObject* self, PyObject* const* args, Py_ssi
   Py_RETURN_NONE;
 }
 
+// Arguments of `hold` and `step` are plain arrays, or Python converts them before it calls. No code of
+// Python's runs between the count of bodies and the use of the arrays: it could change the bodies.
+
+// The array of a row for each body or contact, if any.
+template <class Number>
+void check_rows(const Array<Number>& given, const char* name, Shape shape) {
+  if (given.object) check_shape(given, name, shape);
+}
+
 inline PyObject* forces_hold(PyObject* self, PyObject* const* args, Py_ssize_t count) {
   if (count != 12)
     fail(PyExc_TypeError,
@@ -62,24 +71,31 @@ inline PyObject* forces_hold(PyObject* self, PyObject* const* args, Py_ssize_t c
          "stiffness, age, period)");
   double age = PyFloat_AsDouble(args[10]), period = PyFloat_AsDouble(args[11]);
   if (PyErr_Occurred()) return nullptr;
-  auto pairs = read<int64_t>(args[0], "pairs", {any_length, 2});
+  Array<int64_t> pairs;
+  Array<double> separation, normal, point, volume, covariance, poses, friction, surface, stiffness;
+  if (!read_plain(args[0], pairs) || !pairs.object) Py_RETURN_FALSE;
+  Array<double>* columns[] = {&separation, &normal,   &point,   &volume,   &covariance,
+                              &poses,      &friction, &surface, &stiffness};
+  for (int k = 0; k < 9; ++k)
+    if (!read_plain(args[1 + k], *columns[k]) || (k < 6 && !columns[k]->object)) Py_RETURN_FALSE;
+  check_shape(pairs, "pairs", {any_length, 2});
   npy_intp n = pairs.length(0);
-  auto separation = read<double>(args[1], "separation", {n});
-  auto normal = read<double>(args[2], "normal", {n, 3});
-  auto point = read<double>(args[3], "point", {n, 3});
-  auto volume = read<double>(args[4], "volume", {n});
-  auto covariance = read<double>(args[5], "covariance", {n, 3, 3});
-  auto poses = read<double>(args[6], "poses", {body_count(self), 7});
-  auto friction = read_given<double>(args[7], "friction", {n});
-  auto surface = read_given<double>(args[8], "surface_velocity", {n, 3});
-  auto stiffness = read_given<double>(args[9], "stiffness", {n});
+  check_rows(separation, "separation", {n});
+  check_rows(normal, "normal", {n, 3});
+  check_rows(point, "point", {n, 3});
+  check_rows(volume, "volume", {n});
+  check_rows(covariance, "covariance", {n, 3, 3});
+  check_rows(poses, "poses", {body_count(self), 7});
+  check_rows(friction, "friction", {n});
+  check_rows(surface, "surface_velocity", {n, 3});
+  check_rows(stiffness, "stiffness", {n});
   bc_patches answer{sizeof(bc_patches), int64_t(n),       pairs.numbers,  separation.numbers,
                     normal.numbers,     point.numbers,    volume.numbers, covariance.numbers,
                     friction.numbers,   surface.numbers,  stiffness.numbers, age,
                     period};
   check(bc_patch_forces_hold(forces_of(self), &answer,
                              reinterpret_cast<const bc_pose*>(poses.numbers)));
-  Py_RETURN_NONE;
+  Py_RETURN_TRUE;
 }
 
 inline PyObject* forces_step(PyObject* self, PyObject* const* args, Py_ssize_t count) {
@@ -87,10 +103,14 @@ inline PyObject* forces_step(PyObject* self, PyObject* const* args, Py_ssize_t c
   double dt = PyFloat_AsDouble(args[0]);
   if (PyErr_Occurred()) return nullptr;
   bool as_wrenches = truth_of(args[4]);
+  Array<double> poses, velocities, outside;
+  if (!read_plain(args[1], poses) || !read_plain(args[2], velocities) ||
+      !read_plain(args[3], outside) || !poses.object || !velocities.object)
+    Py_RETURN_NONE;
   npy_intp bodies = body_count(self);
-  auto poses = read<double>(args[1], "poses", {bodies, 7});
-  auto velocities = read<double>(args[2], "velocities", {bodies, 6});
-  auto outside = read_given<double>(args[3], "wrenches", {bodies, 6});
+  check_rows(poses, "poses", {bodies, 7});
+  check_rows(velocities, "velocities", {bodies, 6});
+  check_rows(outside, "wrenches", {bodies, 6});
   auto found = make<double>({bodies, 6});
   check(bc_patch_forces_step(
       forces_of(self), dt, reinterpret_cast<const bc_pose*>(poses.numbers),
@@ -132,14 +152,16 @@ inline PyMethodDef forces_methods[] = {
      "set_bodies(mass, inertia, centre)\n--\n\nChange the bodies: (n,), (n, 3), (n, 3)."},
     {"hold", method<forces_hold>(), METH_FASTCALL,
      "hold(pairs, separation, normal, point, volume, covariance, poses, friction, surface, "
-     "stiffness)\n--\n\nTake the arrays of an answer; None for the last three."},
+     "stiffness, age, period)\n--\n\nTake the arrays of an answer; None for the last three.\n\n"
+     "Return False, and change nothing, where one is no plain array."},
     {"step", method<forces_step>(), METH_FASTCALL,
      "step(dt, poses, velocities, outside, as_wrenches)\n--\n\nReturn velocities or wrenches (n, "
-     "6)."},
+     "6).\n\nReturn None, and change nothing, where one is no plain array."},
     {"forget", method<forces_forget>(), METH_O, "forget(body)\n--\n\nForget a body's patches."},
     {"reset", method<forces_reset>(), METH_NOARGS, "reset()\n--\n\nForget all patches."},
     {"save", method<forces_save>(), METH_NOARGS, "save()\n--\n\nReturn the state as bytes."},
-    {"load", method<forces_load>(), METH_O | METH_CLASS, "load(bytes)\n--\n\nReturn forces of saved bytes."},
+    {"load", method<forces_load>(), METH_O | METH_CLASS,
+     "load(bytes)\n--\n\nReturn forces of saved bytes."},
     {nullptr, nullptr, 0, nullptr}};
 inline PyType_Slot forces_slots[] = {
     {Py_tp_doc, const_cast<char*>("PatchForces(mass, inertia, centre, iterations, relaxations, "

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The library as a Python extension: its functions and types.
+#include "../src/force/rigid_body.hpp"
 #include "broad_phase.hpp"
 #include "forces.hpp"
 #include "pair_solver.hpp"
@@ -92,13 +93,17 @@ PyObject* make_module() {
   for (auto [name, value] : {Whole{"NETWORK_FORMAT", detail::network_format},
                              {"FEATURES", detail::network_features},
                              {"OUTPUTS", detail::network_outputs},
-                             {"UNITS_MAX", detail::network_units_max}})
+                             {"UNITS_MAX", detail::network_units_max},
+                             {"THREADS_MAX", detail::threads_max}})
     add(name, PyLong_FromLong(value));
   using Real = std::pair<const char*, double>;
   for (auto [name, value] : {Real{"LENGTH_MIN", length_min},
                              {"LENGTH_MAX", length_max},
                              {"QUATERNION_MIN", quaternion_min},
                              {"QUATERNION_MAX", quaternion_max},
+                             {"MASS_MIN", force::mass_min},
+                             {"MASS_MAX", force::mass_max},
+                             {"INERTIA_SLACK", force::inertia_slack},
                              {"CONTACT_ULPS", contact_ulps},
                              {"DEPTH_FLOOR", depth_floor}})
     add(name, PyFloat_FromDouble(value));

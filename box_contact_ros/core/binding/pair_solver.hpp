@@ -171,7 +171,7 @@ struct PlainBatch {
     if (!is("threads") || !PyLong_CheckExact(value)) return false;
     int overflow;
     threads = PyLong_AsLongAndOverflow(value, &overflow);
-    return !overflow && threads >= 1;
+    return !overflow && threads >= 1 && threads <= detail::threads_max;
   }
   bool read_sizes(PyObject* value, const double*& sizes, long& step) {
     if (value == Py_None) return true;
@@ -198,7 +198,8 @@ inline PyObject* solver_solve(PyObject* self, PyObject* const* args, Py_ssize_t 
          "solve(poses_a, poses_b, sizes_a, sizes_b, threads, patch=True, pairs=None)");
   long threads = whole_of(args[4]);
   bool patch = count > 5 ? truth_of(args[5]) : true;
-  if (threads < 1) fail(PyExc_ValueError, "threads must be 1 or more");
+  if (threads < 1 || threads > detail::threads_max)
+    fail(PyExc_ValueError, "threads must be within 1 and 1024");
   PairArrays pairs(args, count > 6 ? args[6] : Py_None);
   ContactArrays found{pairs.count, patch};
   long refused = setup->solve(pairs.rows, found, threads);
@@ -222,11 +223,11 @@ inline PyMethodDef solver_methods[] = {
      "Return the contacts of n pairs: row i is what a single call gives for row i.\n\n"
      "poses_a, poses_b are (n, 7); size_a, size_b replace the solver's sizes, (3,) for all rows\n"
      "or (n, 3) for every row its own. Or poses are (m, 7), sizes (3,) or (m, 3), and the rows of\n"
-     "pairs (n, 2) are the places of their boxes A and B. `threads` share the rows; no bit "
-     "depends\n"
-     "on their number. Without `patch` volume and covariance are not computed, and are NaN; "
-     "points\n"
-     "then have the same error bounds, not always the same bits."},
+     "pairs (n, 2) are the places of their boxes A and B. 1 to 1,024 `threads` share the rows; no "
+     "bit\n"
+     "depends on their number. Without `patch` volume and covariance are not computed, and are "
+     "NaN;\n"
+     "points then have the same error bounds, not always the same bits."},
     {nullptr, nullptr, 0, nullptr}};
 inline PyGetSetDef solver_attributes[] = {{"clipped", Guarded<solver_clipped>::call, nullptr,
                                     "Contacts of model exact that were clipped.", nullptr},

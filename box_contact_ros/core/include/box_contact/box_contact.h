@@ -138,7 +138,7 @@ BC_API const char* bc_error_text(void);
 BC_API bc_status bc_collide(const bc_box* a, const bc_box* b, const bc_query* query,
                             bc_contact* contact);
 
-/* Solve many pairs, by `threads` threads: bit for bit the answers of single calls, for any number of
+/* Solve many pairs, by 1 to 1,024 threads: bit for bit the answers of single calls, for any number of
  * threads. The arrays of `results` say what is computed, not `query->patch`. Each refused row gets
  * `colliding` false and `separation` NaN, and the rest of it has no meaning; all other rows are
  * solved, and *refused is the first refused row, or −1. `refused` may be NULL. */

@@ -30,19 +30,20 @@ extern "C" {
 #endif
 
 typedef struct bc_body {
-  double mass;       /* [kg]; 0: no force moves it, but it may move by its velocity */
-  double inertia[3]; /* about the box's own axes, through the centre of mass [kg m²] */
-  double centre[3];  /* of mass, in the box's own frame [m] */
+  double mass;       /* 1e-50 to 1e50 kg; 0: no force moves it, but it may move by its velocity */
+  double inertia[3]; /* about the box's own axes, through the centre of mass: 1e-50 to 1e50 kg m²,
+                        or 0 without a mass; none exceeds the sum of the two others */
+  double centre[3];  /* of mass, in the box's own frame, up to 1e50 m */
 } bc_body;
 
 typedef struct bc_velocity {
-  double linear[3];  /* of the centre of mass [m/s] */
-  double angular[3]; /* [rad/s] */
+  double linear[3];  /* of the centre of mass, up to 1e50 m/s */
+  double angular[3]; /* up to 1e50 rad/s */
 } bc_velocity;
 
 typedef struct bc_wrench {
-  double force[3];  /* [N] */
-  double torque[3]; /* about the centre of mass [N m] */
+  double force[3];  /* up to 1e100 N */
+  double torque[3]; /* about the centre of mass, up to 1e100 N m */
 } bc_wrench;
 
 /* An answer: rows of pairs, as bc_solve_rows gives them. Rows without volume are passed over. A row
@@ -52,11 +53,12 @@ typedef struct bc_patches {
   int64_t count;
   const int64_t* pairs;     /* (count, 2): the bodies of boxes A and B */
   const double* separation; /* [m] */
-  const double* normal;     /* (count, 3), from A to B */
+  const double* normal;     /* (count, 3), from A to B, of length 1 ± 1e-6 */
   const double* point;      /* (count, 3) [m] */
   const double* volume;     /* [m³] */
-  const double* covariance; /* (count, 3, 3) [m²] */
-  const double* friction;   /* Coulomb's μ [1]; NULL: that of the options */
+  const double* covariance; /* (count, 3, 3) [m²]; eigenvalues ≥ −1e-9 of the trace */
+  const double* friction;   /* Coulomb's μ [1]; NULL: that of the options; it, stiffness, age and
+                               period are 0 to 1e50 */
   const double* surface;    /* (count, 3): velocity of B's surface relative to A's, beside that of the
                                bodies, as of a belt [m/s]; NULL: none */
   const double* stiffness;  /* [N/m]; 0, or NULL: as stiff as step and answers bear */
@@ -91,20 +93,22 @@ BC_API bc_status bc_patch_forces_forget(bc_patch_forces* forces, int64_t body);
 BC_API void bc_patch_forces_reset(bc_patch_forces* forces);
 
 /* Take an answer, asked for at `poses` (one for each body). Pairs that are left out are forgotten.
- * BC_BAD_ARGUMENT, and nothing changes, for a contact without a patch and a pair that comes twice. */
+ * BC_BAD_ARGUMENT, and nothing changes, for numbers beyond the limits above, a contact without a patch
+ * and a pair that comes twice. */
 BC_API bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches* answer,
                                       const bc_pose* poses);
 
-/* Take a step of `dt` seconds. `outside` are the wrenches beside those of contacts, gravity among
- * them; NULL: none. `after` are the velocities with which the bodies move during the step;
- * `wrenches` are those of contacts, constant over the step, that lead to them. Either may be NULL,
- * and `after` may be `velocities`. */
+/* Take a step of `dt` seconds: 1e-50 or more, and less than 1. Steps may differ in length. `outside`
+ * are the wrenches beside those of contacts, gravity among them; NULL: none. `after` are the
+ * velocities with which the bodies move during the step; `wrenches` are those of contacts, constant
+ * over the step, that lead to them. Either may be NULL, and `after` may be `velocities`. */
 BC_API bc_status bc_patch_forces_step(bc_patch_forces* forces, double dt, const bc_pose* poses,
                                       const bc_velocity* velocities, const bc_wrench* outside,
                                       bc_velocity* after, bc_wrench* wrenches);
 
 /* Write the state as bytes, for machines of the same byte order, and return how many there are;
- * nothing is written if `capacity` is less. Make forces of such bytes. */
+ * nothing is written if `capacity` is less. Make forces of such bytes: BC_BAD_ARGUMENT for other bytes,
+ * and for numbers beyond the limits above. */
 BC_API int64_t bc_patch_forces_save(const bc_patch_forces* forces, void* bytes, int64_t capacity);
 BC_API bc_status bc_patch_forces_load(const void* bytes, int64_t count, bc_patch_forces** forces);
 

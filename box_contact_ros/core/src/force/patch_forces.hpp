@@ -49,6 +49,9 @@ constexpr double slow_damping_ratio = 2.0;
 constexpr double push_out_limit = 1.0;
 // An answer that is overdue by so many periods [1] pushes nothing out.
 constexpr double overdue_periods = 3.0;
+// Steps accepted [s]: at least this long, so that a speed divided by one is a number; and shorter than
+// that, as nothing that touches stays within its patch for so long.
+constexpr double step_min = 1e-50, step_limit = 1.0;
 // A smaller change of a patch's speeds [m/s] does not make its neighbours be solved again. With 1e-6 a
 // jittered tower of 20 sways for 8 s.
 constexpr double least_change = 1e-8;
@@ -72,6 +75,17 @@ struct Patch {
   Vec<double> given_at;    // where they acted
 
   std::pair<int32_t, int32_t> pair() const { return {a, b}; }
+
+  // Whether all of it is within what is accepted, and what follows from that is a number.
+  bool is_sound() const {
+    bool is_asked = asked_a.is_sound() && asked_b.is_sound() && is_unit(normal) &&
+                    is_within(point, length_max) && shape.is_sound() && depth >= 0.0 &&
+                    depth <= place_max && is_amount(friction) && is_amount(stiffness) &&
+                    is_within(surface, speed_max) && is_amount(late) && is_amount(age);
+    return is_asked && press >= 0.0 && press <= wrench_max && std::fabs(spin) <= wrench_max &&
+           is_within(slip, wrench_max) && is_within(rock, wrench_max) &&
+           is_within(given_at, place_max);
+  }
 };
 
 // A body in a step.
@@ -106,7 +120,10 @@ class PatchForces {
   struct Options {
     int iterations, relaxations;
     double friction;
+
+    bool is_sound() const { return iterations >= 1 && relaxations >= 0 && is_amount(friction); }
   };
+  enum class Held { all, pair_twice, no_patch };
 
   PatchForces(std::vector<Body> bodies, const Options& options)
       : bodies_(std::move(bodies)), options_(options), relaxed_(bodies_.size()) {}
@@ -130,26 +147,29 @@ class PatchForces {
     clock_ = {};
   }
 
-  // Take an answer, and the poses of its question. Pairs that are missing are forgotten.
-  // Returns false, and changes nothing, for a pair that comes twice.
-  bool hold(const bc_patches& answer, const bc_pose* poses) {
+  // Take an answer, and the poses of its question. Pairs that are missing are forgotten. Nothing
+  // changes for a pair that comes twice, and for a patch whose numbers leave float64's range.
+  Held hold(const bc_patches& answer, const bc_pose* poses) {
     next_.clear();
     for (int64_t k = 0; k < answer.count; ++k) {
       auto a = size_t(answer.pairs[2 * k]), b = size_t(answer.pairs[2 * k + 1]);
       bool is_stale = answer.separation[k] != answer.separation[k];
       if (!bodies_[a].is_free() && !bodies_[b].is_free()) continue;
-      if (is_stale || answer.volume[k] > 0.0) next_.push_back(read(answer, k, is_stale, poses));
+      if (!is_stale && !(answer.volume[k] > 0.0)) continue;
+      next_.push_back(read(answer, k, is_stale, poses));
+      if (!is_stale && !next_.back().is_sound()) return Held::no_patch;
     }
     auto before = [](const Patch& p, const Patch& q) { return p.pair() < q.pair(); };
     auto same = [](const Patch& p, const Patch& q) { return p.pair() == q.pair(); };
     if (!std::is_sorted(next_.begin(), next_.end(), before))
       std::sort(next_.begin(), next_.end(), before);
-    if (std::adjacent_find(next_.begin(), next_.end(), same) != next_.end()) return false;
+    if (std::adjacent_find(next_.begin(), next_.end(), same) != next_.end())
+      return Held::pair_twice;
     keep_impulses();
     patches_.swap(next_);
     clock_.period = answer.period > 0.0 ? answer.period : std::max(0.0, clock_.since);
     clock_.since = 0.0;
-    return true;
+    return Held::all;
   }
 
   // From poses, velocities and outside wrenches at the start of a step h to the velocities during it.
@@ -196,10 +216,21 @@ class PatchForces {
     relaxed_.resize(bodies);
     patches_.resize(patches);
   }
+  // Whether the state is one that calls may have made.
   bool is_sound() const {
-    return std::all_of(patches_.begin(), patches_.end(), [this](const Patch& patch) {
+    bool is_time = (clock_.since == -1.0 || is_amount(clock_.since)) && is_amount(clock_.period) &&
+                   is_amount(clock_.window) && clock_.window < step_limit;
+    auto of_bodies = [this](const Patch& patch) {
       return 0 <= patch.a && patch.a < patch.b && size_t(patch.b) < bodies_.size();
-    });
+    };
+    auto out_of_order = [](const Patch& p, const Patch& q) { return p.pair() >= q.pair(); };
+    auto is_sound = [](const auto& each) { return each.is_sound(); };
+    auto all = [](const auto& rows, auto holds) {
+      return std::all_of(rows.begin(), rows.end(), holds);
+    };
+    return options_.is_sound() && is_time && all(bodies_, is_sound) && all(relaxed_, is_sound) &&
+           all(patches_, of_bodies) && all(patches_, is_sound) &&
+           std::adjacent_find(patches_.begin(), patches_.end(), out_of_order) == patches_.end();
   }
 
  private:

@@ -19,10 +19,39 @@ constexpr double thinnest = 1e-7;
 // Between them it is linear in 2·√(e1·e2) / (e1 + e2), to 1 %.
 constexpr double radius_of_line = 0.866025403784438647, radius_of_square = 0.937082;
 
+// By how much the length of a normal may differ from 1 [1].
+constexpr double normal_slack = 1e-6;
+// By how much of its trace an eigenvalue of a covariance may be below zero [1]: rounding.
+constexpr double covariance_slack = 1e-9;
+
+inline bool is_unit(const Vec<double>& a, double slack = normal_slack) {
+  return std::fabs(length(a) - 1.0) <= slack;
+}
+
+// Whether numbers (3, 3) are symmetric, and have no eigenvalue below zero: by the pivots of Cholesky's
+// decomposition, with the slack on the diagonal.
+inline bool is_covariance(const double* c) {
+  double trace = (c[0] + c[4]) + c[8], s = 1.0 / trace;
+  if (!(trace > 0.0 && trace <= largest_number)) return false;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < i; ++j)
+      if (!(std::fabs(c[3 * i + j] - c[3 * j + i]) <= covariance_slack * trace)) return false;
+  double xx = s * c[0] + covariance_slack, xy = s * c[1], xz = s * c[2];
+  double yy = s * c[4] + covariance_slack - xy * xy / xx, yz = s * c[5] - xy * xz / xx;
+  double zz = s * c[8] + covariance_slack - xz * xz / xx - yz * yz / yy;
+  return xx > 0.0 && yy > 0.0 && zz > 0.0;
+}
+
 struct Rectangle {
   Vec<double> axis_1, axis_2;  // along its sides; with the normal a right-handed frame
   double half_1, half_2;       // half lengths along them [m]
   double radius;               // at which friction resists a spin [m]
+
+  bool is_sound() const {
+    double slack = 4.0 * normal_slack;  // both axes are products with the normal
+    return is_unit(axis_1, slack) && is_unit(axis_2, slack) && half_1 > 0.0 && half_2 > 0.0 &&
+           half_1 <= place_max && half_2 <= place_max && radius >= 0.0 && radius <= place_max;
+  }
 };
 
 inline Rectangle rectangle_of(const Vec<double>& normal, const double* covariance) {

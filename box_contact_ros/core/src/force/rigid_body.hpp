@@ -4,12 +4,40 @@
 // Rigid bodies: mass, place, motion and turn.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "../../include/box_contact/force.h"
 #include "../poses.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
+
+// Masses [kg] and moments of inertia [kg m²] accepted: a product of three inverses is a number.
+constexpr double mass_min = 1e-50, mass_max = 1e50;
+// By how much of it a moment of inertia may exceed the sum of the two others [1]: rounding.
+constexpr double inertia_slack = 1e-9;
+// Speeds accepted, at most [m/s], [rad/s]: their squares times a moment of inertia are numbers.
+constexpr double speed_max = 1e50;
+// Forces, torques and impulses accepted, at most [N], [N m], [N s]: those of the largest mass at the
+// largest speed.
+constexpr double wrench_max = 1e100;
+// Times, frictions and stiffnesses accepted, at most [s], [1], [N/m]: their squares are numbers.
+constexpr double amount_max = 1e50;
+// Of a place of a centre of mass [m]: that of a box, and a centre in it.
+constexpr double place_max = 4.0 * length_max;
+
+// NaN fails all of these.
+inline bool are_within(const double* numbers, int64_t count, double limit) {
+  return std::all_of(numbers, numbers + count,
+                     [limit](double number) { return std::fabs(number) <= limit; });
+}
+inline bool is_within(const Vec<double>& a, double limit) { return are_within(a.v, 3, limit); }
+inline bool is_amount(double number) { return number >= 0.0 && number <= amount_max; }
+inline bool is_mass(double number) { return number >= mass_min && number <= mass_max; }
+inline bool is_inertia(const Vec<double>& moments) {
+  return (moments[0] + moments[1]) + moments[2] >= (2.0 - inertia_slack) * largest(moments);
+}
 
 // A body that no force moves has inverses of zero.
 struct Body {
@@ -18,16 +46,35 @@ struct Body {
   Vec<double> centre;           // of mass, in the box's frame [m]
 
   bool is_free() const { return inverse_mass > 0.0; }
+
+  // Whether it is one that is accepted.
+  bool is_sound() const {
+    if (!is_within(centre, length_max)) return false;
+    const Vec<double>& inverse = inverse_inertia;
+    if (inverse_mass == 0.0) return is_within(inverse, 0.0);
+    auto is_inverse = [](double x) { return x >= 1.0 / mass_max && x <= 1.0 / mass_min; };
+    return is_inverse(inverse_mass) && std::all_of(inverse.v, inverse.v + 3, is_inverse) &&
+           is_inertia(Vec<double>{1.0, 1.0, 1.0} / inverse);
+  }
 };
+
+// By how much an axis of a rotation may exceed 1 [1]: rounding.
+constexpr double rotation_slack = 1e-9;
 
 // Where a body is: its centre of mass, and its axes as columns; common frame.
 struct Placed {
   Vec<double> position;
   Mat<double> axes;
+
+  bool is_sound() const {
+    return is_within(position, place_max) && are_within(axes[0], 9, 1.0 + rotation_slack);
+  }
 };
 
 struct Motion {
   Vec<double> linear, angular;  // of the centre of mass [m/s], [rad/s]
+
+  bool is_sound() const { return is_within(linear, speed_max) && is_within(angular, speed_max); }
 };
 
 inline Vec<double> cross(const Vec<double>& a, const Vec<double>& b) {

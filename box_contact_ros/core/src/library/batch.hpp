@@ -56,6 +56,9 @@ inline bool solve_pair(const Solver& solver, const PairNumbers& pair, bc_patch p
   return true;
 }
 
+// More threads than this are refused: a number that no machine's cores ask for is a mistake.
+constexpr int threads_max = 1024;
+
 // Rows that a thread takes at a time: some 100 µs of work, and whole blocks.
 constexpr long rows_per_chunk = 512;
 

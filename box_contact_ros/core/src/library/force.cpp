@@ -23,36 +23,49 @@ const PatchForces& forces_of(const bc_patch_forces* forces) {
 }
 bc_patch_forces* handle(PatchForces* forces) { return reinterpret_cast<bc_patch_forces*>(forces); }
 
-bool is_positive(double number) { return number > 0.0 && number <= largest_number; }
-bool is_finite(const double* numbers, int64_t count) {
-  return std::all_of(numbers, numbers + count,
-                     [](double number) { return std::fabs(number) <= largest_number; });
+bool is_amount_at(const double* numbers, int64_t k) {  // none is as good
+  return !numbers || force::is_amount(numbers[k]);
 }
-// Rows of numbers of 0 or more, or no rows.
-bool is_amount(const double* numbers, int64_t k) {
-  return !numbers || numbers[k] == 0.0 || is_positive(numbers[k]);
+
+// Refuse rows of which one has a number that is not within the limit.
+bc_status check_within(const char* field, size_t row, const double* numbers, int64_t count,
+                       double limit) {
+  if (force::are_within(numbers, count, limit)) return BC_OK;
+  const double* worst = std::find_if_not(
+      numbers, numbers + count, [limit](double number) { return std::fabs(number) <= limit; });
+  return fail(BC_BAD_ARGUMENT, "%s[%zu] has %g, which is not finite, or beyond %g", field, row,
+              *worst, limit);
+}
+
+bc_status read_body(const bc_body& given, size_t k, Body& body) {
+  const double *inertia = given.inertia, mass = given.mass;
+  bool moves = mass != 0.0;
+  if (moves && !force::is_mass(mass))
+    return fail(BC_BAD_ARGUMENT, "mass of body %zu must be 0, or within 1e-50 to 1e50 kg, not %g",
+                k, mass);
+  for (int i = 0; i < 3; ++i)
+    if (!force::is_mass(inertia[i]) && (moves || inertia[i] != 0.0))
+      return fail(BC_BAD_ARGUMENT,
+                  "inertia of body %zu must be within 1e-50 to 1e50 kg m², not (%g, %g, %g)", k,
+                  inertia[0], inertia[1], inertia[2]);
+  Vec<double> moments = force::vector(given.inertia);
+  if (!force::is_inertia(moments))
+    return fail(BC_BAD_ARGUMENT,
+                "inertia of body %zu is (%g, %g, %g): no moment exceeds the sum of the others", k,
+                inertia[0], inertia[1], inertia[2]);
+  Vec<double> ones{1.0, 1.0, 1.0}, zeros{0.0, 0.0, 0.0};
+  body = {moves ? 1.0 / mass : 0.0, moves ? ones / moments : zeros, force::vector(given.centre)};
+  return check_within("centre", k, given.centre, 3, length_max);
 }
 
 bc_status read_bodies(const bc_body* given, int64_t count, std::vector<Body>& bodies) {
   if (!given && count > 0) return refuse_null("bodies");
-  if (count < 0 || count > INT32_MAX) return fail(BC_BAD_ARGUMENT, "count is no number of bodies");
-  bodies.reserve(size_t(count));
-  for (int64_t k = 0; k < count; ++k) {
-    bool moves = given[k].mass != 0.0;
-    if (moves && !is_positive(given[k].mass))
-      return fail(BC_BAD_ARGUMENT, "mass of body %lld must be positive, or 0, not %g", (long long)k,
-                  given[k].mass);
-    if (!is_finite(given[k].centre, 3))
-      return fail(BC_BAD_ARGUMENT, "centre of body %lld is not finite", (long long)k);
-    Body body{moves ? 1.0 / given[k].mass : 0.0, {0.0, 0.0, 0.0}, force::vector(given[k].centre)};
-    for (int i = 0; i < 3 && moves; ++i) {
-      if (!is_positive(given[k].inertia[i]))
-        return fail(BC_BAD_ARGUMENT, "inertia of body %lld must be positive, not %g", (long long)k,
-                    given[k].inertia[i]);
-      body.inverse_inertia[i] = 1.0 / given[k].inertia[i];
-    }
-    bodies.push_back(body);
-  }
+  if (count < 0 || count > INT32_MAX)
+    return fail(BC_BAD_ARGUMENT, "count must be that of bodies, below 2^31, not %lld",
+                (long long)count);
+  bodies.resize(size_t(count));
+  for (size_t k = 0; k < bodies.size(); ++k)
+    if (bc_status status = read_body(given[k], k, bodies[k])) return status;
   return BC_OK;
 }
 
@@ -68,32 +81,96 @@ int64_t state_size(const PatchForces& forces) {
 bc_status check_poses(size_t count, const bc_pose* poses) {
   for (size_t k = 0; k < count; ++k) {
     auto* numbers = reinterpret_cast<const double*>(poses + k);
-    if (!pose_is_valid(numbers)) return refuse_pose("a body's", numbers);
+    if (pose_is_valid(numbers)) continue;
+    char field[32];
+    std::snprintf(field, sizeof field, "poses[%zu]", k);
+    return refuse_pose(field, numbers);
   }
   return BC_OK;
 }
 
-bc_status check_row(const bc_patches& answer, int64_t k, int64_t count) {
-  auto pair = (long long)k;
+bc_status check_patch(const bc_patches& answer, size_t k) {
+  const double *normal = answer.normal + 3 * k, *c = answer.covariance + 9 * k;
+  double volume = answer.volume[k];
+  if (!(volume > 0.0 && volume <= largest_number) || c[0] != c[0])
+    return fail(BC_BAD_ARGUMENT,
+                "pairs[%zu]: the contact has no patch (volume %g): volume and covariance are "
+                "needed, as models mlp and exact give them",
+                k, volume);
+  if (bc_status status = check_within("point", k, answer.point + 3 * k, 3, length_max))
+    return status;
+  if (!force::is_unit(force::vector_at(normal)))
+    return fail(BC_BAD_ARGUMENT, "normal[%zu] (%g, %g, %g) has the length %g, not 1", k, normal[0],
+                normal[1], normal[2], force::length(force::vector_at(normal)));
+  if (!force::is_covariance(c))
+    return fail(BC_BAD_ARGUMENT,
+                "covariance[%zu] (%g, %g, %g; %g, %g, %g; %g, %g, %g) is not symmetric, or has an "
+                "eigenvalue below 0",
+                k, c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8]);
+  return BC_OK;
+}
+
+bc_status check_row(const bc_patches& answer, size_t k, int64_t count) {
   const int64_t* bodies = answer.pairs + 2 * k;
   for (int side = 0; side < 2; ++side)
     if (bodies[side] < 0 || bodies[side] >= count)
-      return fail(BC_BAD_ARGUMENT, "pairs[%lld]: there is no body %lld", pair,
-                  (long long)bodies[side]);
+      return fail(BC_BAD_ARGUMENT, "pairs[%zu] is (%lld, %lld): there is no body %lld", k,
+                  (long long)bodies[0], (long long)bodies[1], (long long)bodies[side]);
   if (bodies[0] == bodies[1])
-    return fail(BC_BAD_ARGUMENT, "pairs[%lld]: both boxes are body %lld", pair,
-                (long long)bodies[0]);
-  if (!is_amount(answer.friction, k) || !is_amount(answer.stiffness, k) ||
-      (answer.surface && !is_finite(answer.surface + 3 * k, 3)))
-    return fail(BC_BAD_ARGUMENT,
-                "pairs[%lld]: friction and stiffness must be 0 or more, and surface finite", pair);
-  if (answer.separation[k] != answer.separation[k] || answer.volume[k] == 0.0) return BC_OK;
-  if (!is_positive(answer.volume[k]) || !is_finite(answer.covariance + 9 * k, 9) ||
-      !is_finite(answer.normal + 3 * k, 3) || !is_finite(answer.point + 3 * k, 3))
-    return fail(BC_BAD_ARGUMENT,
-                "pairs[%lld]: the contact has no patch (volume %g): volume and covariance are "
-                "needed, as models mlp and exact give them",
-                pair, answer.volume[k]);
+    return fail(BC_BAD_ARGUMENT, "pairs[%zu]: both boxes are body %lld", k, (long long)bodies[0]);
+  using Column = std::pair<const char*, const double*>;
+  for (auto [field, column] :
+       {Column{"friction", answer.friction}, {"stiffness", answer.stiffness}})
+    if (!is_amount_at(column, int64_t(k)))
+      return fail(BC_BAD_ARGUMENT, "%s[%zu] must be within 0 and 1e50, not %g", field, k,
+                  column[k]);
+  if (answer.surface)
+    if (bc_status status =
+            check_within("surface_velocity", k, answer.surface + 3 * k, 3, force::speed_max))
+      return status;
+  bool is_left_out = answer.separation[k] != answer.separation[k] || answer.volume[k] == 0.0;
+  return is_left_out ? BC_OK : check_patch(answer, k);
+}
+
+bc_status check_options(const bc_force_options& all) {
+  if (all.iterations < 1)
+    return fail(BC_BAD_ARGUMENT, "iterations must be 1 or more, not %d", all.iterations);
+  if (all.relaxations < 0)
+    return fail(BC_BAD_ARGUMENT, "relaxations must be 0 or more, not %d", all.relaxations);
+  if (!force::is_amount(all.friction))
+    return fail(BC_BAD_ARGUMENT, "friction must be within 0 and 1e50, not %g", all.friction);
+  return BC_OK;
+}
+
+bc_status check_answer(const bc_patches& all, size_t bodies, const bc_pose* poses) {
+  if (all.count < 0)
+    return fail(BC_BAD_ARGUMENT, "count must be 0 or more, not %lld", (long long)all.count);
+  if (!force::is_amount(all.age))
+    return fail(BC_BAD_ARGUMENT, "age must be within 0 and 1e50 s, not %g", all.age);
+  if (!force::is_amount(all.period))
+    return fail(BC_BAD_ARGUMENT, "period must be within 0 and 1e50 s, not %g", all.period);
+  if (all.count > 0 &&
+      !(all.pairs && all.separation && all.normal && all.point && all.volume && all.covariance))
+    return refuse_null("an array of the answer");
+  if (bc_status status = check_poses(bodies, poses)) return status;
+  for (size_t k = 0; k < size_t(all.count); ++k)
+    if (bc_status status = check_row(all, k, int64_t(bodies))) return status;
+  return BC_OK;
+}
+
+bc_status check_step(double dt, size_t bodies, const bc_pose* poses, const bc_velocity* velocities,
+                     const bc_wrench* outside) {
+  if (!(dt >= force::step_min && dt < force::step_limit))
+    return fail(BC_BAD_ARGUMENT, "dt must be at least 1e-50 s and below 1 s, not %g", dt);
+  if (bc_status status = check_poses(bodies, poses)) return status;
+  auto* speeds = reinterpret_cast<const double*>(velocities);
+  auto* loads = reinterpret_cast<const double*>(outside);
+  for (size_t k = 0; k < bodies; ++k) {
+    bc_status status = check_within("velocities", k, speeds + 6 * k, 6, force::speed_max);
+    if (!status && outside)
+      status = check_within("wrenches", k, loads + 6 * k, 6, force::wrench_max);
+    if (status) return status;
+  }
   return BC_OK;
 }
 
@@ -111,10 +188,7 @@ bc_status bc_patch_forces_create(const bc_body* bodies, int64_t count,
     *forces = nullptr;
     bc_force_options all = BC_DEFAULT_FORCE_OPTIONS;
     if (options && !read(options, all)) return fail(BC_BAD_ABI, "options.size is unknown");
-    if (all.iterations < 1 || all.relaxations < 0)
-      return fail(BC_BAD_ARGUMENT, "iterations must be 1 or more, and relaxations 0 or more");
-    if (!is_amount(&all.friction, 0))
-      return fail(BC_BAD_ARGUMENT, "friction must be 0 or more, not %g", all.friction);
+    if (bc_status status = check_options(all)) return status;
     std::vector<Body> read;
     if (bc_status status = read_bodies(bodies, count, read)) return status;
     *forces = handle(
@@ -156,7 +230,7 @@ bc_status bc_patch_forces_forget(bc_patch_forces* forces, int64_t body) {
   return guarded([&] {
     if (!forces) return refuse_null("forces");
     if (body < 0 || size_t(body) >= forces_of(forces).bodies().size())
-      return fail(BC_BAD_ARGUMENT, "there is no body %lld", (long long)body);
+      return fail(BC_BAD_ARGUMENT, "body: there is no body %lld", (long long)body);
     forces_of(forces).forget(int32_t(body));
     return BC_OK;
   });
@@ -173,19 +247,16 @@ bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches* answer
       return refuse_null(!forces ? "forces" : !answer ? "answer" : "poses");
     bc_patches all{};
     if (!read(answer, all)) return fail(BC_BAD_ABI, "answer.size is unknown");
-    if (all.count < 0) return fail(BC_BAD_ARGUMENT, "count is below zero");
-    if (!is_amount(&all.age, 0) || !is_amount(&all.period, 0))
-      return fail(BC_BAD_ARGUMENT, "age and period must be 0 or more, not %g and %g", all.age,
-                  all.period);
-    if (all.count > 0 && !(all.pairs && all.separation && all.normal && all.point && all.volume &&
-                           all.covariance))
-      return refuse_null("an array of the answer");
-    size_t bodies = forces_of(forces).bodies().size();
-    if (bc_status status = check_poses(bodies, poses)) return status;
-    for (int64_t k = 0; k < all.count; ++k)
-      if (bc_status status = check_row(all, k, int64_t(bodies))) return status;
-    if (!forces_of(forces).hold(all, poses))
-      return fail(BC_BAD_ARGUMENT, "a pair of bodies comes twice");
+    if (bc_status status = check_answer(all, forces_of(forces).bodies().size(), poses))
+      return status;
+    switch (forces_of(forces).hold(all, poses)) {
+      case PatchForces::Held::pair_twice:
+        return fail(BC_BAD_ARGUMENT, "pairs: a pair of bodies comes twice");
+      case PatchForces::Held::no_patch:
+        return fail(BC_BAD_ARGUMENT, "covariance: a patch has no area, or volume / area no number");
+      case PatchForces::Held::all:
+        break;
+    }
     return BC_OK;
   });
 }
@@ -196,15 +267,8 @@ bc_status bc_patch_forces_step(bc_patch_forces* forces, double dt, const bc_pose
   return guarded([&] {
     if (!forces || !poses || !velocities)
       return refuse_null(!forces ? "forces" : !poses ? "poses" : "velocities");
-    if (!is_positive(dt)) return fail(BC_BAD_ARGUMENT, "dt must be positive, not %g", dt);
     size_t bodies = forces_of(forces).bodies().size();
-    if (bc_status status = check_poses(bodies, poses)) return status;
-    for (size_t k = 0; k < bodies; ++k) {
-      if (!is_finite(velocities[k].linear, 3) || !is_finite(velocities[k].angular, 3))
-        return fail(BC_BAD_ARGUMENT, "velocity of body %zu is not finite", k);
-      if (outside && (!is_finite(outside[k].force, 3) || !is_finite(outside[k].torque, 3)))
-        return fail(BC_BAD_ARGUMENT, "wrench of body %zu is not finite", k);
-    }
+    if (bc_status status = check_step(dt, bodies, poses, velocities, outside)) return status;
     forces_of(forces).step(dt, poses, velocities, outside, after, wrenches);
     return BC_OK;
   });
@@ -242,12 +306,13 @@ bc_status bc_patch_forces_load(const void* bytes, int64_t count, bc_patch_forces
     PatchForces loaded({}, {1, 0, 0.0});
     if (fits) loaded.make_room(size_t(head[1]), size_t(head[2]));
     if (!fits || int64_t(sizeof head) + state_size(loaded) != count)
-      return fail(BC_BAD_ARGUMENT, "the bytes are no state of this version");
+      return fail(BC_BAD_ARGUMENT, "state: %lld bytes are not a state of this version",
+                  (long long)count);
     PatchForces::visit_state(loaded, [&at](auto* values, size_t rows) {
       if (rows > 0) std::memcpy(static_cast<void*>(values), at, rows * sizeof *values);
       at += rows * sizeof *values;
     });
-    if (!loaded.is_sound()) return fail(BC_BAD_ARGUMENT, "the bytes are damaged");
+    if (!loaded.is_sound()) return fail(BC_BAD_ARGUMENT, "state: the bytes are damaged");
     *forces = handle(new PatchForces(std::move(loaded)));
     return BC_OK;
   });

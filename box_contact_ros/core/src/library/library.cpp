@@ -105,7 +105,8 @@ const double* numbers(const bc_size* sizes) { return reinterpret_cast<const doub
 bc_status check_rows(const bc_rows& rows, int threads, int64_t& refused) {
   if (rows.count < 0 || rows.count > largest_count)
     return fail(BC_BAD_ARGUMENT, "count %lld is that of no array", (long long)rows.count);
-  if (threads < 1) return fail(BC_BAD_ARGUMENT, "threads must be 1 or more, not %d", threads);
+  if (threads < 1 || threads > threads_max)
+    return fail(BC_BAD_ARGUMENT, "threads must be within 1 and %d, not %d", threads_max, threads);
   if (rows.count == 0) return BC_OK;
   if (!rows.poses_a || !rows.poses_b) return refuse_null(rows.poses_a ? "poses_b" : "poses_a");
   if (!rows.pairs && rows.pose_count != rows.count)
