@@ -96,7 +96,7 @@ static void check_bodies(void) {
   } table[] = {{{1e-300, {1, 1, 1}, {0}}, "mass of body 0 must be 0, or within 1e-50 to 1e50 kg"},
                {{INFINITY, {1, 1, 1}, {0}}, "not inf"},
                {{-1, {1, 1, 1}, {0}}, "not -1"},
-               {{1, {1, 1, 100}, {0}}, "inertia of body 0 is (1, 1, 100)"},
+               {{1, {1, 1, 100}, {0}}, "inertia of body 0 (1, 1, 100) has a moment"},
                {{1, {1, 0, 1}, {0}}, "not (1, 0, 1)"},
                {{0, {NAN, 0, 0}, {0}}, "not (nan, 0, 0)"},
                {{1, {1, 1, 1}, {0, 2e50, 0}}, "centre[0] has 2e+50"}};

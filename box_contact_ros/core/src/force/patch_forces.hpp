@@ -76,12 +76,15 @@ struct Patch {
 
   std::pair<int32_t, int32_t> pair() const { return {a, b}; }
 
-  // Whether all of it is within what is accepted, and what follows from that is a number.
+  // Whether area and depth are numbers: what no limit of an answer alone makes sure of.
+  bool has_area() const { return shape.has_area() && depth >= 0.0 && depth <= place_max; }
+
+  // Whether all of it is within what is accepted.
   bool is_sound() const {
     bool is_asked = asked_a.is_sound() && asked_b.is_sound() && is_unit(normal) &&
-                    is_within(point, length_max) && shape.is_sound() && depth >= 0.0 &&
-                    depth <= place_max && is_amount(friction) && is_amount(stiffness) &&
-                    is_within(surface, speed_max) && is_amount(late) && is_amount(age);
+                    is_within(point, length_max) && shape.is_sound() && has_area() &&
+                    is_amount(friction) && is_amount(stiffness) && is_within(surface, speed_max) &&
+                    is_amount(late) && is_amount(age);
     return is_asked && press >= 0.0 && press <= wrench_max && std::fabs(spin) <= wrench_max &&
            is_within(slip, wrench_max) && is_within(rock, wrench_max) &&
            is_within(given_at, place_max);
@@ -157,7 +160,7 @@ class PatchForces {
       if (!bodies_[a].is_free() && !bodies_[b].is_free()) continue;
       if (!is_stale && !(answer.volume[k] > 0.0)) continue;
       next_.push_back(read(answer, k, is_stale, poses));
-      if (!is_stale && !next_.back().is_sound()) return Held::no_patch;
+      if (!is_stale && !next_.back().has_area()) return Held::no_patch;
     }
     auto before = [](const Patch& p, const Patch& q) { return p.pair() < q.pair(); };
     auto same = [](const Patch& p, const Patch& q) { return p.pair() == q.pair(); };

@@ -25,7 +25,8 @@ constexpr double normal_slack = 1e-6;
 constexpr double covariance_slack = 1e-9;
 
 inline bool is_unit(const Vec<double>& a, double slack = normal_slack) {
-  return std::fabs(length(a) - 1.0) <= slack;
+  double squared = dot(a, a);
+  return squared >= (1.0 - slack) * (1.0 - slack) && squared <= (1.0 + slack) * (1.0 + slack);
 }
 
 // Whether numbers (3, 3) are symmetric, and have no eigenvalue below zero: by the pivots of Cholesky's
@@ -47,10 +48,13 @@ struct Rectangle {
   double half_1, half_2;       // half lengths along them [m]
   double radius;               // at which friction resists a spin [m]
 
+  bool has_area() const {
+    return half_1 > 0.0 && half_2 > 0.0 && half_1 <= place_max && half_2 <= place_max;
+  }
   bool is_sound() const {
     double slack = 4.0 * normal_slack;  // both axes are products with the normal
-    return is_unit(axis_1, slack) && is_unit(axis_2, slack) && half_1 > 0.0 && half_2 > 0.0 &&
-           half_1 <= place_max && half_2 <= place_max && radius >= 0.0 && radius <= place_max;
+    return has_area() && is_unit(axis_1, slack) && is_unit(axis_2, slack) && radius >= 0.0 &&
+           radius <= place_max;
   }
 };
 

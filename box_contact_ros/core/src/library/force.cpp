@@ -51,8 +51,8 @@ bc_status read_body(const bc_body& given, size_t k, Body& body) {
   Vec<double> moments = force::vector(given.inertia);
   if (!force::is_inertia(moments))
     return fail(BC_BAD_ARGUMENT,
-                "inertia of body %zu is (%g, %g, %g): no moment exceeds the sum of the others", k,
-                inertia[0], inertia[1], inertia[2]);
+                "inertia of body %zu (%g, %g, %g) has a moment that exceeds the sum of the others",
+                k, inertia[0], inertia[1], inertia[2]);
   Vec<double> ones{1.0, 1.0, 1.0}, zeros{0.0, 0.0, 0.0};
   body = {moves ? 1.0 / mass : 0.0, moves ? ones / moments : zeros, force::vector(given.centre)};
   return check_within("centre", k, given.centre, 3, length_max);
