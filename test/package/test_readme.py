@@ -413,7 +413,7 @@ LENGTHS, QUATERNIONS = (
     for what in ('length', 'quaternion'))
 LIMITS = {
     'contributing/decisions/patch-law.md': (
-        f'Frequency of {SOFT}/step', f'Frequency of {LATE}/T',
+        f'Frequency of {SOFT}/window', f'Frequency of {LATE}/T',
         f'Damping ratio {constant(FORCES, "soft_damping_ratio")}',
         f'{STEPS["iterations"].default} iterations'),
     'contributing/decisions/planes.md': (
@@ -422,7 +422,7 @@ LIMITS = {
     'explanation/force.md': (
         f'up to {STEPS["iterations"].default} times per step',
         f'Up to {STEPS["relaxations"].default} more iterations',
-        f'the frequency {SOFT}/step', f'{float(SOFT) ** -2:.1f}·g·step² deep',
+        f'the frequency {SOFT}/window', f'{float(SOFT) ** -2:.1f}·g·step² deep',
         f'the frequency is {LATE}/T', f'g·T²/{float(LATE) ** 2}',
         f'faster than {constant(FORCES, "push_out_limit")} m/s',
         f'overdue by {constant(FORCES, "overdue_periods")} periods'),
