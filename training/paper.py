@@ -5,7 +5,7 @@
 
 The paper draws boxes that just touch, at any angle to ±90°. A scene asks for other pairs. Here the
 8,000 patterns are contacts of the scene, folded by the symmetries as model `paper` folds them
-(solver/paper.py). The outputs are the paper's four angles, or x, y and z of the impact point.
+(networks/paper.py). The outputs are the paper's four angles, or x, y and z of the impact point.
 """
 from __future__ import annotations
 
@@ -23,8 +23,7 @@ from benchmarks.paper.jobs import SHIPPED
 from benchmarks.pose_sets import LOADS, Generator, Pairs, drawn
 from benchmarks.pose_sets import SETS as POSE_SETS
 from benchmarks.weights import save_weights
-from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.paper import (
+from box_contact_ros.networks.paper import (
     in_file_name,
     is_cube,
     network_inputs,
@@ -32,6 +31,7 @@ from box_contact_ros.solver.paper import (
     touching_pairs,
     turned,
 )
+from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix
 
 SCENES: dict[str, Generator] = {**POSE_SETS, **LOADS}

@@ -23,9 +23,9 @@ from benchmarks.pose_sets import SETS, Pairs
 from benchmarks.weights import save_weights
 from benchmarks.worst_case import climb, worst_start
 from box_contact_ros.core import FEATURES, NETWORK_FORMAT, OUTPUTS
+from box_contact_ros.networks.mlp import ACTIVATION, GROUP, NETWORK, core_numbers
+from box_contact_ros.networks.weights_file import Network
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.mlp import ACTIVATION, GROUP, NETWORK, core_numbers
-from box_contact_ros.solver.weights_file import Network
 
 from .fit import UNITS, MlpErrors, PatchNetwork, errors_of, fit, tensors
 from .samples import MlpSamples, describe, draw_samples, mixture

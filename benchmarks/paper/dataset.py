@@ -36,9 +36,9 @@ from typing import Any
 
 import numpy as np
 
+from box_contact_ros.networks.paper import euler_angles
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.paper import euler_angles
 from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 
 from ..pose_sets import CUBE, turns

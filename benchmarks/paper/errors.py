@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from box_contact_ros.solver.paper import forward
-from box_contact_ros.solver.weights_file import Network
+from box_contact_ros.networks.paper import forward
+from box_contact_ros.networks.weights_file import Network
 
 
 def predict(network: Network, inputs: np.ndarray) -> np.ndarray:

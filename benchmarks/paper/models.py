@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from box_contact_ros.resources import resource_path
-from box_contact_ros.solver.paper import (
+from box_contact_ros.networks.paper import (
     OUTPUTS,
     Paper,
     TouchingPairs,
@@ -23,7 +22,8 @@ from box_contact_ros.solver.paper import (
     network_inputs,
     octant_signs,
 )
-from box_contact_ros.solver.weights_file import load_weights
+from box_contact_ros.networks.weights_file import load_weights
+from box_contact_ros.resources import resource_path
 
 EXPERTS = ('vertex', 'edge', 'face')  # of the committee, in the order of the classifier's outputs
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import THREADS_MAX, native
+from ..networks.mlp import NETWORK, core_numbers, load_mlp
 from .checks import (
     as_floats,
     as_number,
@@ -24,7 +25,6 @@ from .checks import (
     size_fault,
 )
 from .contact import Contact, Contacts, without_patch
-from .mlp import NETWORK, core_numbers, load_mlp
 from .models import NATIVE, Model, check_model, make_model
 
 Names = tuple[str, str, str, str]  # of poses and sizes of A and B, in a refusal

@@ -77,5 +77,5 @@ def make_model(name: str, size: np.ndarray, weights: str | None) -> Model:
     to install, where a library is missing.
     """
     if name == 'paper':
-        return import_module('box_contact_ros.solver.paper').paper(size, weights)
+        return import_module('box_contact_ros.networks.paper').paper(size, weights)
     return import_module('box_contact_ros.soup.soup').Soup(soup_divisions(name))

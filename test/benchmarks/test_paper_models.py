@@ -14,9 +14,9 @@ from test_paper import touching
 from benchmarks.paper.models import Committee, committee, weights_path
 from benchmarks.weights import save_weights
 from box_contact_ros import ContactSolver
+from box_contact_ros.networks.paper import Paper
+from box_contact_ros.networks.weights_file import WeightsError, load_weights
 from box_contact_ros.resources import resource_path
-from box_contact_ros.solver.paper import Paper
-from box_contact_ros.solver.weights_file import WeightsError, load_weights
 
 EXACT = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
 

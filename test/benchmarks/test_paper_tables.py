@@ -20,8 +20,8 @@ from benchmarks.paper import dataset, rotation, soup_tables, tables, tree
 from benchmarks.paper.jobs import JOBS
 from benchmarks.paper.models import weights_path
 from benchmarks.pose_sets import at_depth, on_cube
+from box_contact_ros.networks.weights_file import load_weights
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.weights_file import load_weights
 from box_contact_ros.soup import soup
 
 

@@ -29,8 +29,8 @@ from test_extremes import random_network
 import box_contact_ros
 from box_contact_ros import Contact, ContactSolver
 from box_contact_ros.core import FORCE, instruction_sets, native
+from box_contact_ros.networks.mlp import NETWORK, core_numbers, load_mlp
 from box_contact_ros.solver.contact import Contacts
-from box_contact_ros.solver.mlp import NETWORK, core_numbers, load_mlp
 
 TESTS = Path(__file__).resolve().parents[1]
 PACKAGE = Path(box_contact_ros.__file__).parent

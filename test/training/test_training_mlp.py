@@ -17,7 +17,7 @@ from benchmarks.pose_sets import SETS, Pairs
 from benchmarks.weights import save_weights
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import FEATURES, OUTPUTS
-from box_contact_ros.solver.mlp import NETWORK, load_mlp
+from box_contact_ros.networks.mlp import NETWORK, load_mlp
 from training import __main__ as train
 from training import recipe, samples
 from training.fit import PatchNetwork, errors_of, fit, loss_of, tensors

@@ -16,8 +16,8 @@ import pytest
 from safetensors.numpy import load, load_file, save_file
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.networks.weights_file import WeightsError, load_weights
 from box_contact_ros.resources import resource_path
-from box_contact_ros.solver.weights_file import WeightsError, load_weights
 
 WIDTHS = (6, 5, 3, 4)
 

@@ -27,10 +27,10 @@ from box_contact_ros.core import (
     UNITS_MAX,
     native,
 )
+from box_contact_ros.networks.mlp import ACTIVATION, NETWORK, core_numbers, load_mlp
+from box_contact_ros.networks.weights_file import Network, WeightsError
 from box_contact_ros.solver.contact import Contacts
-from box_contact_ros.solver.mlp import ACTIVATION, NETWORK, core_numbers, load_mlp
 from box_contact_ros.solver.pose import rotation_matrix
-from box_contact_ros.solver.weights_file import Network, WeightsError
 
 N = 4000
 UNIT = (1.0, 1.0, 1.0)

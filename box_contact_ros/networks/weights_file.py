@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from .checks import short_repr
+from ..solver.checks import short_repr
 
 WEIGHT_LIMIT = 1e4
 """Largest weight a loader believes: trained weights stay below 1e2, a flipped exponent bit does

@@ -9,8 +9,8 @@ import poses
 import pytest
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.networks.weights_file import WeightsError
 from box_contact_ros.resources import resource_path
-from box_contact_ros.solver.weights_file import WeightsError
 
 EDGE = 2.0
 MODELS = {'cubes': poses.CUBE, 'containers': poses.CONTAINER}

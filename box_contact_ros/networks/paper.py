@@ -27,9 +27,9 @@ import numpy as np
 
 from ..core import native
 from ..resources import resource_path
-from .checks import as_size, short_repr
-from .contact import Contacts
-from .pose import rotation_matrix
+from ..solver.checks import as_size, short_repr
+from ..solver.contact import Contacts
+from ..solver.pose import rotation_matrix
 from .weights_file import Network, Weights, WeightsError, load_weights
 
 INPUTS, OUTPUTS, PLACE = 6, 4, 3

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core import FEATURES, NETWORK_FORMAT, OUTPUTS, UNITS_MAX
 from ..resources import resource_path
-from .checks import short_repr
+from ..solver.checks import short_repr
 from .weights_file import Network, Weights, WeightsError, load_weights
 
 NETWORK = 'patch'  # name of the network in a weights file
