@@ -125,8 +125,7 @@ def measure(model: Contestant, name: str, pairs: Pairs, truth: Contacts) -> Accu
     both = truth.colliding & contacts.colliding
     touching = pairs.rows(both)
     classes = classify(touching)
-    errors = contact_errors(*(Contacts(*(part[both] for part in answer))
-                              for answer in (contacts, truth)), touching.edge)
+    errors = contact_errors(contacts[both], truth[both], touching.edge)
     return AccuracyRow(
         model=model.name, set=name, pairs=len(both),
         errors={quantity: by_part(values, classes) for quantity, values

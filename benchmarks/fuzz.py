@@ -34,7 +34,7 @@ from box_contact_ros.core import DEPTH_FLOOR, FEATURES, OUTPUTS, UNITS_MAX, nati
 from box_contact_ros.networks.mlp import core_numbers
 from box_contact_ros.networks.weights_file import Network
 from box_contact_ros.solver.arguments import within
-from box_contact_ros.solver.contact import Contacts
+from box_contact_ros.solver.contact import FIELDS, Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 
@@ -335,8 +335,8 @@ def changed_bits(pairs: Pairs, found: Contacts, solver: Solver) -> np.ndarray:
                        | (swapped.separation != found.separation), SWAP, 0)
     for row in range(0, len(found.colliding), ALONE):
         alone = pairs.rows(slice(row, row + 1)).contacts(solver)
-        if not all(np.array_equal(single[0], many[row], equal_nan=True)
-                   for single, many in zip(alone, found)):
+        if not all(np.array_equal(getattr(alone, name)[0], getattr(found, name)[row],
+                                  equal_nan=True) for name in FIELDS):
             changed[row] |= SINGLE
     return changed
 

@@ -19,6 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from box_contact_ros.solver.contact import Contacts
+
 TOLERANCE = 1e-12  # what separations and depths have to keep, of the size
 COORDINATE_ULPS = 8.0
 """And far from the origin, of the coordinates' last place: poses are known no better."""
@@ -62,11 +64,12 @@ class Verdict(NamedTuple):
     unsure: np.ndarray  # (n,) gap or depth up to which either verdict is right [m]
     along: np.ndarray  # (n,) gap along the solver's normal [m], NaN where it says apart
 
-    def settle(self, found: tuple[np.ndarray, ...], gap_of: Callable[[int], float]) -> None:
+    def settle(self, found: Contacts, gap_of: Callable[[int], float]) -> None:
         """Judge the doubtful pairs by their exact gaps; gap_of: returns the one of a row [m]."""
         rows = np.flatnonzero(self.doubtful)
         gap = np.array([gap_of(row) for row in rows], dtype=np.float64)
-        colliding, separation, tolerance = found[0][rows], found[1][rows], self.tolerance[rows]
+        colliding, separation = found.colliding[rows], found.separation[rows]
+        tolerance = self.tolerance[rows]
         self.depth_error[rows] = np.where(colliding, np.abs(separation - gap) / tolerance, np.nan)
         self.faults[rows] = self.faults[rows] & ~BY_GAP | _faults_by_gap(
             colliding, separation, self.along[rows], gap, tolerance, self.unsure[rows])
@@ -91,12 +94,11 @@ def two_touches(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size
 
 
 def judge(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
-          found: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]) -> Verdict:
-    """Judge answers for poses (n, 7) and full extents (n, 3).
-
-    found: colliding (n,), separation (n,) [m], normal (n, 3), point (n, 3), as a solver's batch.
-    """
-    arrays = [np.asarray(part) for part in (pose_a, pose_b, size_a, size_b, *found[:4])]
+          found: Contacts) -> Verdict:
+    """Judge answers for poses (n, 7) and full extents (n, 3)."""
+    arrays = [np.asarray(part) for part in (
+        pose_a, pose_b, size_a, size_b, found.colliding, found.separation, found.normal,
+        found.point)]
     pieces = [_judge(*(part[start:start + PIECE] for part in arrays))
               for start in range(0, max(1, len(pose_a)), PIECE)]
     return Verdict(*(np.concatenate(parts) for parts in zip(*pieces)))

@@ -18,6 +18,8 @@ from pathlib import Path
 import numpy as np
 import yaml
 
+from box_contact_ros import Contact, Contacts
+
 from . import output
 from .contestant import Contestant, Manifold, ours, packages_of
 from .engines import installed
@@ -85,8 +87,9 @@ def fault(one: NamedFailure, found: Manifold, bound: float) -> str:
     depth = float(found.depths[deepest])  # NaN: none is given
     if abs(depth + one.separation) > bound:
         return f'depth {depth:.3g}'
-    along = judge(*pairs, (np.array([True]), np.array([one.separation]),
-                           found.normals[[deepest]], found.points[[deepest]])).along[0]
+    contact = Contact(True, one.separation, found.normals[deepest], found.points[deepest],
+                      np.nan, np.full((3, 3), np.nan))
+    along = judge(*pairs, Contacts.of([contact])).along[0]
     if along < one.separation - bound:  # NaN: no normal is given
         return f'depth {-along:.3g} along the normal'
     # Models press boxes that just touch in.

@@ -87,7 +87,7 @@ class LoadForces:
         fixed = Body(mass=0.0, inertia=np.zeros(3))
         self._forces.set_bodies([self._load, *[fixed] * len(self._places)])
         pairs = np.array([(0, self._places[name]) for name in contacts]).reshape(-1, 2)
-        self._forces.hold(pairs, Contacts.of(list(contacts.values())), self._rows(pose, NO_TURN),
+        self._forces.hold(pairs, Contacts.of(contacts.values()), self._rows(pose, NO_TURN),
                           age=self._late, period=self._period)
 
     def wrench(self, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:

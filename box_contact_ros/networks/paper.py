@@ -156,9 +156,8 @@ class Paper:
             refused = int(misfits[0])
         touching = exact.colliding
         if refused < 0 and touching.any():
-            rows = Contacts(*(column[touching] for column in exact))
             exact.point[touching], exact.normal[touching] = self._contacts(
-                a[touching], b[touching], 0.5 * sizes_a[touching], rows)
+                a[touching], b[touching], 0.5 * sizes_a[touching], exact[touching])
         return exact, refused
 
     def _contacts(self, a: np.ndarray, b: np.ndarray, half: np.ndarray, exact: Contacts,

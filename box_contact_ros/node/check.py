@@ -109,7 +109,7 @@ class Checker:
         listed.header = request.header
         for row in np.flatnonzero(contacts.separation <= request.margin if request.margin
                                   else contacts.colliding).tolist():
-            contact = contacts.row(row)
+            contact = contacts[row]
             a, b = names[places[row, 0]], names[places[row, 1]]
             (listed.contacts if contact.colliding else listed.near).append(
                 contact_message(self._labels.get((a, b), f'{a}_{b}'), a, b, contact))

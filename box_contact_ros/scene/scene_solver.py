@@ -376,8 +376,8 @@ class Answer(NamedTuple):
 
     def named(self) -> list[tuple[Pair, Contact]]:
         """Return each pair with its contact, by name."""
-        return [(self.scene.pair_of(a, b), self.contacts.row(row))
-                for row, (a, b) in enumerate(self.pairs.tolist())]
+        return [(self.scene.pair_of(a, b), contact)
+                for (a, b), contact in zip(self.pairs.tolist(), self.contacts)]
 
     def named_stale(self) -> list[Pair]:
         """Return the stale pairs by name; a box whose pairs all are is paired with itself."""
@@ -466,7 +466,7 @@ class SceneSolver:
             rows = np.flatnonzero(listed)
             if self.margin:
                 rows = rows[np.argsort(~contacts.colliding[rows], kind='stable')]
-            pairs, contacts = pairs[rows], Contacts(*(column[rows] for column in contacts))
+            pairs, contacts = pairs[rows], contacts[rows]
         return Answer(pairs, contacts, near, stale, self.scene)
 
     def _set_poses(self, poses: Sequence[np.ndarray | None] | np.ndarray) -> None:

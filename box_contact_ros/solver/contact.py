@@ -4,10 +4,13 @@
 """What a solver returns: one contact, or the contacts of many pairs as arrays."""
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+import operator
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import overload
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..core import native
 from .checks import short_repr
@@ -15,8 +18,12 @@ from .checks import short_repr
 Contact = native.Contact
 
 
-class Contacts(NamedTuple):
-    """The contacts of n pairs: the fields of `Contact` as arrays."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Contacts(Sequence[Contact]):
+    """The contacts of n pairs: a sequence of `Contact`, and the fields of all as arrays.
+
+    `contacts[3]` is a Contact. A slice, a mask (n,) or numbers of rows give Contacts.
+    """
 
     colliding: np.ndarray
     """(n,) bool."""
@@ -34,26 +41,42 @@ class Contacts(NamedTuple):
     """(n,) int32."""
 
     @classmethod
-    def of(cls, contacts: Sequence[Contact]) -> Contacts:
+    def of(cls, contacts: Iterable[Contact]) -> Contacts:
         """Return single contacts as arrays."""
-        for number, contact in enumerate(contacts):
+        rows = list(contacts)
+        for number, contact in enumerate(rows):
             if not isinstance(contact, Contact):
                 raise ValueError(f'contacts[{number}] must be a Contact, not {short_repr(contact)}')
 
         def column(name: str, kind: type, *shape: int) -> np.ndarray:
-            values = [getattr(contact, name) for contact in contacts]
-            return np.array(values, kind).reshape(len(values), *shape)
+            values = [getattr(contact, name) for contact in rows]
+            return np.array(values, kind).reshape(len(rows), *shape)
 
         return cls(column('colliding', bool), column('separation', float),
                    column('normal', float, 3), column('point', float, 3),
                    column('volume', float), column('covariance', float, 3, 3),
                    column('axis', np.int32))
 
-    def row(self, number: int) -> Contact:
-        """Return the contact of one pair."""
-        return Contact(bool(self.colliding[number]), float(self.separation[number]),
-                       self.normal[number], self.point[number], float(self.volume[number]),
-                       self.covariance[number], int(self.axis[number]))
+    def __len__(self) -> int:
+        return len(self.colliding)
+
+    @overload
+    def __getitem__(self, rows: int | np.integer) -> Contact: ...
+    @overload
+    def __getitem__(self, rows: slice | ArrayLike) -> Contacts: ...
+
+    def __getitem__(self, rows: int | np.integer | slice | ArrayLike) -> Contact | Contacts:
+        try:
+            row = operator.index(rows)  # type: ignore[arg-type]
+        except TypeError:
+            return Contacts(*(getattr(self, name)[rows] for name in FIELDS))
+        return Contact(bool(self.colliding[row]), float(self.separation[row]), self.normal[row],
+                       self.point[row], float(self.volume[row]), self.covariance[row],
+                       int(self.axis[row]))
+
+
+FIELDS = tuple(field.name for field in fields(Contacts))
+"""Names of the fields of Contact and Contacts, in the order of their arguments."""
 
 
 def patch_areas(contacts: Contacts) -> np.ndarray:
@@ -71,15 +94,13 @@ def patch_area(contact: Contact) -> float:
     return float(areas[0])
 
 
-def without_patch(colliding: np.ndarray, separation: np.ndarray, normal: np.ndarray,
-                  point: np.ndarray) -> Contacts:
-    """Return contacts of a model that gives the point alone: arrays with a row a pair.
+def without_patch(contacts: Contacts) -> Contacts:
+    """Return contacts of which the point alone is known.
 
     Volume and covariance of those in contact are NaN, as of the core with `patch=False`.
     """
-    return Contacts(colliding, separation, normal, point, np.where(colliding, np.nan, 0.0),
-                    np.full((len(colliding), 3, 3), np.nan),
-                    np.full(len(colliding), -1, dtype=np.int32))
+    return replace(contacts, volume=np.where(contacts.colliding, np.nan, 0.0),
+                   covariance=np.full((len(contacts), 3, 3), np.nan))
 
 
 native.use_contacts(Contacts)

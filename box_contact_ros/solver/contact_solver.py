@@ -111,7 +111,7 @@ class ContactSolver(native.PairSolver):
         """
         a = as_floats(pose_a, 'pose_a', 'a pose (x y z qx qy qz qw)', (7,)).reshape(1, 7)
         b = as_floats(pose_b, 'pose_b', 'a pose (x y z qx qy qz qw)', (7,)).reshape(1, 7)
-        return self._solve(a, b, self._size_a, self._size_b, _SINGLE).row(0)
+        return self._solve(a, b, self._size_a, self._size_b, _SINGLE)[0]
 
     def _batch_general(self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,
                        size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
@@ -163,7 +163,7 @@ class ContactSolver(native.PairSolver):
                 size_b = size_b if len(size_b) == 1 else size_b[second]
                 a, b, places = a[first], b[second], None
             contacts, refused = self._model.solve(a, b, size_a, size_b, threads)
-            contacts = contacts if patch else without_patch(*contacts[:4])
+            contacts = contacts if patch else without_patch(contacts)
         if refused >= 0:
             at = (refused, refused) if places is None else tuple(places[refused])
             raise ValueError(self._refusal(a, b, size_a, size_b, at, names))

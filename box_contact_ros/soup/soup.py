@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import fcl
@@ -151,7 +152,7 @@ class Soup:
               threads: int = 1) -> tuple[Contacts, int]:
         """Return contacts for poses (n, 7), sizes (n or 1, 3), and the first refused row or −1."""
         exact, refused = self._exact.solve(a, b, size_a, size_b, threads)
-        merged = without_patch(*exact[:4])
+        merged = replace(without_patch(exact), axis=np.full(len(exact), -1, np.int32))
         for row in np.flatnonzero(merged.colliding) if refused < 0 else ():
             sizes = tuple(size_a[row % len(size_a)]), tuple(size_b[row % len(size_b)])
             contacts = collide(*self.place(a[row], b[row], *sizes))

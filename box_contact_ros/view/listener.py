@@ -29,7 +29,6 @@ from ..node.ros_client import PoseTopic, pose_topics, stamp_of
 from ..node.runtime import GuardedNode
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import Answer, Scene, two_boxes
-from ..solver.contact import Contacts
 
 KEPT = 1000  # poses kept per topic: a second at 1 kHz
 UNANSWERED = 0.5
@@ -71,8 +70,7 @@ def read_touching(message: Any, scene: Scene) -> Answer:
     answer = read_answer(message, scene)
     touching = np.flatnonzero(answer.contacts.colliding)
     rows = touching[np.argsort(answer.contacts.separation[touching], kind='stable')]
-    contacts = Contacts(*(column[rows] for column in answer.contacts))
-    return answer._replace(pairs=answer.pairs[rows], contacts=contacts)
+    return answer._replace(pairs=answer.pairs[rows], contacts=answer.contacts[rows])
 
 
 class Track:

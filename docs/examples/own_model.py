@@ -10,6 +10,8 @@ Run it with `python own_model.py`. It prints:
 
 This model takes verdict, depth and normal from `exact`. Its point is the middle of the centres.
 """
+from dataclasses import replace
+
 import numpy as np
 
 from box_contact_ros import Contacts, ContactSolver
@@ -27,7 +29,7 @@ class Between:
         sizes_a, sizes_b = (np.broadcast_to(size, (len(a), 3)) for size in (size_a, size_b))
         found = self.exact.batch(a, b, size_a=sizes_a, size_b=sizes_b, threads=threads, patch=False)
         middle = (a[:, :3] + b[:, :3]) / 2.0
-        return found._replace(point=np.where(found.colliding[:, None], middle, np.nan)), -1
+        return replace(found, point=np.where(found.colliding[:, None], middle, np.nan)), -1
 
 
 if __name__ == '__main__':

@@ -18,7 +18,7 @@ from box_contact_ros.bench.report import (
     table,
     void_reason,
 )
-from box_contact_ros.solver.contact import Contacts, without_patch
+from box_contact_ros.solver.contact import Contacts
 
 MS = 1_000_000  # ns
 START = 1_700_000_000_000_000_000  # ns: stamps as large as real ones
@@ -30,8 +30,9 @@ DEPTH = 2e-3  # of all pairs [m]
 def exact() -> Contacts:
     """Return the truth: all pairs touch at a point of their own, at one depth."""
     points = np.stack([0.01 * np.arange(PAIRS), np.ones(PAIRS), np.zeros(PAIRS)], axis=1)
-    return without_patch(np.ones(PAIRS, bool), np.full(PAIRS, -DEPTH),
-                         np.tile([0.0, 0.0, -1.0], (PAIRS, 1)), points)
+    return Contacts(np.ones(PAIRS, bool), np.full(PAIRS, -DEPTH),
+                    np.tile([0.0, 0.0, -1.0], (PAIRS, 1)), points, np.full(PAIRS, np.nan),
+                    np.full((PAIRS, 3, 3), np.nan), np.full(PAIRS, -1, np.int32))
 
 
 def played(node: str = 'contact', *, delay: int = MS) -> AnswerLog:

@@ -106,7 +106,7 @@ def test_points_and_depths_of_a_known_contestant_have_known_errors() -> None:
 
     def shifted(pairs: Pairs) -> Contacts:
         contacts = exact.solve(pairs)
-        return contacts._replace(point=contacts.point + [0.0, 0.01, 0.0])
+        return replace(contacts, point=contacts.point + [0.0, 0.01, 0.0])
 
     pairs = SETS['random cubes'](np.random.default_rng(1), 100)
     row = accuracy.measure(replace(exact, name='mlp', solve=shifted), 'random cubes', pairs,

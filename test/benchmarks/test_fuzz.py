@@ -24,8 +24,8 @@ def drawn(name, n=400):
 
 def answers(pairs, model='exact'):
     a, b, size_a, size_b = pairs
-    return [part.copy() for part in ContactSolver((1, 1, 1), (1, 1, 1), model=model).batch(
-        a, b, size_a=size_a, size_b=size_b)]
+    return ContactSolver((1, 1, 1), (1, 1, 1), model=model).batch(
+        a, b, size_a=size_a, size_b=size_b)
 
 
 def test_gates_are_at_zero(tmp_path, capsys):
@@ -83,8 +83,8 @@ def test_the_judges_gap_is_the_oracles(name):
     for row, (a, b, size_a, size_b) in enumerate(zip(*pairs)):
         exact = oracle.separation(oracle.make_box(a, size_a), oracle.make_box(b, size_b))
         assert judge.exact_gap(a, b, size_a, size_b) == float(exact)
-        if found[0][row] and not verdict.doubtful[row]:
-            off = abs(mpfr(float(found[1][row])) - exact) / verdict.tolerance[row]
+        if found.colliding[row] and not verdict.doubtful[row]:
+            off = abs(mpfr(float(found.separation[row])) - exact) / verdict.tolerance[row]
             assert off <= 2.0
 
 
@@ -102,20 +102,21 @@ def test_planted_faults_are_found(name):
     pairs = drawn(name)
     found = answers(pairs)
     size = np.maximum(pairs[2], pairs[3]).max(axis=1)
-    deep = np.flatnonzero(found[0] & (found[1] < -1e-6 * size)
+    deep = np.flatnonzero(found.colliding & (found.separation < -1e-6 * size)
                           & (np.abs(pairs[0][:, :3]).max(axis=1) < 20.0))[:7]
-    apart = np.flatnonzero(~found[0] & (found[1] > 1e-6 * size))[0]
+    apart = np.flatnonzero(~found.colliding & (found.separation > 1e-6 * size))[0]
     assert all(not faults for faults in settled(pairs, found))
-    found[0][deep[0]] = False
-    found[1][deep[0]] = 1.0
-    found[0][apart], found[2][apart], found[3][apart] = True, (0.0, 0.0, 1.0), pairs[0][apart, :3]
-    found[1][apart] = -1e-3 * size[apart]
-    found[1][deep[1]] *= 1.0 + 1e-3
-    found[1][deep[2]] *= 1.0 - 1e-3
-    found[2][deep[3]] *= -1.0
-    found[2][deep[4]] *= 1.0 + 1e-9
-    found[3][deep[5]] += 2.0 * size[deep[5]]
-    found[3][deep[6], 1] = np.nan
+    found.colliding[deep[0]] = False
+    found.separation[deep[0]] = 1.0
+    found.colliding[apart], found.normal[apart] = True, (0.0, 0.0, 1.0)
+    found.point[apart] = pairs[0][apart, :3]
+    found.separation[apart] = -1e-3 * size[apart]
+    found.separation[deep[1]] *= 1.0 + 1e-3
+    found.separation[deep[2]] *= 1.0 - 1e-3
+    found.normal[deep[3]] *= -1.0
+    found.normal[deep[4]] *= 1.0 + 1e-9
+    found.point[deep[5]] += 2.0 * size[deep[5]]
+    found.point[deep[6], 1] = np.nan
     faults = settled(pairs, found)
     for row, expected in ((deep[0], 'missed contact'), (apart, 'phantom contact'),
                           (deep[1], 'too deep'), (deep[2], 'too shallow'),

@@ -4,6 +4,7 @@
 """Gates at zero on the stored families of hard poses, for `exact` and `mlp`."""
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -169,7 +170,7 @@ def test_swap(everything, model):
     two = solve(model, other)
     np.testing.assert_array_equal(one.colliding, two.colliding)
     np.testing.assert_array_equal(one.separation, two.separation)
-    along = judge.judge(*everything, (one.colliding, one.separation, -two.normal, one.point)).along
+    along = judge.judge(*everything, replace(one, normal=-two.normal)).along
     allowed = 2 * judge.rounding(*everything)
     assert (np.abs(along - one.separation) <= allowed)[one.colliding].all()
 

@@ -30,7 +30,7 @@ import box_contact_ros
 from box_contact_ros import Contact, ContactSolver
 from box_contact_ros.core import FORCE, instruction_sets, native
 from box_contact_ros.networks.mlp import NETWORK, core_numbers, load_mlp
-from box_contact_ros.solver.contact import Contacts
+from box_contact_ros.solver.contact import FIELDS, Contacts
 
 TESTS = Path(__file__).resolve().parents[1]
 PACKAGE = Path(box_contact_ros.__file__).parent
@@ -49,9 +49,9 @@ def a_solver(model: str) -> ContactSolver:
     return ContactSolver((1, 1, 1), (1, 1, 1), model=model)
 
 
-def assert_same_bits(one: tuple | Contact, other: tuple | Contact,
+def assert_same_bits(one: Contact | Contacts, other: Contact | Contacts,
                      where: object = None) -> None:
-    for name, mine, theirs in zip(Contacts._fields, *map(fields, (one, other)), strict=True):
+    for name, mine, theirs in zip(FIELDS, *map(fields, (one, other)), strict=True):
         assert np.array_equal(mine, theirs, equal_nan=True), (name, where)
 
 
@@ -72,19 +72,21 @@ import sys
 import numpy as np
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import native
+from box_contact_ros.solver.contact import FIELDS
 pairs = np.load(sys.argv[1])
 columns = [pairs[name] for name in ('pose_a', 'pose_b', 'size_a', 'size_b')]
 found = {'instruction_set': native.instruction_set, 'lanes': native.lanes}
 for model in ('exact', 'mlp'):
     solver = ContactSolver((1, 1, 1), (1, 1, 1), model=model)
     many = solver.batch(*columns[:2], size_a=columns[2], size_b=columns[3])
-    found |= {f'{model} {name}': value for name, value in many._asdict().items()}
+    found |= {f'{model} {name}': getattr(many, name) for name in FIELDS}
 strange = native.PairSolver('mlp', (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), pairs['network'])
-found |= {f'strange {k}': value for k, value in enumerate(strange.solve(*columns, 1)[0])}
+contacts = strange.solve(*columns, 1)[0]
+found |= {f'strange {name}': getattr(contacts, name) for name in FIELDS}
 for row in range(0, len(columns[0]), 40):
     a, b, size_a, size_b = (column[row] for column in columns)
     one = ContactSolver(size_a, size_b, model='exact')(a, b)
-    for name in many._fields:
+    for name in FIELDS:
         assert np.array_equal(getattr(one, name), found[f'exact {name}'][row],
                               equal_nan=True), (row, name)
 np.savez(sys.argv[2], **found)
@@ -293,7 +295,7 @@ def test_models_that_give_the_point_alone(model: str) -> None:
     for row, b in enumerate((ABOVE, apart)):
         one = solver(poses.IDENTITY, b)
         assert one.colliding is (row == 0)
-        assert_same_bits(one, tuple(field[row] for field in many))
+        assert_same_bits(one, many[row])
         assert np.array_equal(one.volume, [np.nan, 0.0][row], equal_nan=True)
         assert one.covariance.shape == (3, 3) and np.isnan(one.covariance).all()
 
@@ -320,7 +322,7 @@ def test_a_contact_never_changes() -> None:
     before = fields(one)
     for name in ('normal', 'point', 'covariance'):
         getattr(one, name)[:] = 7.0
-    for name in (*Contacts._fields, 'another'):
+    for name in (*FIELDS, 'another'):
         with pytest.raises(AttributeError):
             setattr(one, name, before[0])
         with pytest.raises(AttributeError):
@@ -330,7 +332,8 @@ def test_a_contact_never_changes() -> None:
                     one.axis)
     point[:] = 7.0
     for same in (one, again, copy.deepcopy(one)):
-        assert_same_bits(before, same)
+        for mine, theirs in zip(before, fields(same), strict=True):
+            assert np.array_equal(mine, theirs, equal_nan=True)
     assert repr(again) == repr(one)
     assert repr(one).startswith('Contact(colliding=True, separation=-0.09')
     assert repr(one).endswith(', axis=2)')

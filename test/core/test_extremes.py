@@ -13,7 +13,7 @@ import pytest
 from poses import Pairs
 
 from box_contact_ros.core import LENGTH_MAX, LENGTH_MIN, native
-from box_contact_ros.solver.contact import Contacts
+from box_contact_ros.solver.contact import FIELDS, Contacts
 
 UNIT = (1.0, 1.0, 1.0)
 N = 20_000
@@ -65,8 +65,8 @@ def test_contacts_keep_their_promises(model: str, seed: int) -> None:
     assert 0.05 < 1.0 - good.mean() < 0.2
     answers, refused = solver(model, rng).solve(*pairs, 2)
     assert refused == np.argmin(good)
-    assert not answers[0][~good].any() and np.isnan(answers[1][~good]).all()
-    found = Contacts(*(part[good] for part in answers))
+    assert not answers.colliding[~good].any() and np.isnan(answers.separation[~good]).all()
+    found = answers[good]
     pairs = Pairs(*(part[good] for part in pairs))
     touching, separation = found.colliding, found.separation
     assert 0.4 < touching.mean() < 0.95
@@ -97,9 +97,9 @@ def test_a_row_is_its_single_call(model: str) -> None:
         rows = slice(first, first + count)
         many, _ = number.solve(*(part[rows] for part in pairs), 1)
         good = accepted(Pairs(*(part[rows] for part in pairs)))
-        for field, values in enumerate(many):
-            singles = np.concatenate([answer[field] for answer, _ in alone[rows]])
-            assert np.array_equal(values[good], singles[good], equal_nan=True), (first, field)
+        singles = Contacts.of([answer[0] for answer, _ in alone[rows]])
+        for name, one, other in zip(FIELDS, *map(poses.fields, (many[good], singles[good]))):
+            assert np.array_equal(one, other, equal_nan=True), (first, name)
         first, count = first + count, count % (2 * native.lanes + 1) + 1
 
 

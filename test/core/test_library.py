@@ -25,11 +25,11 @@ import numpy as np
 import poses
 import pytest
 from patience import PATIENCE
-from poses import Pairs
+from poses import Pairs, fields
 
 from box_contact_ros import Body, ContactSolver, PatchForces
 from box_contact_ros.core import FORCE, instruction_sets, native
-from box_contact_ros.solver.contact import Contacts
+from box_contact_ros.solver.contact import FIELDS, Contacts
 from box_contact_ros.solver.pose import rotation_matrix
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -132,7 +132,8 @@ def by_ctypes(library: ctypes.CDLL, model: str, pairs: Pairs, threads: int = 1,
     rows = Rows(ctypes.sizeof(Rows), count, poses, *(at(part, c_double) for part in pairs), poses,
                 poses, None if places is None else at(places, c_int64))
     results = Results(ctypes.sizeof(Results), at(found.colliding, c_bool),
-                      *(at(field, c_double) for field in found[1:-1]), at(found.axis, c_int32))
+                      *(at(field, c_double) for field in fields(found)[1:-1]),
+                      at(found.axis, c_int32))
     query = Query.of(model=int(model == 'mlp'))
     assert library.bc_collide_rows(byref(rows), byref(query), byref(results), threads, None) == 0
     return found
@@ -151,14 +152,14 @@ def test_other_languages_get_the_bits_of_python(library: ctypes.CDLL, model: str
     assert 0.3 < wanted.colliding.mean() < 0.9
     for threads in (1, 3):
         found = by_ctypes(library, model, pairs, threads)
-        for field, one, other in zip(Contacts._fields, found, wanted):
+        for field, one, other in zip(FIELDS, *map(fields, (found, wanted))):
             assert np.array_equal(one, other, equal_nan=True), field
     n = len(pairs.pose_a)
     all_poses = Pairs(*2 * (np.concatenate(pairs[:2]),), *2 * (np.concatenate(pairs[2:]),))
     places = np.random.default_rng(8).permutation(np.column_stack([np.arange(n), n + np.arange(n)]))
     found = by_ctypes(library, model, all_poses, 2, places)
-    for field, one, other in zip(Contacts._fields, found, wanted):
-        assert np.array_equal(one, other[places[:, 0]], equal_nan=True), field
+    for field, one, other in zip(FIELDS, *map(fields, (found, wanted[places[:, 0]]))):
+        assert np.array_equal(one, other, equal_nan=True), field
 
 
 @pytest.mark.parametrize('source', ['force_test.c', 'force_test.cpp'])
@@ -399,8 +400,8 @@ def test_points_without_the_patch() -> None:
         sizes = {'size_a': pairs.size_a, 'size_b': pairs.size_b}
         whole = solver.batch(*pairs[:2], **sizes)
         point = solver.batch(*pairs[:2], **sizes, patch=False)
-        for one, other in zip(whole[:3], point):
-            assert np.array_equal(one, other, equal_nan=True)
+        for name in ('colliding', 'separation', 'normal'):
+            assert np.array_equal(getattr(whole, name), getattr(point, name), equal_nan=True)
         touching = whole.colliding
         size = np.maximum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
         depth = np.maximum(-whole.separation, 1e-9 * size)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from box_contact_ros import Contacts
+from box_contact_ros.solver.contact import FIELDS
 
 CONTAINER = (12.192, 2.438, 2.591)
 CUBE = (2.0, 2.0, 2.0)
@@ -30,10 +30,8 @@ class Pairs(NamedTuple):
 
 
 def fields(found):
-    """Return the fields of a Contact as a tuple, as Contacts has them; a tuple stays as it is."""
-    if isinstance(found, tuple):
-        return found
-    return tuple(getattr(found, name) for name in Contacts._fields)
+    """Return the fields of a Contact or of Contacts as a tuple."""
+    return tuple(getattr(found, name) for name in FIELDS)
 
 
 def joined(*parts: tuple[np.ndarray, ...]) -> Pairs:

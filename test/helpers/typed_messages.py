@@ -26,8 +26,7 @@ from box_contact_ros.node.messages import NANOSECONDS, UPPER, Refused, make_head
 from box_contact_ros.scene.pairing import StampedPose
 from box_contact_ros.scene.scene_solver import Pair
 from box_contact_ros.solver.checks import pose_fault
-from box_contact_ros.solver.contact import Contact, patch_area
-from box_contact_ros.solver.contact import Contacts as Rows
+from box_contact_ros.solver.contact import FIELDS, Contact, patch_area
 
 
 def pose_stamped(numbers: Iterable[float], frame_id: str, stamp: int) -> PoseStamped:
@@ -121,7 +120,7 @@ def contacts_at(stamp: int, touching: Mapping[Pair, Contact], stale: Sequence[st
 
 def changed(contact: Contact, **numbers: Any) -> Contact:
     """Return a contact with some other numbers."""
-    return Contact(**{name: getattr(contact, name) for name in Rows._fields} | numbers)
+    return Contact(**{name: getattr(contact, name) for name in FIELDS} | numbers)
 
 
 def _point(numbers: np.ndarray) -> Point:

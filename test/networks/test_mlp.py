@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,7 @@ from box_contact_ros.core import (
 )
 from box_contact_ros.networks.mlp import ACTIVATION, NETWORK, core_numbers, load_mlp
 from box_contact_ros.networks.weights_file import Network, WeightsError
-from box_contact_ros.solver.contact import Contacts
+from box_contact_ros.solver.contact import FIELDS, Contacts
 from box_contact_ros.solver.pose import rotation_matrix
 
 N = 4000
@@ -80,7 +81,7 @@ def with_numbers(pairs: Pairs, numbers: np.ndarray) -> Contacts:
 
 
 def assert_same_bits(one: Contacts, other: Contacts, where: object = None) -> None:
-    for name, mine, theirs in zip(Contacts._fields, one, other, strict=True):
+    for name, mine, theirs in zip(FIELDS, *map(poses.fields, (one, other)), strict=True):
         assert np.array_equal(mine, theirs, equal_nan=True), (name, where)
 
 
@@ -224,7 +225,7 @@ def test_rows_apart_or_refused_do_not_disturb_neighbours(mlp: ContactSolver) -> 
     mixed.size_a[2::4] = (1.0, 1e-3, 1.0)               # a card
     mixed.pose_b[3::8] = mixed.pose_a[3::8]             # one in the other
     found = mixed.contacts(mlp)
-    assert_same_bits(*(Contacts(*(field[::4] for field in each)) for each in (found, clean)))
+    assert_same_bits(found[::4], clean[::4])
     assert not found.colliding[1::4].any() and np.isnan(found.point[1::4]).all()
     for bad in ((np.nan, 0, 0, 0, 0, 0, 1), (0, 0, 0, 0, 0, 0, 0)):
         refused = Pairs(*(part.copy() for part in pairs))
@@ -255,8 +256,8 @@ def test_rigid_motion(mlp: ContactSolver, named_set: tuple[str, Pairs]) -> None:
     moved = pairs._replace(pose_a=poses.moved(pairs.pose_a, shift, turn),
                            pose_b=poses.moved(pairs.pose_b, shift, turn))
     found, axes = pairs.contacts(mlp), rotation_matrix(turn)
-    assert_close(moved.contacts(mlp), found._replace(
-        point=poses.rotate(turn, found.point) + shift,
+    assert_close(moved.contacts(mlp), replace(
+        found, point=poses.rotate(turn, found.point) + shift,
         covariance=axes @ found.covariance @ np.swapaxes(axes, 1, 2)), pairs)
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import copy
 import math
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -369,10 +370,10 @@ def test_a_kinematic_body_carries_along() -> None:
 
 def test_a_stale_pair_keeps_its_patch() -> None:
     world = World(pose(z=0.5)).run(100)
-    stale = world.contacts()._replace(separation=np.array([math.nan]))
+    stale = replace(world.contacts(), separation=np.array([math.nan]))
     world.forces.hold(world.pairs, stale, world.poses)
     assert world.wrenches()[1, 2] == pytest.approx(WEIGHT, rel=1e-3)
-    world.forces.hold(world.pairs[:0], Contacts(*(rows[:0] for rows in stale)), world.poses)
+    world.forces.hold(world.pairs[:0], stale[:0], world.poses)
     assert np.abs(world.wrenches()).max() < 1e-6 * WEIGHT
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import copy
 import math
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import poses
@@ -235,7 +236,7 @@ class Upwards:
     def solve(self, a, b, size_a, size_b, threads=1):
         exact = native.PairSolver('exact', poses.CUBE, poses.CUBE)
         contacts, refused = exact.solve(a, b, size_a, size_b, threads)
-        return contacts._replace(normal=np.tile([0.0, 0, 1], (len(a), 1))), refused
+        return replace(contacts, normal=np.tile([0.0, 0, 1], (len(a), 1))), refused
 
 
 def test_a_model_object_answers_a_scene():

@@ -14,7 +14,7 @@ import numpy as np
 import poses
 import pytest
 
-from box_contact_ros import Contact, ContactSolver
+from box_contact_ros import Contact, Contacts, ContactSolver
 from box_contact_ros.solver.contact import patch_area
 
 SOLVER = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
@@ -31,6 +31,46 @@ def test_result_is_plain():
     apart = SOLVER(poses.IDENTITY, [0, 0, 2.5, 0, 0, 0, 1])
     assert apart.colliding is False and apart.separation == 0.5
     assert np.isnan(apart.normal).all() and np.isnan(apart.point).all()
+
+
+def some_contacts(n=6):
+    """Every second pair touches, each at a place and a depth of its own."""
+    b = np.tile(ABOVE, (n, 1))
+    b[:, 0], b[::2, 2] = np.linspace(-1.0, 1.0, n), np.linspace(1.5, 2.0, len(b[::2]))
+    b[1::2, 2] = 3.0
+    return SOLVER.batch(np.tile(poses.IDENTITY, (n, 1)), b), b
+
+
+@pytest.mark.parametrize('rows', [
+    slice(1, None, 2), slice(3, 3), [4, 0, -1], np.array([], int), [True, False] * 3,
+    lambda many: many.colliding, lambda many: np.argsort(many.separation)])
+def test_contacts_are_a_sequence(rows):
+    """A list of contacts of single calls: its length, order, slices, and each field as an array."""
+    many, b = some_contacts()
+    singles = [SOLVER(poses.IDENTITY, pose) for pose in b]
+    assert len(many) == len(list(many)) == len(singles) == 6
+    for row in (0, 3, -1, np.int32(2)):
+        assert isinstance(many[row], Contact)
+        for mine, theirs in zip(poses.fields(many[row]), poses.fields(singles[row])):
+            assert np.array_equal(mine, theirs, equal_nan=True) and type(mine) is type(theirs)
+    for row in (6, -7):
+        with pytest.raises(IndexError):
+            many[row]
+    rows = rows(many) if callable(rows) else rows
+    chosen = many[rows]
+    assert type(chosen) is Contacts
+    for mine, theirs, every in zip(*map(poses.fields, (
+            chosen, Contacts.of(np.array(singles, object)[rows]), many))):
+        assert np.array_equal(mine, theirs, equal_nan=True) and mine.dtype == theirs.dtype
+        assert np.array_equal(mine, every[rows], equal_nan=True)
+
+
+def test_contacts_go_to_other_processes_and_keep_their_fields():
+    many, _ = some_contacts()
+    for mine, theirs in zip(*map(poses.fields, (many, pickle.loads(pickle.dumps(many))))):
+        assert np.array_equal(mine, theirs, equal_nan=True)
+    with pytest.raises(AttributeError):
+        many.point = many.normal
 
 
 def test_area_of_a_patch():

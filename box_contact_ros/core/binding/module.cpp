@@ -14,15 +14,6 @@ namespace {
 using namespace box_contact;
 using namespace box_contact::binding;
 
-PyObject* use_contacts(PyObject*, PyObject* type) {
-  if (!PyType_Check(type) ||
-      !PyType_IsSubtype(reinterpret_cast<PyTypeObject*>(type), &PyTuple_Type))
-    fail(PyExc_TypeError, "a named tuple type is needed");
-  Owned before(reinterpret_cast<PyObject*>(contacts_type));
-  contacts_type = reinterpret_cast<PyTypeObject*>(Py_NewRef(type));
-  Py_RETURN_NONE;
-}
-
 PyObject* instruction_sets(PyObject*, PyObject*) {
   const auto& kernels = detail::kernels();
   Owned names(made(PyTuple_New(Py_ssize_t(kernels.count))));
@@ -36,7 +27,7 @@ PyMethodDef module_methods[] = {
      "instruction_sets()\n--\n\n"
      "Return the instruction sets that were built and that this machine can run, best last."},
     {"use_contacts", method<use_contacts>(), METH_O,
-     "use_contacts(type)\n--\n\nSet the named tuple that batches return."},
+     "use_contacts(type)\n--\n\nSet the class of what batches return: with a slot for each field."},
     {"write_poses", method<write_poses>(), METH_FASTCALL,
      "write_poses(to, rows, poses)\n--\n\n"
      "Write a list of poses (7,), or None for NaN, to rows (n,) of an array (m, 7).\n\n"
@@ -72,7 +63,6 @@ PyModuleDef module_definition = {PyModuleDef_HEAD_INIT,
 PyObject* make_module() {
   import_array1(nullptr);
   kernel = detail::chosen_kernel();
-  contacts_type = reinterpret_cast<PyTypeObject*>(Py_NewRef(&PyTuple_Type));
   contact_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&contact_spec)));
   name_call_general = made(PyUnicode_InternFromString("_call_general"));
   name_batch_general = made(PyUnicode_InternFromString("_batch_general"));
