@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from box_contact_ros.core import FORCE
+from box_contact_ros.models import make_model
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
@@ -102,7 +103,8 @@ def packages_of(contestants: Sequence[Contestant]) -> list[str]:
 def ours(model: Any, *, weights: str | None = None, name: str = '') -> Contestant:
     """Return a model of this package, or an object with `solve` under a name of its own."""
     name = name or (model if isinstance(model, str) else type(model).__name__)
-    solver = partial(ContactSolver, model=model, weights=weights)
+    made = make_model(model, weights=weights) if isinstance(model, str) else model
+    solver = partial(ContactSolver, model=made)
 
     def solve(pairs: Pairs) -> Contacts:
         return pairs.contacts(solver(pairs.size_a[0], pairs.size_b[0]))

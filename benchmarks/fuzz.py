@@ -254,7 +254,7 @@ class RandomMlp:
         network = Network([(rng.uniform(-scale, scale, (units, inputs)),
                             rng.uniform(-scale, scale, units))
                            for inputs, units in pairwise(widths)])
-        self._solver = native.PairSolver('mlp', UNIT, UNIT, core_numbers(network))
+        self._solver = native.Mlp(core_numbers(network))
 
     def batch(self, pose_a: np.ndarray, pose_b: np.ndarray, *, size_a: np.ndarray,
               size_b: np.ndarray) -> Contacts:
@@ -352,7 +352,7 @@ def _piece(job: tuple[str, int, int, int, tuple[str, ...], bool]) -> list[Tally]
     """Draw and judge one piece of a class, for all models; the seed is the piece's own."""
     name, seed, number, count, models, random_weights = job
     own = seed, list(CLASSES).index(name), number
-    solvers: dict[str, Solver] = {model: ContactSolver(UNIT, UNIT, model=model) for model in models}
+    solvers: dict[str, Solver] = {model: ContactSolver(model=model) for model in models}
     if random_weights and 'mlp' in solvers:
         solvers['mlp'] = RandomMlp(*own)
     found = examine(draw(name, np.random.default_rng(own), count), name, solvers)

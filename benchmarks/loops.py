@@ -137,7 +137,7 @@ class Ours:
         self.scene, self.step_size, self.latency = scene, timing.step, timing.latency
         self.every = max(1, round(1.0 / (timing.rate_hz * timing.step)))
         self.late = round(timing.latency / timing.step)
-        self.solver = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
+        self.solver = ContactSolver()
         self.forces = PatchForces(
             [Body(mass=m, inertia=i, centre=c)
              for m, i, c in zip(boxes.mass, boxes.inertia, boxes.centre)])

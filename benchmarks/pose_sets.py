@@ -62,7 +62,7 @@ class Pairs(NamedTuple):
 
     def contacts(self, solver: ContactSolver | None = None) -> Contacts:
         """Return the contacts by a solver, without one the exact ones."""
-        solver = solver or ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
+        solver = solver or ContactSolver()
         return solver.batch(self.pose_a, self.pose_b, size_a=self.size_a, size_b=self.size_b)
 
 

@@ -65,7 +65,7 @@ def worst_of(solver: ContactSolver, quantity: str, pairs: Pairs, rng: np.random.
 
 def search(name: str, make: Generator, seed: Sequence[int], seconds: float) -> Searched:
     """Search a set, each quantity for that long."""
-    solver, rng = ContactSolver(UNIT, UNIT, model='mlp'), np.random.default_rng(seed)
+    solver, rng = ContactSolver(model='mlp'), np.random.default_rng(seed)
     pairs = make(rng, DRAWN)
     worst = {quantity: worst_of(solver, quantity, pairs, rng, seconds, name in FREE)
              for quantity in QUANTITIES}

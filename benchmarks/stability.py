@@ -132,7 +132,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
     rows = []
     for model in MODELS:
-        solver = ContactSolver((1, 1, 1), (1, 1, 1), model=model)
+        solver = ContactSolver(model=model)
         rows += [examine(model, family, cases[family], partial(Pairs.contacts, solver=solver))
                  for family in tqdm(families, desc=f'stability, {model}', unit='family')]
     about = output.machine(('numpy', 'python-fcl'))

@@ -69,7 +69,7 @@ def run(make: Callable[[], Scene], timing: Timing | None) -> Outcome:
     """Run a scene by ours at a timing, or by MuJoCo with a step of 1 ms."""
     scene = make()
     boxes, start = scene.boxes, scene.boxes.pose.copy()
-    solver = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
+    solver = ContactSolver()
     rest, deepest = math.nan, 0.0
     for loop in steps(scene, timing):
         if loop.tick % JUDGED:

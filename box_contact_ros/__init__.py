@@ -13,14 +13,16 @@ from .solver.contact import Contact, Contacts
 from .solver.contact_solver import ContactSolver
 
 if TYPE_CHECKING:
+    from .models import make_model
     from .scene.laws import Body, PatchForces
     from .scene.scene_file import read_scene
     from .scene.scene_solver import Box, Pair, Scene, SceneSolver
 
 __all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Pair', 'PatchForces', 'Scene',
-           'SceneSolver', 'read_scene']
+           'SceneSolver', 'make_model', 'read_scene']
 
 _LOADED_WHEN_USED = {
+    'models': ('make_model',),
     'scene.laws': ('Body', 'PatchForces'),
     'scene.scene_file': ('read_scene',),
     'scene.scene_solver': ('Box', 'Pair', 'Scene', 'SceneSolver'),

@@ -23,6 +23,7 @@ from benchmarks.paper.jobs import SHIPPED
 from benchmarks.pose_sets import LOADS, Generator, Pairs, drawn
 from benchmarks.pose_sets import SETS as POSE_SETS
 from benchmarks.weights import save_weights
+from box_contact_ros.models import make_model
 from box_contact_ros.networks.paper import (
     in_file_name,
     is_cube,
@@ -100,7 +101,7 @@ def train(folder: Path, scene: str, output: str, *, seed: int, commit: str,
     save_weights(path, layers, card)
     # What is measured is what was written.
     pairs = streams[-1].rows(slice(METRIC_PAIRS))
-    solver = ContactSolver(sizes[0], sizes[0], model='paper', weights=str(path))
+    solver = ContactSolver(sizes[0], sizes[0], model=make_model('paper', weights=path))
     errors = point_errors(pairs.contacts(solver).point, pairs.contacts().point, pairs.edge)
     card['metrics'] = dict(zip(('p50', 'p99'), percentiles(errors, 50, 99)))
     save_weights(path, layers, card)

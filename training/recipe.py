@@ -23,6 +23,7 @@ from benchmarks.pose_sets import SETS, Pairs
 from benchmarks.weights import save_weights
 from benchmarks.worst_case import climb, worst_start
 from box_contact_ros.core import FEATURES, NETWORK_FORMAT, OUTPUTS
+from box_contact_ros.models import make_model
 from box_contact_ros.networks.mlp import ACTIVATION, GROUP, NETWORK, core_numbers
 from box_contact_ros.networks.weights_file import Network
 from box_contact_ros.solver.contact_solver import ContactSolver
@@ -181,7 +182,7 @@ def error_summary(errors: np.ndarray) -> dict[str, float]:
 
 def measured(path: Path, seed: int, count: int) -> dict[str, Any]:
     """Return the errors of point, volume and covariance on each pose set."""
-    solver = ContactSolver((1, 1, 1), (1, 1, 1), model='mlp', weights=str(path))
+    solver = ContactSolver(model=make_model('mlp', weights=path))
     found: dict[str, Any] = {}
     for number, (name, make) in enumerate(SETS.items()):
         pairs = make(np.random.default_rng([seed, _METRICS, number]), count)

@@ -33,11 +33,11 @@ from pathlib import Path
 
 from ..core import native
 from ..extras import require
+from ..models import MODELS
 from ..node.parameters import outside_ros_args
 from ..node.processes import asked_to_end, keep_to_this_host, program, running
 from ..node.runtime import exit_on_refusal, running_node
 from ..solver.arguments import model_name, program_parser, within
-from ..solver.models import MODELS
 from .drive import NODES, BenchNode
 from .poses import swaying_containers
 from .report import comparison, draw, figures, table, void_reason

@@ -46,15 +46,27 @@ class Contact:
     @property
     def axis(self) -> int: ...
 
+class Exact:
+    def __init__(self) -> None: ...
+    def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+              threads: int = 1, patch: bool = True, pairs: np.ndarray | None = None,
+              margin: float = 0.0, /) -> tuple[Any, int]: ...  # Contacts
+    @property
+    def clipped(self) -> int: ...
+
+class Mlp:
+    def __init__(self, network: np.ndarray | None = None) -> None: ...
+    def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+              threads: int = 1, patch: bool = True, pairs: np.ndarray | None = None,
+              margin: float = 0.0, /) -> tuple[Any, int]: ...  # Contacts
+    @property
+    def clipped(self) -> int: ...
+
 class PairSolver:
-    def __init__(self, model: str | None, size_a: tuple[float, float, float],
-                 size_b: tuple[float, float, float], network: np.ndarray | None = None,
-                 margin: float = 0.0) -> None: ...
+    def __init__(self, model: Exact | Mlp | None, size_a: tuple[float, ...] | None = None,
+                 size_b: tuple[float, ...] | None = None, margin: float = 0.0) -> None: ...
     def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Any: ...
     def batch(self, *args: Any, **keywords: Any) -> Any: ...
-    def solve(self, poses_a: np.ndarray, poses_b: np.ndarray, sizes_a: np.ndarray,
-              sizes_b: np.ndarray, threads: int, patch: bool = True,
-              pairs: np.ndarray | None = None, /) -> tuple[Any, int]: ...  # Contacts
     @property
     def clipped(self) -> int: ...
 

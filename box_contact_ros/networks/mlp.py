@@ -3,13 +3,15 @@
 
 """Weights files of model `mlp`, whose algorithm is that of core/src/mlp/.
 
-The shipped weights are compiled into the core, so only the option `weights` reads a file.
+The shipped weights are compiled into the core: no file is read for them.
 """
 from __future__ import annotations
 
+import os
+
 import numpy as np
 
-from ..core import FEATURES, NETWORK_FORMAT, OUTPUTS, UNITS_MAX
+from ..core import FEATURES, NETWORK_FORMAT, OUTPUTS, UNITS_MAX, native
 from ..resources import resource_path
 from ..solver.checks import short_repr
 from .weights_file import Network, Weights, WeightsError, load_weights
@@ -37,7 +39,12 @@ def core_numbers(network: Network) -> np.ndarray:
     return np.concatenate([np.array(counts[:2], np.float32), *numbers])
 
 
-def load_mlp(path: str | None = None) -> Weights:
+def read_mlp(path: str | os.PathLike[str]) -> native.Mlp:
+    """Return model `mlp` with the weights of a file; raises `WeightsError`."""
+    return native.Mlp(core_numbers(load_mlp(path).networks[NETWORK]))
+
+
+def load_mlp(path: str | os.PathLike[str] | None = None) -> Weights:
     """Read the weights of an MLP, for None the shipped file's; raises `WeightsError`."""
     loaded = load_weights(path or resource_path('weights', 'mlp.safetensors'))
     file = f'weights file {short_repr(str(loaded.path))}'

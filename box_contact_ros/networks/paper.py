@@ -21,14 +21,15 @@ Weights are for cubes of any edge, or for the very size that they were trained f
 """
 from __future__ import annotations
 
-from typing import NamedTuple
+import os
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from ..core import native
 from ..resources import resource_path
 from ..solver.checks import as_size, short_repr
-from ..solver.contact import Contacts
+from ..solver.contact import Contact, Contacts
 from ..solver.pose import rotation_matrix
 from .weights_file import Network, Weights, WeightsError, load_weights
 
@@ -36,6 +37,8 @@ INPUTS, OUTPUTS, PLACE = 6, 4, 3
 """Of a network: t_x t_y t_z roll pitch yaw → azimuth, elevation of the point, of the normal. Or →
 x y z of the point, from the first box's centre [half of the longest edge]; the normal is then
 SAT's."""
+SHIPPED = ('paper', 'paper-12.192x2.438x2.591')
+"""Weights files, for cubes of any edge and for 40 ft containers."""
 SAME_SIZE = 1e-6
 """Relative difference of extents up to which two sizes are one, and a size that of the weights."""
 
@@ -130,7 +133,12 @@ class Paper:
             raise WeightsError(f'weights file {short_repr(str(weights.path))}: the sizes in its '
                                'card are no list of three extents') from error
         self._cubes = is_cube(self._size)
-        self._exact = native.PairSolver('exact', (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
+        self._exact = native.Exact()
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Self:
+        """Return the model with the weights of a file; raises `WeightsError`."""
+        return cls(load_weights(path))
 
     def answer(self, pairs: TouchingPairs) -> tuple[np.ndarray, np.ndarray]:
         """Return directions (n, 3) to the impact point and of the normal, first box's frame.
@@ -151,7 +159,7 @@ class Paper:
         """Return contacts for poses (n, 7), sizes (n or 1, 3), and the first refused row or −1."""
         exact, refused = self._exact.solve(a, b, size_a, size_b, threads, False)
         sizes_a, sizes_b = (np.broadcast_to(size, (len(a), 3)) for size in (size_a, size_b))
-        misfits = np.flatnonzero(~self._fits(sizes_a, sizes_b))
+        misfits = np.flatnonzero(~self.fits(sizes_a, sizes_b))
         if len(misfits) and (refused < 0 or misfits[0] < refused):
             refused = int(misfits[0])
         touching = exact.colliding
@@ -181,7 +189,7 @@ class Paper:
         from_a = np.where(pairs.first_is_b[:, None], -normal, normal)
         return first[:, :3] + turned(axes, point), turned(axes, from_a)
 
-    def _fits(self, size_a: np.ndarray, size_b: np.ndarray) -> np.ndarray:
+    def fits(self, size_a: np.ndarray, size_b: np.ndarray) -> np.ndarray:
         """Return which rows of full extents (n, 3) the weights are for, (n,)."""
         wanted = size_a[:, :1] if self._cubes else self._size
         return np.all((np.abs(size_a - size_b) <= SAME_SIZE * size_a)
@@ -189,12 +197,46 @@ class Paper:
 
     def size_fault(self, size_a: np.ndarray, size_b: np.ndarray) -> str | None:
         """Return why the weights are not for two full extents (3,) [m], or None."""
-        if self._fits(size_a[None], size_b[None])[0]:
+        if self.fits(size_a[None], size_b[None])[0]:
             return None
         known = 'cubes of one size' if self._cubes else f'boxes of {in_words(self._size)}'
         return (f'the weights {short_repr(self._file)} of model {self.name!r} are for two {known}, '
                 f'not for {in_words(size_a)} and {in_words(size_b)}; any sizes work with model '
                 "'exact'")
+
+
+class ShippedPaper:
+    """Model `paper` with the shipped weights: those for the sizes of each pair."""
+
+    def __init__(self) -> None:
+        self._papers = [Paper.read(resource_path('weights', f'{name}.safetensors'))
+                        for name in SHIPPED]
+
+    def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+              threads: int = 1) -> tuple[Contacts, int]:
+        """Return contacts for poses (n, 7), sizes (n or 1, 3), and the first refused row or −1."""
+        size_a, size_b = (np.broadcast_to(size, (len(a), 3)) for size in (size_a, size_b))
+        fits = np.array([paper.fits(size_a, size_b) for paper in self._papers])
+        which = fits.argmax(axis=0)  # 0, which refuses it, of a row that no weights are for
+        if not which.any():
+            return self._papers[0].solve(a, b, size_a, size_b, threads)
+        order = np.argsort(which, kind='stable')
+        found: list[Contact] = []
+        refusals = []
+        for number, paper in enumerate(self._papers):
+            rows = np.flatnonzero(which == number)
+            part, refused = paper.solve(a[rows], b[rows], size_a[rows], size_b[rows], threads)
+            found += part
+            refusals += [int(rows[refused])] if refused >= 0 else []
+        return Contacts.of(found)[np.argsort(order)], min(refusals, default=-1)
+
+    def size_fault(self, size_a: np.ndarray, size_b: np.ndarray) -> str | None:
+        """Return why no weights are for two full extents (3,) [m], or None."""
+        if any(paper.size_fault(size_a, size_b) is None for paper in self._papers):
+            return None
+        return (f"model 'paper' has no weights for boxes of {in_words(size_a)} and "
+                f'{in_words(size_b)}: train them and give make_model their file, or use model '
+                "'exact', which needs none")
 
 
 def touching_pairs(a: np.ndarray, b: np.ndarray, exact: Contacts,
@@ -228,19 +270,3 @@ def in_words(size: np.ndarray) -> str:
 def in_file_name(size: np.ndarray) -> str:
     """Return full extents (3,) as the names of weights files have them: nothing for cubes."""
     return '' if is_cube(size) else '-' + 'x'.join(f'{extent:g}' for extent in size)
-
-
-def paper(size: np.ndarray, path: str | None) -> Paper:
-    """Return model `paper` with the weights of a file.
-
-    path: None is the shipped file for full extents (3,) [m] of A. Raises `WeightsError` where there
-    is none.
-    """
-    if path is None:
-        try:
-            path = str(resource_path('weights', f'paper{in_file_name(size)}.safetensors'))
-        except FileNotFoundError as error:
-            raise WeightsError(
-                f"model 'paper' has no weights for boxes of size {in_words(size)}: train them, "
-                "name a file with `weights`, or use model 'exact', which needs none") from error
-    return Paper(load_weights(path))

@@ -14,6 +14,7 @@ The library safetensors is imported where a file is read, and nowhere else.
 from __future__ import annotations
 
 import json
+import os
 from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,7 +66,7 @@ class Weights:
         return network
 
 
-def load_weights(path: Path | str) -> Weights:
+def load_weights(path: str | os.PathLike[str]) -> Weights:
     """Read and check a weights file; raises `WeightsError` that says what is wrong with it."""
     from safetensors import SafetensorError
 

@@ -13,10 +13,10 @@ import numpy as np
 
 from box_contact_msgs.srv import Check
 
+from ..models import most_near
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import name_fault, nearest_name, pose_fault, short_repr, size_fault
 from ..solver.contact_solver import ContactSolver
-from ..solver.models import most_near
 from .messages import contact_message, frames_differ
 
 MOST_BOXES = 256
@@ -68,14 +68,17 @@ def pair_count(request: Check.Request) -> int:
 class Checker:
     """Answers requests with a model. It keeps nothing of a request."""
 
-    def __init__(self, solver: SceneSolver) -> None:
-        """Take the scene and the model; requests may name the scene's boxes without sizes."""
-        self.solver, self._scene, self._model = solver, solver.scene, solver.model
+    def __init__(self, solver: SceneSolver, model: str = 'exact') -> None:
+        """Take the scene and the model, by its name too.
+
+        Requests may name the scene's boxes without sizes.
+        """
+        self.solver, self._scene, self._model = solver, solver.scene, model
         self._fixed = {name: tuple(box.pose) for name, box in self._scene.boxes.items() if box.pose}
         self._labels = {(pair.a, pair.b): pair.label for pair in self._scene.pairs}
-        self._most_pairs = min(MOST_PAIRS, most_near(str(self._model)))
-        self._solver_for = functools.cache(lambda margin: ContactSolver(
-            (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), model=solver.model, margin=margin))
+        self._most_pairs = min(MOST_PAIRS, most_near(model))
+        self._solver_for = functools.cache(
+            lambda margin: ContactSolver(model=solver.model, margin=margin))
 
     def answer(self, request: Check.Request, response: Check.Response) -> Check.Response:
         """Fill in the response: contacts, or why there are none."""

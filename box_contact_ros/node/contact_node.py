@@ -34,11 +34,12 @@ from std_srvs.srv import Trigger
 from box_contact_msgs.srv import Check
 
 from ..core import LENGTH_MAX
+from ..models import MODELS, check_model, make_model, most_near
 from ..scene.pairing import PAIRINGS, RESETS
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import CONTAINER, Scene, SceneSolver, two_boxes
 from ..solver.checks import short_repr
-from ..solver.models import MODELS, NATIVE, check_model, most_near
+from ..solver.models import NATIVE
 from .check import Checker, Throttle, pair_count
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
 from .parameters import (
@@ -221,7 +222,8 @@ class ContactNode(GuardedNode, LifecycleNode):
     def _make_solver(self, values: Mapping[str, Any], scene: Scene) -> SceneSolver:
         """Return the solver that checked parameters ask for, or raise ValueError."""
         name = self.model_of(values)
-        return SceneSolver(scene, model=name, margin=values['margin'], most_near=most_near(name))
+        return SceneSolver(scene, model=make_model(name), margin=values['margin'],
+                           most_near=most_near(name))
 
     def _set_live(self, parameters: Sequence[Parameter]) -> SetParametersResult:
         """Take new values of LIVE, all or none; rclpy refuses those that are read-only."""
@@ -248,9 +250,10 @@ class ContactNode(GuardedNode, LifecycleNode):
         pairs, more = scene.pair_count, len(topics) - NAMED_TOPICS
         frame = f' in frame {short_repr(scene.frame_id)}' if scene.frame_id else ''
         self.get_logger().info(
-            f'ready: model {solver.model!r}, pairing {self._values["pairing"]!r}, {pairs} '
-            f'{"pair" if pairs == 1 else "pairs"}; poses{frame} from '
-            f'{", ".join(topics[:NAMED_TOPICS])}{f" and {more} more" if more > 0 else ""}')
+            f'ready: model {self.model_of(self._values)!r}, pairing '
+            f'{self._values["pairing"]!r}, {pairs} {"pair" if pairs == 1 else "pairs"}; '
+            f'poses{frame} from {", ".join(topics[:NAMED_TOPICS])}'
+            f'{f" and {more} more" if more > 0 else ""}')
 
     def _check(self, request: Check.Request, response: Check.Response) -> Check.Response:
         """Answer about the boxes of a request, on the node's model; ticks know nothing of it."""
@@ -259,7 +262,7 @@ class ContactNode(GuardedNode, LifecycleNode):
             return response
         solver = self._answerer.solver
         if self._checker is None or self._checker.solver is not solver:
-            self._checker = Checker(solver)
+            self._checker = Checker(solver, self.model_of(self._values))
         began, used, pairs = time.monotonic(), time.thread_time(), pair_count(request)
         if refusal := self._throttle.refusal(pairs, began):
             response.message = refusal
@@ -293,8 +296,9 @@ class ContactNode(GuardedNode, LifecycleNode):
         if self._answerer is None or self._topics is None:
             self._diagnostics.publish(state=state, values={'pairs': 0})
         else:
-            self._diagnostics.report(state, self._answerer.solver, self._answerer.pairing,
-                                     self._topics, self._answerer.take_lost())
+            self._diagnostics.report(
+                state, self._answerer.solver.scene, self.model_of(self._values),
+                self._answerer.pairing, self._topics, self._answerer.take_lost())
 
 
 def run(node_type: type[ContactNode], doc: str | None, args: Sequence[str] | None) -> int:

@@ -19,7 +19,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 from ..scene.pairing import OLD, OVERTAKEN, REPEATED, RESETS, TOO_LATE, Pairing, Rejection
-from ..scene.scene_solver import Pair, Scene, SceneSolver
+from ..scene.scene_solver import Pair, Scene
 from .messages import make_header
 from .topics import SceneTopics
 
@@ -171,13 +171,13 @@ class Diagnostics:
         self._reported: Counter[str] = Counter()
         self._logged: dict[str, float] = {}  # when a cause was logged [s]
 
-    def report(self, state: str, solver: SceneSolver, pairing: Pairing, topics: SceneTopics,
+    def report(self, state: str, scene: Scene, model: str, pairing: Pairing, topics: SceneTopics,
                lost: int) -> None:
         """Report on a node that is configured.
 
         state: that of the lifecycle. lost: poses that never came since the last report.
         """
-        logger, scene = self._node.get_logger(), solver.scene
+        logger = self._node.get_logger()
         rejections, pairing.rejections = pairing.rejections, {}
         for line in (*self._monitor.take_refusals(),
                      *(_rejection_line(*rejection) for rejection in rejections.items())):
@@ -198,7 +198,7 @@ class Diagnostics:
             findings += _lateness(load, sent, new[OVERTAKEN])
         self._log(findings)
         self.publish(findings, state=state, load=load, came=new['poses'] > 0, values={
-            'model': solver.model, 'pairs': scene.pair_count, 'stale boxes': ' '.join(stale),
+            'model': model, 'pairs': scene.pair_count, 'stale boxes': ' '.join(stale),
             'boxes that never came': ' '.join(unseen),
             'unanswered pairs': len(summary.unanswered), 'waiting ticks': pairing.waiting_ticks,
             'lost since the last report': load.lost,

@@ -31,7 +31,7 @@ from ..solver.checks import (
     size_fault,
 )
 from ..solver.contact import Contact, Contacts
-from ..solver.contact_solver import BY_PLACE, ContactSolver
+from ..solver.contact_solver import ContactSolver
 from ..solver.models import Model
 
 POSE_ARRAY = 'poses'
@@ -391,7 +391,7 @@ class SceneSolver:
     boxes: use one per thread.
     """
 
-    def __init__(self, scene: Scene, *, model: str | Model = 'exact', weights: str | None = None,
+    def __init__(self, scene: Scene, *, model: str | Model = 'exact',
                  margin: float = 0.0, most_near: int = sys.maxsize) -> None:
         """Begin without poses.
 
@@ -414,11 +414,8 @@ class SceneSolver:
         self._moving = np.array([scene.index_of[name] for name in scene.moving])
         self._broad_phase = native.BroadPhase(self._size, scene.is_fixed, margin, scene.rows,
                                               *scene.groups)
-        a, b = scene.rows[0] if scene.pairs else (0, 0)
-        self._solver = ContactSolver(self._size[a], self._size[b], model=model, weights=weights,
-                                     margin=margin)
-        self._again = partial(SceneSolver, model=model, weights=weights, margin=margin,
-                              most_near=most_near)
+        self._solver = ContactSolver(model=model, margin=margin)
+        self._again = partial(SceneSolver, model=model, margin=margin, most_near=most_near)
         self._warm_up()
 
     def __reduce__(self) -> tuple[Callable[..., SceneSolver], tuple[Scene]]:
@@ -459,8 +456,7 @@ class SceneSolver:
         if near > self._most_near:
             raise TooManyNear(f'more than {self._most_near} pairs are near each other, and so many '
                               'are not answered')
-        contacts = self._solver._solve(self._poses, self._poses, self._size, self._size,
-                                       BY_PLACE, places=pairs)
+        contacts = self._solver.batch(self._poses, sizes=self._size, pairs=pairs)
         if self.margin or False in contacts.colliding.tobytes():
             listed = contacts.separation <= self.margin if self.margin else contacts.colliding
             rows = np.flatnonzero(listed)

@@ -4,7 +4,6 @@
 """ContactSolver: SAT first, then the contact point by the chosen model."""
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import THREADS_MAX, native
-from ..networks.mlp import NETWORK, core_numbers, load_mlp
 from .checks import (
     as_floats,
     as_number,
@@ -25,12 +23,12 @@ from .checks import (
     size_fault,
 )
 from .contact import Contact, Contacts, without_patch
-from .models import NATIVE, Model, check_model, make_model
+from .models import NATIVE_TYPES, Model, as_model
 
 Names = tuple[str, str, str, str]  # of poses and sizes of A and B, in a refusal
 _SINGLE: Names = ('pose_a', 'pose_b', 'size_a', 'size_b')
 _MANY: Names = ('poses_a', 'poses_b', 'size_a', 'size_b')
-BY_PLACE: Names = ('poses', 'poses', 'sizes', 'sizes')
+_BY_PLACE: Names = ('poses', 'poses', 'sizes', 'sizes')
 
 
 class ContactSolver(native.PairSolver):
@@ -42,46 +40,33 @@ class ContactSolver(native.PairSolver):
     contacts = solver.batch(poses_a, poses_b)
     ```
 
-    Sizes are three full extents [m]; poses are `x y z qx qy qz qw` in a common frame. Raises
-    `ValueError`, with the field and the value, for anything that is not a size or a pose. A solver
-    may be called from several threads.
+    Sizes are three full extents [m]. Without them, each batch brings its own. Poses are
+    `x y z qx qy qz qw` in a common frame. Raises `ValueError`, with the field and the value, for
+    anything that is not a size or a pose. A solver may be called from several threads.
 
-    model: one of `models.MODELS`, or an object with `solve` as `models.Model` describes it.
-    weights: a file to use instead of the shipped weights, for `mlp` and `paper`.
+    model: 'exact', 'mlp', or an object with `solve` as `models.Model` describes it.
     margin: separation up to which pairs apart have a normal too [m]; infinity: all.
     """
 
-    def __init__(self, size_a: ArrayLike, size_b: ArrayLike, *, model: str | Model = 'exact',
-                 weights: str | None = None, margin: float = 0.0) -> None:
-        row_a, row_b = as_size(size_a, 'size_a'), as_size(size_b, 'size_b')
+    def __init__(self, size_a: ArrayLike | None = None, size_b: ArrayLike | None = None, *,
+                 model: str | Model = 'exact', margin: float = 0.0) -> None:
         margin = as_number(margin, 'margin')
         if not margin >= 0.0:
             raise ValueError(f'margin must be 0 or more, not {margin:g}')
-        if weights is not None and not isinstance(weights, (str, os.PathLike)):
-            raise ValueError(f'weights must be the path of a file, not {short_repr(weights)}')
-        self._model: Model | None = None  # what answers, where C++ does not
-        if not isinstance(model, (str, type)) and hasattr(model, 'solve'):
-            self._model = model
-        else:
-            check_model('model', model)
-            if model not in NATIVE:
-                self._model = make_model(str(model), row_a[0], weights)
-        if weights is not None and model not in ('mlp', 'paper'):
-            raise ValueError(f'weights have no effect on model {short_repr(model)}: leave them out')
-        if margin and self._model is not None:
+        self.model, self._model, self._margin = model, as_model(model), margin
+        self._native = self._model if isinstance(self._model, NATIVE_TYPES) else None
+        if margin and self._native is None:
             raise ValueError(f'margin {margin:g} has no effect on model {short_repr(model)}: leave '
                              'it at 0')
         self._size_fault = getattr(self._model, 'size_fault', lambda a, b: None)
-        if fault := self._size_fault(row_a[0], row_b[0]):
-            raise ValueError(fault)
-        network = None
-        if model == 'mlp' and weights is not None:
-            network = core_numbers(load_mlp(weights).networks[NETWORK])
+        self._size_a = None if size_a is None else as_size(size_a, 'size_a')
+        self._size_b = None if size_b is None else as_size(size_b, 'size_b')
+        if self._size_a is not None and self._size_b is not None:
+            if fault := self._size_fault(self._size_a[0], self._size_b[0]):
+                raise ValueError(fault)
         # Calls are answered in C++, which calls `_call_general` and `_batch_general` for the rest.
-        super().__init__(str(model) if self._model is None else None, tuple(row_a[0]),
-                         tuple(row_b[0]), network, margin)
-        self.model = model
-        self._size_a, self._size_b, self._weights, self._margin = row_a, row_b, weights, margin
+        a, b = (None if size is None else tuple(size[0]) for size in (self._size_a, self._size_b))
+        super().__init__(self._native, a, b, margin)
 
     if TYPE_CHECKING:  # the core, which does it, knows no type of ours
         def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact: ...  # noqa: D102
@@ -95,9 +80,8 @@ class ContactSolver(native.PairSolver):
 
     def __reduce__(self) -> tuple[Callable[..., ContactSolver], tuple[Any, ...]]:
         """Pickle the arguments."""
-        return (partial(ContactSolver, model=self.model, weights=self._weights,
-                        margin=self._margin),
-                (self._size_a[0], self._size_b[0]))
+        return (partial(ContactSolver, model=self.model, margin=self._margin),
+                tuple(None if size is None else size[0] for size in (self._size_a, self._size_b)))
 
     @property
     def fallbacks(self) -> int:
@@ -111,7 +95,8 @@ class ContactSolver(native.PairSolver):
         """
         a = as_floats(pose_a, 'pose_a', 'a pose (x y z qx qy qz qw)', (7,)).reshape(1, 7)
         b = as_floats(pose_b, 'pose_b', 'a pose (x y z qx qy qz qw)', (7,)).reshape(1, 7)
-        return self._solve(a, b, self._size_a, self._size_b, _SINGLE)[0]
+        return self._solve(a, b, _known(self._size_a, 'size_a'), _known(self._size_b, 'size_b'),
+                           _SINGLE)[0]
 
     def _batch_general(self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,
                        size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
@@ -130,9 +115,9 @@ class ContactSolver(native.PairSolver):
                                  'pairs=…) has neither poses_b nor size_a nor size_b')
             poses = as_floats(poses_a, 'poses', 'poses (m, 7) of rows x y z qx qy qz qw', (None, 7))
             rows_a = self._sizes(sizes, 'sizes', self._size_a, len(poses))
-            rows_b = self._size_b if sizes is None else rows_a
+            rows_b = self._sizes(sizes, 'sizes', self._size_b, len(poses))
             places = as_places(pairs, 'pairs', len(poses))
-            return self._solve(poses, poses, rows_a, rows_b, BY_PLACE, threads, patch, places)
+            return self._solve(poses, poses, rows_a, rows_b, _BY_PLACE, threads, patch, places)
         if sizes is not None or poses_b is None:
             raise ValueError('batch takes (poses_a, poses_b), or (poses, sizes=…, pairs=…)')
         a = as_floats(poses_a, 'poses_a', 'poses (n, 7) of rows x y z qx qy qz qw', (None, 7))
@@ -144,18 +129,20 @@ class ContactSolver(native.PairSolver):
                            patch)
 
     @staticmethod
-    def _sizes(size: ArrayLike | None, name: str, default: np.ndarray, count: int) -> np.ndarray:
+    def _sizes(size: ArrayLike | None, name: str, default: np.ndarray | None, count: int,
+               ) -> np.ndarray:
         """Return sizes (1, 3) or (count, 3)."""
         if size is None:
-            return default
+            return _known(default, name)
         array = as_floats(size, name, f'full extents (3,) or ({count}, 3)', (3,), (count, 3))
         return as_size(array, name) if array.ndim == 1 else array
 
     def _solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
                names: Names, threads: int = 1, patch: bool = True,
                places: np.ndarray | None = None) -> Contacts:
-        if self._model is None:
-            contacts, refused = self.solve(a, b, size_a, size_b, threads, bool(patch), places)
+        if self._native is not None:
+            contacts, refused = self._native.solve(a, b, size_a, size_b, threads, bool(patch),
+                                                   places, self._margin)
         else:
             if places is not None:
                 first, second = places.T
@@ -182,3 +169,10 @@ class ContactSolver(native.PairSolver):
                 return f'{name}[{row}] {fault}{order}' if numbered else f'{name} {fault}{order}'
         fault = self._size_fault(size_a[at[0] % len(size_a)], size_b[at[1] % len(size_b)])
         return fault or f'model {short_repr(self.model)} refuses row {at[0]}'
+
+
+def _known(size: np.ndarray | None, name: str) -> np.ndarray:
+    """Return the size (1, 3) of a solver; ValueError: it has none."""
+    if size is None:
+        raise ValueError(f'{name} is missing: give it to ContactSolver or to batch')
+    return size

@@ -123,8 +123,8 @@ class Soup:
     """
 
     def __init__(self, divisions: int) -> None:
-        self.fallbacks = 0
-        self._exact = native.PairSolver('exact', (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
+        self.divisions, self.fallbacks = divisions, 0
+        self._exact = native.Exact()
 
         # Each solver keeps objects of its own, one for A and one for B: placing moves them. Their
         # meshes are kept with them, as other solvers' may displace them in `mesh`.
@@ -133,6 +133,10 @@ class Soup:
             soup = mesh(size, divisions)
             return soup, fcl.CollisionObject(soup.model)
         self._made = made
+
+    def __reduce__(self) -> tuple[type[Soup], tuple[int]]:
+        """Pickle the divisions."""
+        return Soup, (self.divisions,)
 
     def place(self, a: np.ndarray, b: np.ndarray, size_a: Size, size_b: Size,
               ) -> tuple[fcl.CollisionObject, fcl.CollisionObject]:

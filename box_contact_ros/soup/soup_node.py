@@ -13,10 +13,10 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..models import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
 from ..node.contact_node import PARAMETERS as CONTACT_PARAMETERS
 from ..node.contact_node import ContactNode, run
 from ..node.parameters import Setting, whole_number
-from ..solver.models import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
 
 PARAMETERS = {
     'divisions': Setting(

@@ -14,22 +14,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from box_contact_ros import Contacts, ContactSolver
+from box_contact_ros import Contacts, ContactSolver, make_model
+from box_contact_ros.solver.contact import without_patch
 
 
 class Between:
     """The point is the middle between the centres of both boxes."""
 
     def __init__(self) -> None:
-        self.exact = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
+        self.exact = make_model('exact')
 
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
               threads: int = 1) -> tuple[Contacts, int]:
-        """Return the contacts of poses (n, 7) and sizes (n or 1, 3), and −1: no row is refused."""
-        sizes_a, sizes_b = (np.broadcast_to(size, (len(a), 3)) for size in (size_a, size_b))
-        found = self.exact.batch(a, b, size_a=sizes_a, size_b=sizes_b, threads=threads, patch=False)
+        """Return the contacts of poses (n, 7) and sizes (n or 1, 3), and the first refused row."""
+        found, refused = self.exact.solve(a, b, size_a, size_b, threads)
         middle = (a[:, :3] + b[:, :3]) / 2.0
-        return replace(found, point=np.where(found.colliding[:, None], middle, np.nan)), -1
+        point = np.where(found.colliding[:, None], middle, np.nan)
+        return replace(without_patch(found), point=point), refused
 
 
 if __name__ == '__main__':

@@ -91,7 +91,7 @@ def test_searched_for_the_worst(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     with (tmp_path / 'searched.csv').open() as file:
         worst = {row['quantity']: float(row['worst']) for row in csv.DictReader(file)}
     pairs = SETS['containers'](np.random.default_rng([3, 0]), 3_000)
-    found = pairs.contacts(ContactSolver((1, 1, 1), (1, 1, 1), model='mlp'))
+    found = pairs.contacts(ContactSolver(model='mlp'))
     errors = contact_errors(found, pairs.contacts(), pairs.edge)
     for quantity, value in worst.items():
         assert value >= 0.999 * getattr(errors, quantity).max()

@@ -24,7 +24,7 @@ def drawn(name, n=400):
 
 def answers(pairs, model='exact'):
     a, b, size_a, size_b = pairs
-    return ContactSolver((1, 1, 1), (1, 1, 1), model=model).batch(
+    return ContactSolver(model=model).batch(
         a, b, size_a=size_a, size_b=size_b)
 
 
@@ -68,7 +68,7 @@ def test_found_poses_have_no_variance_below_zero():
     size_a, size_b, pose_a, pose_b = (np.array(column) for column in zip(*FOUND))
     pairs = Pairs(pose_a, pose_b, size_a, size_b)
     for model in ('exact', 'mlp'):
-        found = pairs.contacts(ContactSolver((1, 1, 1), (1, 1, 1), model=model))
+        found = pairs.contacts(ContactSolver(model=model))
         assert found.colliding.all()
         assert not fuzz.patch_faults(pairs, found).any()
     assert not fuzz.mlp_faults(pairs, found).any()
@@ -160,7 +160,7 @@ def test_a_covariance_of_mlp_is_judged_to_rounding():
 def answered_by_mlp():
     """Pairs and sound contacts of `mlp`."""
     pairs = drawn('container')
-    found = pairs.contacts(ContactSolver((1, 1, 1), (1, 1, 1), model='mlp'))
+    found = pairs.contacts(ContactSolver(model='mlp'))
     assert found.colliding.sum() > 200 and not fuzz.mlp_faults(pairs, found).any()
     return pairs, found
 
@@ -194,7 +194,7 @@ def test_a_fault_is_printed_so_that_it_can_be_pasted(monkeypatch):
 
     class Wrong:
         def batch(self, *poses, **sizes):
-            found = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(*poses, **sizes)
+            found = ContactSolver().batch(*poses, **sizes)
             found.separation[found.colliding] *= 1.01
             return found
 

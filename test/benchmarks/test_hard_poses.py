@@ -28,7 +28,7 @@ STATED = 4.0
 
 
 def solve(model, pairs):
-    return ContactSolver((1, 1, 1), (1, 1, 1), model=model).batch(
+    return ContactSolver(model=model).batch(
         pairs.pose_a, pairs.pose_b, size_a=pairs.size_a, size_b=pairs.size_b)
 
 
@@ -292,7 +292,7 @@ def test_thin_plates_that_cross_have_a_point_in_both(pose_a, pose_b, size_a, siz
         assert found.colliding.all()
         assert not (judge.judge(*pairs, found).faults & judge.OUTSIDE).any()
     # Planes are certain of these overlaps. Clipping has to agree with them.
-    solver = ContactSolver((1, 1, 1), (1, 1, 1))
+    solver = ContactSolver()
     by_planes, (clipped, _, _) = pairs.contacts(solver).point, native.clipped(*pairs)
     assert solver.clipped == 0
     assert np.linalg.norm(by_planes - clipped) < 1e-4 * pairs.size

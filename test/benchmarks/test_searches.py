@@ -79,7 +79,7 @@ def test_a_climb_starts_from_the_worst() -> None:
 @pytest.mark.parametrize('name', ['random sizes', 'tilted stacks', 'containers', 'crossed bars'])
 def test_the_worst_of_mlp(name: str) -> None:
     """A short climb by the volume's error from each set: point 15 %, volume and covariance 60 %."""
-    solver = ContactSolver((1, 1, 1), (1, 1, 1), model='mlp')
+    solver = ContactSolver(model='mlp')
 
     def errors(pairs: Pairs) -> np.ndarray:
         with np.errstate(invalid='ignore'):  # NaN: apart
@@ -101,7 +101,7 @@ class Stepping:
     """Model `exact`, but that the point, volume or covariance steps where B's x passes a place."""
 
     def __init__(self, at: float, step: float, place: int) -> None:
-        self.solver = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
+        self.solver = ContactSolver()
         self.at, self.step, self.place = at, step, place
 
     def batch(self, pose_a, pose_b, *, size_a, size_b):

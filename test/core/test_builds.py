@@ -88,7 +88,7 @@ def test_another_build_has_the_same_bits(name: str, tmp_path: Path) -> None:
     assert 10.9 < bodies[-1, 2] + 0.5 < 11.0
     assert np.array_equal(lines[-len(bodies):], bodies)
     for model, rows in zip(('exact', 'mlp'), np.split(np.array(lines[:-len(bodies)]), 2)):
-        wanted = ContactSolver((1, 1, 1), (1, 1, 1), model=model).batch(
+        wanted = ContactSolver(model=model).batch(
             *pairs[:2], size_a=pairs.size_a, size_b=pairs.size_b)
         assert 0.3 < wanted.colliding.mean() < 0.95
         for column, field in zip((rows[:, 0], rows[:, 1], rows[:, 2:]), poses.fields(wanted)):

@@ -18,7 +18,7 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.core import DEPTH_FLOOR, native
 
 CHUNK = 500
-SOLVER = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
+SOLVER = ContactSolver()
 FAMILIES = {'random': poses.random_pairs, 'near-parallel': poses.near_parallel_pairs}
 THIN = {'ridges': poses.ridges, 'cards': poses.cards, 'flush': poses.flush_pairs,
         'sharing an axis': poses.sharing_an_axis, 'equal thickness': poses.equal_thickness}
@@ -106,7 +106,7 @@ def planes_against_clipping(pairs, least):
 
     Of pairs that touch, of which at least `least` are not clipped anyway.
     """
-    solver = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
+    solver = ContactSolver()
     found = solver.batch(*pairs[:2], size_a=pairs[2], size_b=pairs[3])
     rows = found.colliding
     assert rows.sum() - solver.clipped > least
@@ -221,7 +221,7 @@ def test_boxes_that_touch_in_a_point(kind, model):
     (a, b, size_a, size_b), wanted = kind(np.random.default_rng(17), 20_000)
     size = np.maximum(size_a, size_b).max(axis=1)
     for first, other in (((a, size_a), (b, size_b)), ((b, size_b), (a, size_a))):
-        found = ContactSolver((1, 1, 1), (1, 1, 1), model=model).batch(
+        found = ContactSolver(model=model).batch(
             first[0], other[0], size_a=first[1], size_b=other[1])
         touching = found.colliding  # rounding leaves a gap between some
         assert touching.mean() > 0.999

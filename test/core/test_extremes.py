@@ -31,9 +31,9 @@ def random_network(rng: np.random.Generator) -> np.ndarray:
     return np.concatenate([[first, second], numbers]).astype(np.float32)
 
 
-def solver(model: str, rng: np.random.Generator) -> native.PairSolver:
-    """Return a solver, of `mlp` with a random network."""
-    return native.PairSolver(model, UNIT, UNIT, random_network(rng) if model == 'mlp' else None)
+def solver(model: str, rng: np.random.Generator) -> native.Exact | native.Mlp:
+    """Return a model, `mlp` with a random network."""
+    return native.Mlp(random_network(rng)) if model == 'mlp' else native.Exact()
 
 
 def accepted(pairs: Pairs) -> np.ndarray:

@@ -14,7 +14,7 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.solver.contact import FIELDS
 
 N = 2000
-SOLVERS = {model: ContactSolver((1, 1, 1), (1, 1, 1), model=model) for model in ('exact', 'mlp')}
+SOLVERS = {model: ContactSolver(model=model) for model in ('exact', 'mlp')}
 SAME_NORMAL = 1e-6
 """Two faces tilted by θ tie when θ² is lost in rounding, so either may give the normal."""
 FAMILIES = {'random': poses.random_pairs, 'near-parallel': poses.near_parallel_pairs}

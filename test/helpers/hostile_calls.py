@@ -46,7 +46,7 @@ def rows(n: int = 4) -> np.ndarray:
 
 
 def exact() -> Any:
-    return native.PairSolver('exact', UNIT, UNIT)
+    return native.Exact()
 
 
 def forces(n: int = 2) -> Any:
@@ -141,9 +141,9 @@ def networks_that_no_file_has() -> None:
     for number in (np.nan, np.inf, -np.inf, 1e5):
         network = a_network()
         network[-1] = number
-        refused(ValueError, native.PairSolver, 'mlp', UNIT, UNIT, network)
+        refused(ValueError, native.Mlp, network)
     for count in (0, 2, 8):
-        refused(ValueError, native.PairSolver, 'mlp', UNIT, UNIT, np.zeros(count, np.float32))
+        refused(ValueError, native.Mlp, np.zeros(count, np.float32))
 
 
 def threads_that_are_none() -> None:
@@ -157,7 +157,7 @@ def extreme_numbers() -> None:
     """Rows of numbers at both ends of what is accepted, and beyond, alone and in batches."""
     rng = np.random.default_rng(29)
     for _ in range(100):
-        for solver in (exact(), native.PairSolver('mlp', UNIT, UNIT, a_network(rng))):
+        for solver in (exact(), native.Mlp(a_network(rng))):
             pairs = poses.extreme_pairs(rng, 200)
             solver.solve(*pairs, 2)
             for row in range(0, 200, 10):
@@ -253,12 +253,12 @@ def random_calls(seed: int, rounds: int) -> None:
     solver, public, one, law = exact(), ContactSolver(UNIT, UNIT), np.ones((1, 3)), forces()
     places, boxes = np.array([[0, 1], [2, 3]]), np.ones((4, 3))
     targets: list[tuple[Callable[..., Any], list[Any], dict[str, Any]]] = [
-        (native.PairSolver, ['mlp', UNIT, UNIT, a_network(), 0.1], {}),
-        (solver, [POSE, ABOVE], {}), (public, [POSE, ABOVE], {}),
-        (solver.batch, [rows(), rows()], {'size_a': boxes, 'threads': 2, 'patch': True}),
+        (native.PairSolver, [solver, UNIT, UNIT, 0.1], {}), (native.Mlp, [a_network()], {}),
+        (public, [POSE, ABOVE], {}),
+        (public.batch, [rows(), rows()], {'size_a': boxes, 'threads': 2, 'patch': True}),
         (public.batch, [rows(), rows()], {'size_b': boxes, 'threads': 2, 'patch': False}),
         (public.batch, [rows()], {'sizes': boxes, 'pairs': places}),
-        (solver.solve, [rows(), rows(), one, one, 2, True, places], {}),
+        (solver.solve, [rows(), rows(), one, one, 2, True, places, 0.1], {}),
         (native.Contact, [True, -1.0, np.ones(3), np.ones(3), 1.0, np.eye(3), 2], {}),
         (native.write_poses, [rows(), np.array([3, 0]), [POSE, None]], {}),
         (native.mlp_inputs, [rows(), rows(), one, one], {}),

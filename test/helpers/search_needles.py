@@ -32,7 +32,7 @@ ASPECTS = (300.0, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8)
 """Longest edge of a box by its shortest, at most."""
 DEPTHS = (0.01, np.inf)  # deeper than the shortest edge too: a needle through a box
 DRAWN, CLIMBING = 600, 45  # pairs, as those of benchmarks/searched.py
-SOLVER = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
+SOLVER = ContactSolver()
 
 
 def solved(pairs):

@@ -20,7 +20,7 @@ pytest.importorskip('benchmarks.pose_sets')
 from benchmarks.errors import contact_errors
 from benchmarks.pose_sets import LOADS, SETS, Pairs
 from benchmarks.steps import drawn_paths, largest_steps
-from box_contact_ros import ContactSolver
+from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.core import (
     FEATURES,
     NETWORK_FORMAT,
@@ -62,7 +62,7 @@ def drawn(name: str, n: int = N) -> Pairs:
 
 @pytest.fixture(scope='module')
 def mlp() -> ContactSolver:
-    return ContactSolver(UNIT, UNIT, model='mlp')
+    return ContactSolver(model='mlp')
 
 
 @pytest.fixture(params=FAMILIES)
@@ -77,7 +77,7 @@ def named_set(request: pytest.FixtureRequest) -> tuple[str, Pairs]:
 
 def with_numbers(pairs: Pairs, numbers: np.ndarray) -> Contacts:
     """Return the contacts by a network as the core reads it."""
-    return native.PairSolver('mlp', UNIT, UNIT, numbers).solve(*pairs, 1)[0]
+    return native.Mlp(numbers).solve(*pairs, 1)[0]
 
 
 def assert_same_bits(one: Contacts, other: Contacts, where: object = None) -> None:
@@ -314,7 +314,7 @@ def test_the_compiled_network_is_the_shipped_file() -> None:
     numbers = np.array([float(text) for text in re.findall(r'([-\d.e]+)F', body)], np.float32)
     assert np.array_equal(numbers, SHIPPED)
     pairs = drawn('crossed bars', 200)
-    assert_same_bits(pairs.contacts(ContactSolver(UNIT, UNIT, model='mlp')),
+    assert_same_bits(pairs.contacts(ContactSolver(model='mlp')),
                      with_numbers(pairs, SHIPPED))
 
 
@@ -331,8 +331,8 @@ def written(path: Path, widths: tuple[int, ...] = (FEATURES, 4, 4, OUTPUTS), nam
 
 def test_a_network_of_zeros_is_the_body_of_the_chords(tmp_path: Path) -> None:
     pairs = drawn('crossed bars')
-    found = pairs.contacts(ContactSolver(UNIT, UNIT, model='mlp',
-                                         weights=written(tmp_path / 'zeros')))
+    found = pairs.contacts(ContactSolver(
+        model=make_model('mlp', weights=written(tmp_path / 'zeros'))))
     rows = found.colliding
     axes, middle, half, _, volume, mean, _ = native.mlp_inputs(*pairs.rows(rows))
     np.testing.assert_allclose(found.volume[rows], volume * np.prod(2.0 * half, axis=1), rtol=1e-6)
@@ -345,7 +345,7 @@ def test_layers_that_the_core_does_not_have_are_refused(tmp_path: Path, hidden: 
     """None, one or three hidden layers, or too many units."""
     weights = written(tmp_path / 'other', (FEATURES, *hidden, OUTPUTS))
     with pytest.raises(WeightsError, match=f'two hidden layers, of at most {UNITS_MAX} units'):
-        ContactSolver(UNIT, UNIT, model='mlp', weights=weights)
+        make_model('mlp', weights=weights)
 
 
 @pytest.mark.parametrize('change, words', [
@@ -361,11 +361,11 @@ def test_weights_with_another_meaning_are_refused(
         tmp_path: Path, change: dict[str, Any], words: str) -> None:
     """They would be taken without complaint, and answer nonsense."""
     with pytest.raises(WeightsError, match=words):
-        ContactSolver(UNIT, UNIT, model='mlp', weights=written(tmp_path / 'other', **change))
+        make_model('mlp', weights=written(tmp_path / 'other', **change))
 
 
 @pytest.mark.parametrize('numbers', [SHIPPED[:-1], SHIPPED[2:], np.zeros(1, np.float32),
                                      np.r_[np.float32(9), SHIPPED[1:]]])
 def test_numbers_that_are_no_network_are_refused(numbers: np.ndarray) -> None:
-    with pytest.raises(ValueError, match='the network fits'):
-        native.PairSolver('mlp', UNIT, UNIT, numbers)
+    with pytest.raises(ValueError, match='the network does not fit'):
+        native.Mlp(numbers)

@@ -8,7 +8,7 @@ import numpy as np
 import poses
 import pytest
 
-from box_contact_ros import ContactSolver
+from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.networks.weights_file import WeightsError
 from box_contact_ros.resources import resource_path
 
@@ -19,7 +19,8 @@ MODELS = {'cubes': poses.CUBE, 'containers': poses.CONTAINER}
 
 def make(name):
     size = MODELS[name]
-    return ContactSolver(size, size, model='paper'), ContactSolver(size, size, model='exact'), size
+    paper = ContactSolver(size, size, model=make_model('paper'))
+    return paper, ContactSolver(size, size), size
 
 
 def touching(size, n=4000, depth=0.0, seed=9):
@@ -122,7 +123,7 @@ def test_cubes_of_any_edge():
     solver, _, size = make('cubes')
     a, b = touching(np.array(size), n=200, depth=0.05)
     for factor in (2.0**-6, 2.0**6):
-        other = ContactSolver([EDGE * factor] * 3, [EDGE * factor] * 3, model='paper')
+        other = ContactSolver([EDGE * factor] * 3, [EDGE * factor] * 3, model=make_model('paper'))
         scaling = np.array([factor] * 3 + [1] * 4)
         one, two = solver.batch(a, b), other.batch(a * scaling, b * scaling)
         assert np.array_equal(one.point * factor, two.point)
@@ -145,19 +146,19 @@ def test_sizes_and_places_of_rows(name):
 
 
 @pytest.mark.parametrize('sizes, words', [
-    (((2, 2, 2), (3, 3, 3)), 'for two cubes of one size, not for 2 × 2 × 2 m and 3 × 3 × 3 m'),
-    (((1, 2, 3), (1, 2, 3)), "no weights for boxes of size 1 × 2 × 3 m.*model 'exact'")])
+    (((2, 2, 2), (3, 3, 3)), 'no weights for boxes of 2 × 2 × 2 m and 3 × 3 × 3 m'),
+    (((1, 2, 3), (1, 2, 3)), "no weights for boxes of 1 × 2 × 3 m and .*model 'exact'")])
 def test_other_sizes_are_refused(sizes, words):
     with pytest.raises(ValueError, match=words):
-        ContactSolver(*sizes, model='paper')
+        ContactSolver(*sizes, model=make_model('paper'))
 
 
 def test_other_sizes_in_a_batch_are_refused():
     """The first row that is refused is named, whether for its pose or for its size."""
-    solver = ContactSolver(poses.CUBE, poses.CUBE, model='paper')
+    solver = ContactSolver(poses.CUBE, poses.CUBE, model=make_model('paper'))
     two = np.tile(poses.IDENTITY, (2, 1))
-    for sizes, words in ((([2, 2, 2], [2, 2, 3]), 'for two cubes of one size, not for'),
-                         (([1, 2, 3], [1, 2, 3]), 'not for 1 × 2 × 3 m and 1 × 2 × 3 m')):
+    for sizes, words in ((([2, 2, 2], [2, 2, 3]), 'for boxes of 2 × 2 × 2 m and 2 × 2 × 3 m'),
+                         (([1, 2, 3], [1, 2, 3]), 'for boxes of 1 × 2 × 3 m and 1 × 2 × 3 m')):
         with pytest.raises(ValueError, match=words):
             solver.batch(two, two, size_a=sizes[0], size_b=sizes[1])
     rows = np.array([[2.0, 2, 2], [2, 2, 3]])
@@ -170,6 +171,6 @@ def test_other_sizes_in_a_batch_are_refused():
 def test_weights_for_something_else_are_refused():
     cubes = str(resource_path('weights', 'paper.safetensors'))
     with pytest.raises(ValueError, match='are for two cubes of one size'):
-        ContactSolver(poses.CONTAINER, poses.CONTAINER, model='paper', weights=cubes)
+        ContactSolver(poses.CONTAINER, poses.CONTAINER, model=make_model('paper', weights=cubes))
     with pytest.raises(WeightsError, match='does not exist'):
-        ContactSolver(poses.CUBE, poses.CUBE, model='paper', weights='nowhere.safetensors')
+        make_model('paper', weights='nowhere.safetensors')

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from safetensors.numpy import load, load_file, save_file
 
-from box_contact_ros import ContactSolver
+from box_contact_ros import make_model
 from box_contact_ros.networks.weights_file import WeightsError, load_weights
 from box_contact_ros.resources import resource_path
 
@@ -104,7 +104,7 @@ def test_sizes_that_are_none(tmp_path: Path, sizes: object) -> None:
     card = {**load_weights(shipped).card, 'sizes': sizes}
     save_file(load_file(shipped), tmp_path / 'x', metadata={'card': json.dumps(card)})
     with pytest.raises(WeightsError, match='no list of three extents'):
-        ContactSolver((2, 2, 2), (2, 2, 2), model='paper', weights=str(tmp_path / 'x'))
+        make_model('paper', weights=tmp_path / 'x')
 
 
 @pytest.mark.parametrize('text', [None, '', '{', '3', '"name"', '[]',

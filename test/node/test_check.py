@@ -19,7 +19,7 @@ from std_srvs.srv import Trigger
 from typed_messages import a_box, a_pair
 
 from box_contact_msgs.srv import Check
-from box_contact_ros import ContactSolver, SceneSolver
+from box_contact_ros import ContactSolver, SceneSolver, make_model
 from box_contact_ros.node.check import MOST_BOXES, MOST_PAIRS, Checker, Throttle
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import contacts_by_pair
@@ -162,7 +162,7 @@ def test_costly_requests_pause_for_ticks() -> None:
 def test_a_soup_answers_few_pairs() -> None:
     """Its pairs take up to a third of a second; and it knows no axis of those apart."""
     pytest.importorskip('fcl')
-    checker = Checker(SceneSolver(SCENE, model='soup-2'))
+    checker = Checker(SceneSolver(SCENE, model=make_model('soup-2')), 'soup-2')
     boxes = [a_box(f'{i}', ORIGIN, CUBE) for i in range(13)]
     assert 'at most 64' in asked(checker, *boxes).message
     apart = (a_box('load', APART), a_box('stack', ORIGIN))

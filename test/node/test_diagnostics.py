@@ -33,7 +33,7 @@ def node(monkeypatch):
 
     def report(seconds):
         clock[0] += seconds
-        reporter.report(ACTIVE, SOLVER, pairing, Mock(), 0)
+        reporter.report(ACTIVE, SOLVER.scene, 'exact', pairing, Mock(), 0)
         return node.create_publisher().publish.call_args.args[0].status[0].message
     return counts, report
 

@@ -45,11 +45,11 @@ sys.meta_path.insert(0, Refusing())
 exec(PROGRAM)
 """
 SOLVER = """
-from box_contact_ros import ContactSolver
+from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.scene.scene_solver import SceneSolver
 from box_contact_ros.scene.scene_file import read_scene
 for model in ('exact', 'mlp', 'paper'):
-    ContactSolver((2, 2, 2), (2, 2, 2), model=model)([0] * 6 + [1], [0] * 6 + [1])
+    ContactSolver((2, 2, 2), (2, 2, 2), model=make_model(model))([0] * 6 + [1], [0] * 6 + [1])
 SceneSolver(read_scene('config/scenes/yard_bay.yaml'))
 """
 NODE = """

@@ -37,6 +37,7 @@ from box_contact_msgs.msg import Box
 from box_contact_msgs.srv import Check
 from box_contact_ros import PatchForces
 from box_contact_ros.core import DEPTH_FLOOR
+from box_contact_ros.models import most_near
 from box_contact_ros.networks.mlp import NETWORK, load_mlp
 from box_contact_ros.node import check, diagnostics, topics
 from box_contact_ros.node.check import Checker
@@ -44,7 +45,6 @@ from box_contact_ros.node.contact_node import PARAMETERS
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene import pairing, scene_file
 from box_contact_ros.scene.scene_solver import SceneSolver, two_boxes
-from box_contact_ros.solver.models import most_near
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [*sorted(ROOT.glob('*.md'), key=lambda page: page.name != 'README.md'),

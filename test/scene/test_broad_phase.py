@@ -157,7 +157,7 @@ def test_no_touching_pair_is_left_out():
     touching = barely = 0
     for size, pose in cases:
         n = size.shape[1]
-        found = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(
+        found = ContactSolver().batch(
             *np.ascontiguousarray(pose), size_a=size[0].copy(), size_b=size[1].copy())
         listed = np.stack((np.arange(n), np.arange(n, 2 * n)), axis=1)
         pairs, _, refused = broad_phase(
@@ -175,7 +175,7 @@ def test_a_margin_loses_no_pair_within_it():
     for margin in (0.1, 0.5, 1.0):
         size, pose = made(rng, scattered, 60)
         every = np.argwhere(np.triu(np.ones((60, 60)), 1))
-        apart = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(
+        apart = ContactSolver().batch(
             pose, sizes=size, pairs=every).separation
         pairs, *_ = broad_phase(size, margin=margin).find(pose, PLENTY)
         wanted = set(map(tuple, every[apart <= margin].tolist()))
@@ -227,7 +227,7 @@ def test_the_pairs_of_a_scene(patterns, listed):
     rows = pose[[index[name] for name in scene.moving]]
     rows[7] = np.nan
     answer = SceneSolver(scene, model='exact')(rows)
-    single = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
+    single = ContactSolver()
     present = [pair for pair in scene.every_pair() if gone not in pair]
     places = np.array([(index[pair.a], index[pair.b]) for pair in present])
     contacts = single.batch(pose, sizes=size, pairs=places)

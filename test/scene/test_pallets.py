@@ -62,7 +62,7 @@ def test_contacts_of_shaken_pallets_are_those_of_every_pair(pallets, solver):
     for _ in range(3):
         pose = pallets.shaken(rng)
         answer = solver(pose[~pallets.fixed])
-        wanted = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(
+        wanted = ContactSolver().batch(
             pose, sizes=pallets.size, pairs=pairs)
         hit = np.flatnonzero(wanted.colliding)
         assert np.array_equal(answer.pairs, pairs[hit]) and 4000 < len(hit) < 5000

@@ -13,7 +13,7 @@ import numpy as np
 import poses
 import pytest
 
-from box_contact_ros import ContactSolver
+from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.core import native
 from box_contact_ros.scene.scene_solver import (
     EVERY_PAIR,
@@ -234,7 +234,7 @@ class Upwards:
     """A model of a user's own: the answers of exact, every normal upwards."""
 
     def solve(self, a, b, size_a, size_b, threads=1):
-        exact = native.PairSolver('exact', poses.CUBE, poses.CUBE)
+        exact = native.Exact()
         contacts, refused = exact.solve(a, b, size_a, size_b, threads)
         return replace(contacts, normal=np.tile([0.0, 0, 1], (len(a), 1))), refused
 
@@ -258,7 +258,7 @@ def test_models_that_do_not_know_a_size_refuse_the_scene():
     with pytest.raises(ValueError, match='model'):
         SceneSolver(yard(1, 2, 2), model='nothing')
     with pytest.raises(ValueError, match="use model 'exact'"):
-        SceneSolver(two_boxes((1, 2, 3), (1, 2, 3)), model='paper')
+        SceneSolver(two_boxes((1, 2, 3), (1, 2, 3)), model=make_model('paper'))
 
 
 @pytest.mark.parametrize('pairs, words', [

@@ -52,7 +52,7 @@ class Series(NamedTuple):
 
 
 def solve(model: str, pairs: Pairs) -> Contacts:
-    return ContactSolver(UNIT, UNIT, model=model).batch(
+    return ContactSolver(model=model).batch(
         pairs.pose_a, pairs.pose_b, size_a=pairs.size_a, size_b=pairs.size_b)
 
 

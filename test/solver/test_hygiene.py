@@ -17,7 +17,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from box_contact_ros import ContactSolver
+from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.core import LENGTH_MAX, LENGTH_MIN, QUATERNION_MAX, QUATERNION_MIN
 from box_contact_ros.solver.checks import absent_poses, are_poses, pose_fault, size_fault
 
@@ -306,7 +306,7 @@ def test_what_is_no_pose(model, strange):
                        (lambda: solver.batch(strange, [ABOVE]), 'poses_a'),
                        (lambda: solver.batch([ABOVE], [strange]), 'poses_b'),
                        (lambda: solver.batch([ABOVE], [ABOVE], size_b=[strange]), 'size_b'),
-                       (lambda: ContactSolver(strange, poses.CUBE, model=model), 'size_a')):
+                       (lambda: ContactSolver([strange], poses.CUBE, model=model), 'size_a')):
         with pytest.raises(ValueError) as refusal:
             ask()
         text = str(refusal.value)
@@ -342,6 +342,6 @@ def test_weights_that_are_no_file(tmp_path):
     """A folder, a device, a name too long."""
     for path in (tmp_path, '/dev/null', 'x' * 5000, 'a\0b', tmp_path / 'nothing'):
         with pytest.raises(ValueError, match='weights file .* (cannot be read|does not exist)'):
-            ContactSolver(poses.CUBE, poses.CUBE, model='mlp', weights=str(path))
+            make_model('mlp', weights=str(path))
     with pytest.raises(ValueError, match="^weights have no effect on model 'exact'"):
-        ContactSolver(poses.CUBE, poses.CUBE, weights='mlp.safetensors')
+        make_model('exact', weights='mlp.safetensors')

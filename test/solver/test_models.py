@@ -19,8 +19,9 @@ import yaml
 import box_contact_ros
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import native
+from box_contact_ros.models import MODELS, check_model, make_model, most_near
 from box_contact_ros.solver.arguments import model_name
-from box_contact_ros.solver.models import MODELS, NATIVE, check_model, most_near
+from box_contact_ros.solver.models import NATIVE
 
 ROOT = Path(__file__).resolve().parents[2]
 HIGHER = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
@@ -31,21 +32,17 @@ def python(code):
                           cwd=Path(box_contact_ros.__file__).parents[1])
 
 
-class Lifted(native.PairSolver):
+class Lifted:
     """The exact point, moved up by some millimetres: a model of this test's own."""
 
     def __init__(self, millimetres):
-        super().__init__('exact', poses.CUBE, poses.CUBE)
-        self.lift = 1e-3 * millimetres
-
-    def __reduce__(self):
-        return Lifted, (1e3 * self.lift,)
+        self.exact, self.lift = native.Exact(), 1e-3 * millimetres
 
     def size_fault(self, size_a, size_b):
         return None if max(size_a) < 9.0 else 'box A is too large'
 
     def solve(self, a, b, size_a, size_b, threads=1):
-        found, refused = super().solve(a, b, size_a, size_b, threads)
+        found, refused = self.exact.solve(a, b, size_a, size_b, threads)
         found.point[found.colliding, 2] += self.lift
         return found, refused
 
@@ -72,11 +69,44 @@ def test_an_object_refuses_poses_and_sizes():
         ContactSolver(poses.CUBE, poses.CUBE, model=Lifted(1), margin=0.1)
 
 
-@pytest.mark.parametrize('model', [None, 3, Lifted, object()])
-def test_what_is_no_model(model):
+@pytest.mark.parametrize('model, words', [
+    *((model, 'and no object with the method solve') for model in (None, 3, Lifted, object())),
+    ('paper', 'make_model makes others'), ('exakt', 'did you mean exact')])
+def test_what_is_no_model(model, words):
     """Neither is a class, which is not yet made."""
-    with pytest.raises(ValueError, match='^model .* is not one of: exact, mlp, paper, soup-N'):
-        ContactSolver(poses.CUBE, poses.CUBE, model=model)
+    with pytest.raises(ValueError, match=f'^model .* is not one of: exact, mlp.*{words}'):
+        ContactSolver(model=model)
+
+
+@pytest.mark.parametrize('name', ['exact', 'mlp', 'paper', 'soup-2'])
+def test_a_model_answers_for_the_sizes_of_its_call(name):
+    """A solver without sizes is every solver with sizes, and a pickled model answers as before."""
+    if name == 'soup-2':
+        pytest.importorskip('fcl')
+    model = make_model(name)
+    pair = np.stack([poses.IDENTITY, HIGHER])
+    sizes = [poses.CUBE, poses.CONTAINER] if name == 'paper' else [poses.CUBE, (3, 2, 2)]
+    size = np.repeat(sizes, 2, axis=0)
+    many = ContactSolver(model=model).batch(
+        np.tile(pair, (2, 1)), sizes=size, pairs=[[2, 3], [0, 1], [3, 2]])
+    model = pickle.loads(pickle.dumps(model))
+    for row, (a, b) in zip(many, ((2, 3), (0, 1), (3, 2))):
+        one = ContactSolver(size[a], size[b], model=model)(pair[a % 2], pair[b % 2])
+        for mine, theirs in zip(*map(poses.fields, (row, one))):
+            assert np.array_equal(mine, theirs, equal_nan=True)
+    assert many.colliding.all()
+
+
+def test_a_size_that_nobody_gave():
+    with pytest.raises(ValueError, match='^size_a is missing: give it to ContactSolver'):
+        ContactSolver()(poses.IDENTITY, HIGHER)
+    with pytest.raises(ValueError, match='^size_b is missing: .* or to batch'):
+        ContactSolver(poses.CUBE).batch([poses.IDENTITY], [HIGHER])
+    with pytest.raises(ValueError, match='^sizes is missing'):
+        ContactSolver().batch(np.stack([poses.IDENTITY, HIGHER]), pairs=np.array([[0, 1]]))
+    with pytest.raises(ValueError, match=r'^pairs\[0\] is \(0, 2\), but there are 2 poses'):
+        ContactSolver(poses.CUBE, poses.CUBE).batch(
+            np.stack([poses.IDENTITY, HIGHER]), pairs=np.array([[0, 2]]))
 
 
 def test_programs_take_names_of_models():
@@ -101,8 +131,8 @@ def test_wrong_names(name, words):
 
 def test_a_missing_library_is_named_with_its_extra():
     code = ('import sys; sys.modules["fcl"] = None\n'
-            'from box_contact_ros import ContactSolver\n'
-            'ContactSolver((1, 1, 1), (1, 1, 1), model="soup-8")')
+            'from box_contact_ros import make_model\n'
+            'make_model("soup-8")')
     done = python(code)
     assert re.fullmatch(r"box_contact_ros: the Python module 'fcl' is not installed: .*"
                         r"pip install -c constraints\.txt -e '\.\[soup\]'\n", done.stderr)
@@ -130,7 +160,7 @@ def test_the_default_reads_no_file_and_imports_no_other_model():
     code = ('import sys, builtins, pathlib\n'
             'from box_contact_ros import ContactSolver\n'
             'pathlib.Path.open = builtins.open = None\n'
-            'ContactSolver((1, 1, 1), (1, 1, 1), model="mlp")\n'
+            'ContactSolver(model="mlp")\n'
             'print({"fcl", "safetensors", "box_contact_ros.networks.paper"} & {*sys.modules})')
     done = python(code)
     assert done.stdout == 'set()\n', done.stderr

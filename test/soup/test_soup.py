@@ -12,7 +12,7 @@ import pytest
 
 pytest.importorskip('fcl')
 
-from box_contact_ros import ContactSolver
+from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.soup import soup
 
 IDENTITY = poses.IDENTITY
@@ -21,7 +21,7 @@ ORIENTATION = np.array([0.2, -0.35, 0.1, 0.9])  # no axis of B is near one of A
 
 
 def cubes(divisions):
-    return ContactSolver(poses.CUBE, poses.CUBE, model=f'soup-{divisions}')
+    return ContactSolver(poses.CUBE, poses.CUBE, model=make_model(f'soup-{divisions}'))
 
 
 def corner_on_top(depth, x=0.31, y=-0.17):
@@ -124,7 +124,7 @@ def test_a_box_inside_another_is_counted_and_answered():
     """Surfaces that do not meet: SAT's normal and the exact point, never NaN."""
     sizes = (poses.CUBE, (0.5, 0.5, 0.5))
     inside = np.array([0.2, 0.1, 0.5, 0, 0, 0, 1])
-    model, exact = (ContactSolver(*sizes, model=name) for name in ('soup-8', 'exact'))
+    model, exact = (ContactSolver(*sizes, model=make_model(name)) for name in ('soup-8', 'exact'))
     found, wanted = model(IDENTITY, inside), exact(IDENTITY, inside)
     assert found.colliding and model.fallbacks == 1
     assert np.array_equal(found.point, wanted.point)
@@ -149,7 +149,7 @@ def test_batch_is_row_by_row_with_sizes_of_their_own():
     many = cubes(4).batch(a, b, size_a=size_a, size_b=size_b)
     assert 10 < many.colliding.sum() < 40
     for row in range(len(a)):
-        one = ContactSolver(size_a[row], size_b[row], model='soup-4')(a[row], b[row])
+        one = ContactSolver(size_a[row], size_b[row], model=make_model('soup-4'))(a[row], b[row])
         assert one.colliding == many.colliding[row]
         assert np.array_equal(one.point, many.point[row], equal_nan=True)
         assert np.array_equal(one.normal, many.normal[row], equal_nan=True)

@@ -18,7 +18,7 @@ from ros_client import Client, serving
 pytest.importorskip('fcl')
 
 from box_contact_msgs.msg import Contacts
-from box_contact_ros import ContactSolver
+from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import contacts_by_pair
 from box_contact_ros.resources import resource_path
@@ -78,7 +78,7 @@ def test_both_nodes_answer_one_input(client, soup_node):
         client.offer_until_answered(ORIGIN, APART)
         stamp = client.ask_soup(ORIGIN, TOUCHING, frames=('yard', 'yard'))
         assert client.is_answered(stamp)
-    wanted = ContactSolver(poses.CUBE, poses.CUBE, model='soup-4')(ORIGIN, TOUCHING)
+    wanted = ContactSolver(poses.CUBE, poses.CUBE, model=make_model('soup-4'))(ORIGIN, TOUCHING)
     point, normal, contacts = (client.soup[topic][stamp] for topic in TOPICS)
     assert point.header == normal.header == contacts.header == client.points[stamp].header
     assert point.header.frame_id == 'yard'

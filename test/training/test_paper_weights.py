@@ -21,7 +21,7 @@ from benchmarks.paper.errors import (
 )
 from benchmarks.paper.models import weights_path
 from benchmarks.pose_sets import SETS
-from box_contact_ros import ContactSolver
+from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.networks.weights_file import load_weights
 
 
@@ -92,7 +92,7 @@ def test_the_scene_of_containers_is_what_its_card_says(ending: str, p50: float, 
     assert card['architecture']['contact'][:3] == [6, 20, 18]
     pairs = SETS['containers'](np.random.default_rng(11), 20_000)
     size = pairs.size_a[0]
-    found = pairs.contacts(ContactSolver(size, size, model='paper', weights=str(path)))
+    found = pairs.contacts(ContactSolver(size, size, model=make_model('paper', weights=path)))
     errors = point_errors(found.point, pairs.contacts().point, pairs.edge)
     measured = dict(zip(('p50', 'p99'), np.percentile(errors, (50, 99))))
     assert measured['p50'] < p50 and measured['p99'] < p99

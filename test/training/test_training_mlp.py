@@ -15,7 +15,7 @@ torch = pytest.importorskip('torch')
 from benchmarks.errors import contact_errors
 from benchmarks.pose_sets import SETS, Pairs
 from benchmarks.weights import save_weights
-from box_contact_ros import ContactSolver
+from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.core import FEATURES, OUTPUTS
 from box_contact_ros.networks.mlp import NETWORK, load_mlp
 from training import __main__ as train
@@ -61,8 +61,7 @@ def test_errors_are_those_of_the_core(pairs: Pairs, tmp_path: Path, hidden: tupl
             parameter.copy_(torch.randn(parameter.shape))
     save_weights(tmp_path / 'mlp.safetensors', {NETWORK: network.layers()},
                  {**load_mlp().card, 'architecture': [FEATURES, *hidden, OUTPUTS]})
-    solver = ContactSolver((1, 1, 1), (1, 1, 1), model='mlp',
-                           weights=str(tmp_path / 'mlp.safetensors'))
+    solver = ContactSolver(model=make_model('mlp', weights=tmp_path / 'mlp.safetensors'))
     data, rows = describe(pairs)
     asked = pairs.rows(rows)
     expected = contact_errors(asked.contacts(solver), asked.contacts(), asked.edge)

@@ -64,6 +64,8 @@ PyObject* make_module() {
   import_array1(nullptr);
   kernel = detail::chosen_kernel();
   contact_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&contact_spec)));
+  exact_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&exact_spec)));
+  mlp_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&mlp_spec)));
   name_call_general = made(PyUnicode_InternFromString("_call_general"));
   name_batch_general = made(PyUnicode_InternFromString("_batch_general"));
   Owned module(made(PyModule_Create(&module_definition)));
@@ -76,6 +78,8 @@ PyObject* make_module() {
   add("lanes", PyLong_FromLong(kernel ? kernel->lanes : 0));
   add("compiler", PyUnicode_FromString(__VERSION__));
   add("Contact", Py_NewRef(contact_type));
+  add("Exact", Py_NewRef(exact_type));
+  add("Mlp", Py_NewRef(mlp_type));
   add("PairSolver", PyType_FromSpec(&solver_spec));
   add("BroadPhase", PyType_FromSpec(&broad_phase_spec));
   add("PatchForces", PyType_FromSpec(&forces_spec));

@@ -57,15 +57,23 @@ inline const double* numbers_of(PyObject* object, int n, double* copy) {
   return copy;
 }
 
-// Rows (count, columns) of a float64 array that lies in order, or nullptr. `count` −1: any.
-inline const double* plain_rows(PyObject* object, npy_intp& count, npy_intp columns) {
-  if (!is_plain<double>(object)) return nullptr;
+// Rows (count, columns) of an array that lies in order, or nullptr. `count` −1: any.
+template <class Number>
+const Number* plain_rows(PyObject* object, npy_intp& count, npy_intp columns) {
+  if (!is_plain<Number>(object)) return nullptr;
   auto* array = reinterpret_cast<PyArrayObject*>(object);
   bool fits = PyArray_NDIM(array) == 2 && PyArray_DIM(array, 1) == columns &&
               (count < 0 || PyArray_DIM(array, 0) == count);
   if (!fits) return nullptr;
   count = PyArray_DIM(array, 0);
-  return static_cast<const double*>(PyArray_DATA(array));
+  return static_cast<const Number*>(PyArray_DATA(array));
+}
+
+// The first of pairs (count, 2) with a place that none of the poses has, or −1.
+inline npy_intp bad_place(const int64_t* pairs, npy_intp count, npy_intp poses) {
+  for (npy_intp k = 0; k < 2 * count; ++k)
+    if (pairs[k] < 0 || pairs[k] >= poses) return k / 2;
+  return -1;
 }
 
 // Write a list of poses (7,), None for a box that is not there, to rows of an array. Returns False
@@ -120,12 +128,10 @@ struct PairArrays {
   void check_places() {
     npy_intp poses = count;
     count = places.length(0);
-    for (npy_intp k = 0; k < 2 * count; ++k) {
-      if (places.numbers[k] >= 0 && places.numbers[k] < poses) continue;
-      PyErr_Format(PyExc_ValueError, "pairs[%zd] has the place %lld, which no pose has", k / 2,
-                   (long long)places.numbers[k]);
-      throw PythonError{};
-    }
+    npy_intp bad = bad_place(places.numbers, count, poses);
+    if (bad < 0) return;
+    PyErr_Format(PyExc_ValueError, "pairs[%zd] has a place that no pose has", bad);
+    throw PythonError{};
   }
 };
 

@@ -1,59 +1,36 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// Class `PairSolver`: pairs of boxes by a model of the library.
+// Class `PairSolver`: pairs of boxes by a model, with sizes that are known beforehand or come with
+// each call.
 //
 // Arguments are checked here for kind and shape only. What is no plain number goes to Python, which
 // converts it or says what is wrong with it.
 #pragma once
 
-#include <algorithm>
-#include <atomic>
-#include <cmath>
-#include <iterator>
-#include <vector>
+#include <memory>
 
-#include "../src/library/batch.hpp"
-#include "../src/mlp/shipped_network.hpp"
-#include "contacts.hpp"
-#include "pair_arrays.hpp"
+#include "models.hpp"
 
 namespace box_contact::binding {
 
-using detail::Counts;
-using detail::Model;
-
-inline const detail::Kernel* kernel = nullptr;  // of this process
-inline PyObject* name_call_general = nullptr;   // of the methods for what is no plain array
+inline PyObject* name_call_general = nullptr;  // of the methods for what is no plain array
 inline PyObject* name_batch_general = nullptr;
 
-// Who answers, the sizes of the boxes, and how many contacts took another way than most.
+// Who answers, and the sizes of the boxes, where they are known.
 struct Setup {
-  Model model = Model::exact;
+  Owned owner;  // of the model
+  NativeModel* model;
   double size_a[3], size_b[3];  // full extents [m]
-  double margin = 0.0;          // [m]
-  std::vector<float> network;   // of model `mlp`
-  std::atomic<long> clipped{0};
+  bool has_size_a = false, has_size_b = false;
+  double margin = 0.0;  // [m]
 
-  detail::Solver solver() const { return {kernel, model, network.data()}; }
   detail::PairNumbers pair(const double* pose_a, const double* pose_b) const {
     return {pose_a, pose_b, size_a, size_b};
   }
-  Rows rows(const double* poses_a, const double* poses_b) const {
-    return {poses_a, poses_b, size_a, size_b, 0, 0, nullptr};
-  }
-  void count(const Counts& counts) {
-    if (counts.clipped) clipped += counts.clipped;
-  }
-  // Solve rows without Python's lock. Returns the first row that is refused, or −1.
-  long solve(const Rows& rows, const ContactArrays& found, long threads) {
-    Counts counts{};
-    long refused = without_lock([&] {
-      return detail::solve_rows(solver(), rows, long(found.count), found.results(margin), threads,
-                                counts);
-    });
-    if (refused < 0) count(counts);
-    return refused;
+  // Rows without poses; nullptr instead of sizes that are not known.
+  Rows rows() const {
+    return {nullptr, nullptr, has_size_a ? size_a : nullptr, has_size_b ? size_b : nullptr, 0, 0};
   }
 };
 
@@ -66,57 +43,34 @@ inline PyObject* solver_new(PyTypeObject* type, PyObject*, PyObject*) {
   return Holder<PairSolver>::make(type, PairSolver{});
 }
 
-// Whether a weight is believed: trained ones stay below 1e2, a flipped exponent bit does not.
-inline bool is_weight(float number) { return std::fabs(number) <= 1e4F; }
-
-inline std::vector<float> read_network(PyObject* object) {
-  auto array = read<float>(object, "network", {any_length});
-  float* end = array.numbers + array.length(0);
-  if (!std::all_of(array.numbers, end, is_weight))
-    fail(PyExc_ValueError, "the network has a weight that is not within -1e4 to 1e4");
-  return {array.numbers, end};
+// Returns whether there is a size.
+inline bool read_size(PyObject* given, double* size) {
+  if (given == Py_None) return false;
+  return PyArg_ParseTuple(given, "ddd", size, size + 1, size + 2) ? true : throw PythonError{};
 }
 
-// Whether a model has the network that it needs. A network of `mlp` has the groups of each hidden
-// layer, then groups of eight units: their biases, and their weights for each input (mlp/network.hpp).
-inline bool fits(Model model, const std::vector<float>& network) {
-  if (model == Model::exact) return network.empty();
-  constexpr long most = detail::network_units_max / 8;
-  if (network.size() < 2) return false;
-  float first = network[0], second = network[1];
-  if (!(first >= 1.0F && first <= most && second >= 1.0F && second <= most)) return false;
-  long groups = long(first), next = long(second);
-  long units = 8 * (1 + detail::network_features) * groups + 8 * (1 + 8 * groups) * next;
-  return long(network.size()) == 2 + units + 8 * (1 + 8 * next);
-}
-
-// No network: the shipped one. No model: Python answers.
+// Model None: Python answers.
 inline int solver_init(PyObject* self, PyObject* args, PyObject* keywords) {
   auto setup = std::make_unique<Setup>();
-  PyObject *name, *network = Py_None;
-  double *a = setup->size_a, *b = setup->size_b;
-  static const char* names[] = {"model", "size_a", "size_b", "network", "margin", nullptr};
-  if (!PyArg_ParseTupleAndKeywords(args, keywords, "O(ddd)(ddd)|Od", const_cast<char**>(names),
-                                   &name, a, a + 1, a + 2, b, b + 1, b + 2, &network,
-                                   &setup->margin))
+  PyObject *model, *size_a = Py_None, *size_b = Py_None;
+  static const char* names[] = {"model", "size_a", "size_b", "margin", nullptr};
+  if (!PyArg_ParseTupleAndKeywords(args, keywords, "O|OOd", const_cast<char**>(names), &model,
+                                   &size_a, &size_b, &setup->margin))
     return -1;
-  auto is = [name](const char* one) {
-    return PyUnicode_Check(name) && PyUnicode_CompareWithASCIIString(name, one) == 0;
-  };
-  if (is("mlp")) setup->model = Model::mlp;
-  if (network != Py_None) {
-    setup->network = read_network(network);
-  } else if (setup->model == Model::mlp) {
-    setup->network.assign(std::begin(detail::shipped_network), std::end(detail::shipped_network));
-  }
-  if (!(is("mlp") || is("exact") || name == Py_None) || !fits(setup->model, setup->network))
-    fail(PyExc_ValueError, "model is 'exact', 'mlp', or None; the network fits");
-  // core/__init__.py goes no further.
-  if (!kernel) fail(PyExc_RuntimeError, "the environment names an unknown instruction set");
+  for (PyObject* size : {size_a, size_b})
+    if (size != Py_None && !PyTuple_Check(size)) fail(PyExc_TypeError, "a size is a tuple or None");
+  setup->has_size_a = read_size(size_a, setup->size_a);
+  setup->has_size_b = read_size(size_b, setup->size_b);
   PairSolver& solver = Holder<PairSolver>::of(self);
   // Other threads may be using it.
   if (solver.is_made) fail(PyExc_RuntimeError, "a solver is made once: make another");
-  if (name != Py_None) solver.setup = std::move(setup);
+  if (is_native_model(model)) {
+    setup->owner.reset(Py_NewRef(model));
+    setup->model = ModelObject::of(model).get();
+    solver.setup = std::move(setup);
+  } else if (model != Py_None) {
+    fail(PyExc_TypeError, "model is an Exact, an Mlp, or None");
+  }
   solver.is_made = true;
   return 0;
 }
@@ -128,15 +82,15 @@ inline PyObject* call_method(PyObject* self, PyObject* name, PyObject* args, PyO
 
 inline PyObject* solver_call(PyObject* self, PyObject* args, PyObject* keywords) {
   Setup* setup = Holder<PairSolver>::of(self).setup.get();
-  if (setup && !keywords && PyTuple_GET_SIZE(args) == 2) {
+  if (setup && setup->has_size_a && setup->has_size_b && !keywords && PyTuple_GET_SIZE(args) == 2) {
     double copy_a[7], copy_b[7];
     const double* a = numbers_of(PyTuple_GET_ITEM(args, 0), 7, copy_a);
     const double* b = a ? numbers_of(PyTuple_GET_ITEM(args, 1), 7, copy_b) : nullptr;
     bc_contact contact;
     Counts counts{};
-    if (b && detail::solve_pair(setup->solver(), setup->pair(a, b), BC_COVARIANCE, setup->margin,
-                                contact, counts)) {
-      setup->count(counts);
+    if (b && detail::solve_pair(setup->model->solver(), setup->pair(a, b), BC_COVARIANCE,
+                                setup->margin, contact, counts)) {
+      setup->model->count(counts);
       return Contact::make(contact_type, std::move(contact));
     }
   }
@@ -146,27 +100,39 @@ inline PyObject* solver_call(PyObject* self, PyObject* args, PyObject* keywords)
 // What a call of `batch` asks for, if it is all plain.
 struct PlainBatch {
   Rows rows{};
-  npy_intp count = -1;
+  npy_intp count = -1;  // of pairs
+  npy_intp poses = -1;  // of A, or of all boxes
   long threads = 1;
   bool patch = true;
 
   // Returns false for what Python has to convert or to refuse.
   bool read(PyObject* args, PyObject* keywords, const Setup& setup) {
-    if (PyTuple_GET_SIZE(args) != 2) return false;
-    rows = setup.rows(plain_rows(PyTuple_GET_ITEM(args, 0), count, 7), nullptr);
-    if (rows.poses_a) rows.poses_b = plain_rows(PyTuple_GET_ITEM(args, 1), count, 7);
+    Py_ssize_t given = PyTuple_GET_SIZE(args);
+    if (given != 1 && given != 2) return false;
+    rows = setup.rows();
+    by_place = given == 1;
+    rows.poses_a = plain_rows<double>(PyTuple_GET_ITEM(args, 0), poses, 7);
+    if (!rows.poses_a) return false;
+    rows.poses_b = by_place ? rows.poses_a : plain_rows<double>(PyTuple_GET_ITEM(args, 1), poses, 7);
     if (!rows.poses_b) return false;
+    count = poses;
     PyObject *key, *value;
     for (Py_ssize_t place = 0; keywords && PyDict_Next(keywords, &place, &key, &value);)
       if (!PyUnicode_Check(key) || !read_keyword(key, value)) return false;
-    return true;
+    return rows.sizes_a && rows.sizes_b && by_place == (rows.pairs != nullptr);
   }
 
  private:
+  bool by_place = false;  // batch(poses, sizes=…, pairs=…)
+
   bool read_keyword(PyObject* key, PyObject* value) {
     auto is = [key](const char* name) { return PyUnicode_CompareWithASCIIString(key, name) == 0; };
-    if (is("size_a")) return read_sizes(value, rows.sizes_a, rows.size_step_a);
-    if (is("size_b")) return read_sizes(value, rows.sizes_b, rows.size_step_b);
+    if (is("size_a")) return !by_place && read_sizes(value, rows.sizes_a, rows.size_step_a);
+    if (is("size_b")) return !by_place && read_sizes(value, rows.sizes_b, rows.size_step_b);
+    if (is("sizes"))
+      return by_place && read_sizes(value, rows.sizes_a, rows.size_step_a) &&
+             read_sizes(value, rows.sizes_b, rows.size_step_b);
+    if (is("pairs")) return by_place && read_pairs(value);
     if (is("patch") && PyBool_Check(value)) return patch = value == Py_True, true;
     if (!is("threads") || !PyLong_CheckExact(value)) return false;
     int overflow;
@@ -175,9 +141,15 @@ struct PlainBatch {
   }
   bool read_sizes(PyObject* value, const double*& sizes, long& step) {
     if (value == Py_None) return true;
-    sizes = plain_rows(value, count, 3);
+    sizes = plain_rows<double>(value, poses, 3);
     step = 3;
     return sizes != nullptr;
+  }
+  bool read_pairs(PyObject* value) {
+    count = -1;
+    rows.pairs = plain_rows<int64_t>(value, count, 2);
+    rows.pose_count = long(poses);
+    return rows.pairs && bad_place(rows.pairs, count, poses) < 0;
   }
 };
 
@@ -186,37 +158,18 @@ inline PyObject* solver_batch(PyObject* self, PyObject* args, PyObject* keywords
   PlainBatch plain;
   if (setup && plain.read(args, keywords, *setup)) {
     ContactArrays found{plain.count, plain.patch};
-    if (setup->solve(plain.rows, found, plain.threads) < 0) return found.release();
+    if (setup->model->solve(plain.rows, found, setup->margin, plain.threads) < 0)
+      return found.release();
   }
   return call_method(self, name_batch_general, args, keywords);
 }
 
-inline PyObject* solver_solve(PyObject* self, PyObject* const* args, Py_ssize_t count) {
-  Setup* setup = Holder<PairSolver>::of(self).setup.get();
-  if (count < 5 || count > 7 || !setup)
-    fail(PyExc_TypeError,
-         "solve(poses_a, poses_b, sizes_a, sizes_b, threads, patch=True, pairs=None)");
-  long threads = whole_of(args[4]);
-  bool patch = count > 5 ? truth_of(args[5]) : true;
-  if (threads < 1 || threads > detail::threads_max)
-    fail(PyExc_ValueError, "threads must be within 1 and 1024");
-  PairArrays pairs(args, count > 6 ? args[6] : Py_None);
-  ContactArrays found{pairs.count, patch};
-  long refused = setup->solve(pairs.rows, found, threads);
-  return Py_BuildValue("(Nl)", found.release(), refused);
-}
-
 inline PyObject* solver_clipped(PyObject* self, void*) {
   const Setup* setup = Holder<PairSolver>::of(self).setup.get();
-  return PyLong_FromLong(setup ? setup->clipped.load() : 0);
+  return PyLong_FromLong(setup ? setup->model->clipped.load() : 0);
 }
 
 inline PyMethodDef solver_methods[] = {
-    {"solve", method<solver_solve>(), METH_FASTCALL,
-     "solve(poses_a, poses_b, sizes_a, sizes_b, threads, patch=True, pairs=None)\n--\n\n"
-     "Return Contacts, and the first refused row or -1.\n\n"
-     "poses (m, 7), sizes (m, 3) or (1, 3) full extents [m]; frame: that of the poses.\n"
-     "pairs (n, 2): places of the boxes of each row."},
     {"batch", method<solver_batch>(), METH_VARARGS | METH_KEYWORDS,
      "batch($self, poses_a, poses_b=None, *, size_a=None, size_b=None, sizes=None, pairs=None, "
      "threads=1, patch=True)\n--\n\n"
@@ -236,8 +189,8 @@ inline PyGetSetDef solver_attributes[] = {{"clipped", Guarded<solver_clipped>::c
 inline PyType_Slot solver_slots[] = {
     {Py_tp_doc,
      const_cast<char*>(
-         "PairSolver(model, size_a, size_b, network=None, margin=0.0)\n--\n\n"
-         "Solve pairs of boxes by model 'exact' or 'mlp'; None leaves all to Python.\n\n"
+         "PairSolver(model, size_a=None, size_b=None, margin=0.0)\n--\n\n"
+         "Solve pairs of boxes by an Exact or an Mlp; model None leaves all to Python.\n\n"
          "A call with two poses (7,) returns a Contact, and batch(poses_a, poses_b) returns "
          "Contacts. What is no plain array, tuple or list of numbers, and what is refused, goes to "
          "self._call_general(pose_a, pose_b) and self._batch_general(...).")},

@@ -1,0 +1,175 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// Classes `Exact` and `Mlp`: the models of the library as objects. Sizes come with each call.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <iterator>
+#include <memory>
+#include <vector>
+
+#include "../src/library/batch.hpp"
+#include "../src/mlp/shipped_network.hpp"
+#include "contacts.hpp"
+#include "pair_arrays.hpp"
+
+namespace box_contact::binding {
+
+using detail::Counts;
+using detail::Model;
+
+inline const detail::Kernel* kernel = nullptr;  // of this process
+inline PyTypeObject *exact_type = nullptr, *mlp_type = nullptr;
+
+struct NativeModel {
+  Model kind = Model::exact;
+  std::vector<float> network;    // of `Mlp`
+  std::atomic<long> clipped{0};  // contacts that took another way than most
+
+  detail::Solver solver() const { return {kernel, kind, network.data()}; }
+  void count(const Counts& counts) {
+    if (counts.clipped) clipped += counts.clipped;
+  }
+  // Solve rows without Python's lock. Returns the first row that is refused, or −1.
+  long solve(const Rows& rows, const ContactArrays& found, double margin, long threads) {
+    Counts counts{};
+    long refused = without_lock([&] {
+      return detail::solve_rows(solver(), rows, long(found.count), found.results(margin), threads,
+                                counts);
+    });
+    if (refused < 0) count(counts);
+    return refused;
+  }
+};
+
+using ModelObject = Holder<std::unique_ptr<NativeModel>>;
+
+inline bool is_native_model(PyObject* object) {
+  return Py_IS_TYPE(object, exact_type) || Py_IS_TYPE(object, mlp_type);
+}
+
+// Whether a weight is believed: trained ones stay below 1e2, a flipped exponent bit does not.
+inline bool is_weight(float number) { return std::fabs(number) <= 1e4F; }
+
+inline std::vector<float> read_network(PyObject* object) {
+  auto array = read<float>(object, "network", {any_length});
+  float* end = array.numbers + array.length(0);
+  if (!std::all_of(array.numbers, end, is_weight))
+    fail(PyExc_ValueError, "the network has a weight that is not within -1e4 to 1e4");
+  return {array.numbers, end};
+}
+
+// Whether a model has the network that it needs. A network of `mlp` has the groups of each hidden
+// layer, then groups of eight units: their biases, and their weights for each input (mlp/network.hpp).
+inline bool fits(Model model, const std::vector<float>& network) {
+  if (model == Model::exact) return network.empty();
+  constexpr long most = detail::network_units_max / 8;
+  if (network.size() < 2) return false;
+  float first = network[0], second = network[1];
+  if (!(first >= 1.0F && first <= most && second >= 1.0F && second <= most)) return false;
+  long groups = long(first), next = long(second);
+  long units = 8 * (1 + detail::network_features) * groups + 8 * (1 + 8 * groups) * next;
+  return long(network.size()) == 2 + units + 8 * (1 + 8 * next);
+}
+
+inline PyObject* make_model(PyTypeObject* type, std::unique_ptr<NativeModel> model) {
+  if (!fits(model->kind, model->network)) fail(PyExc_ValueError, "the network does not fit `Mlp`");
+  // core/__init__.py goes no further.
+  if (!kernel) fail(PyExc_RuntimeError, "the environment names an unknown instruction set");
+  return ModelObject::make(type, std::move(model));
+}
+
+inline PyObject* exact_new(PyTypeObject* type, PyObject* args, PyObject* keywords) {
+  static const char* names[] = {nullptr};
+  if (!PyArg_ParseTupleAndKeywords(args, keywords, ":Exact", const_cast<char**>(names)))
+    return nullptr;
+  return make_model(type, std::make_unique<NativeModel>());
+}
+
+// No network: the shipped one.
+inline PyObject* mlp_new(PyTypeObject* type, PyObject* args, PyObject* keywords) {
+  PyObject* network = Py_None;
+  static const char* names[] = {"network", nullptr};
+  if (!PyArg_ParseTupleAndKeywords(args, keywords, "|O:Mlp", const_cast<char**>(names), &network))
+    return nullptr;
+  auto model = std::make_unique<NativeModel>();
+  model->kind = Model::mlp;
+  if (network == Py_None) {
+    model->network.assign(std::begin(detail::shipped_network), std::end(detail::shipped_network));
+  } else {
+    model->network = read_network(network);
+  }
+  return make_model(type, std::move(model));
+}
+
+inline PyObject* exact_reduce(PyObject* self, PyObject*) {
+  return Py_BuildValue("(O())", Py_TYPE(self));
+}
+inline PyObject* mlp_reduce(PyObject* self, PyObject*) {
+  const std::vector<float>& network = ModelObject::of(self)->network;
+  auto array = make<float>({npy_intp(network.size())});
+  std::copy(network.begin(), network.end(), array.numbers);
+  return Py_BuildValue("(O(N))", Py_TYPE(self), array.object.release());
+}
+
+inline PyObject* model_solve(PyObject* self, PyObject* const* args, Py_ssize_t count) {
+  if (count < 4 || count > 8)
+    fail(PyExc_TypeError,
+         "solve(a, b, size_a, size_b, threads=1, patch=True, pairs=None, margin=0.0)");
+  long threads = count > 4 ? whole_of(args[4]) : 1;
+  bool patch = count > 5 ? truth_of(args[5]) : true;
+  double margin = count > 7 ? PyFloat_AsDouble(args[7]) : 0.0;
+  if (PyErr_Occurred()) return nullptr;
+  if (threads < 1 || threads > detail::threads_max)
+    fail(PyExc_ValueError, "threads must be within 1 and 1024");
+  PairArrays pairs(args, count > 6 ? args[6] : Py_None);
+  ContactArrays found{pairs.count, patch};
+  long refused = ModelObject::of(self)->solve(pairs.rows, found, margin, threads);
+  return Py_BuildValue("(Nl)", found.release(), refused);
+}
+
+inline PyObject* model_clipped(PyObject* self, void*) {
+  return PyLong_FromLong(ModelObject::of(self)->clipped.load());
+}
+
+#define BC_SOLVE                                                                              \
+  {"solve", method<model_solve>(), METH_FASTCALL,                                             \
+   "solve(a, b, size_a, size_b, threads=1, patch=True, pairs=None, margin=0.0, /)\n--\n\n"     \
+   "Return Contacts, and the first refused row or -1.\n\n"                                    \
+   "Poses a and b are (m, 7), full extents (m, 3) or (1, 3) [m]. pairs (n, 2): places of the\n" \
+   "boxes of each row. margin: up to which separation pairs apart have a normal [m]."}
+inline PyMethodDef exact_methods[] = {
+    BC_SOLVE, {"__reduce__", method<exact_reduce>(), METH_NOARGS, "Pickle nothing."}, {}};
+inline PyMethodDef mlp_methods[] = {
+    BC_SOLVE, {"__reduce__", method<mlp_reduce>(), METH_NOARGS, "Pickle the network."}, {}};
+#undef BC_SOLVE
+inline PyGetSetDef model_attributes[] = {
+    {"clipped", Guarded<model_clipped>::call, nullptr, "Contacts of `Exact` that were clipped.",
+     nullptr},
+    {}};
+
+inline PyType_Slot exact_slots[] = {
+    {Py_tp_doc, const_cast<char*>("Exact()\n--\n\n"
+                                  "Model `exact`: the exact moments of the overlap.")},
+    {Py_tp_new, slot<exact_new>()},
+    {Py_tp_dealloc, reinterpret_cast<void*>(ModelObject::dealloc)},
+    {Py_tp_methods, exact_methods},
+    {Py_tp_getset, model_attributes},
+    {0, nullptr}};
+inline PyType_Slot mlp_slots[] = {
+    {Py_tp_doc, const_cast<char*>("Mlp(network=None)\n--\n\n"
+                                  "Model `mlp` with the shipped network, or one (n,) float32.")},
+    {Py_tp_new, slot<mlp_new>()},
+    {Py_tp_dealloc, reinterpret_cast<void*>(ModelObject::dealloc)},
+    {Py_tp_methods, mlp_methods},
+    {Py_tp_getset, model_attributes},
+    {0, nullptr}};
+inline PyType_Spec exact_spec = {"box_contact_ros.core._native.Exact", sizeof(ModelObject), 0,
+                                 Py_TPFLAGS_DEFAULT | Py_TPFLAGS_IMMUTABLETYPE, exact_slots};
+inline PyType_Spec mlp_spec = {"box_contact_ros.core._native.Mlp", sizeof(ModelObject), 0,
+                               Py_TPFLAGS_DEFAULT | Py_TPFLAGS_IMMUTABLETYPE, mlp_slots};
+
+}  // namespace box_contact::binding
