@@ -24,10 +24,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from box_contact_ros.arguments import model_name, within
 from box_contact_ros.core import DEPTH_FLOOR
 from box_contact_ros.networks.paper import turned
 from box_contact_ros.networks.weights_file import WeightsError
-from box_contact_ros.solver.arguments import model_name, within
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.pose import rotation_matrix
 

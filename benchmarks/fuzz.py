@@ -30,10 +30,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from box_contact_ros.arguments import within
 from box_contact_ros.core import DEPTH_FLOOR, FEATURES, OUTPUTS, UNITS_MAX, native
 from box_contact_ros.networks.mlp import core_numbers
 from box_contact_ros.networks.weights_file import Network
-from box_contact_ros.solver.arguments import within
 from box_contact_ros.solver.contact import FIELDS, Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix

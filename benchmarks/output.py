@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from box_contact_ros.arguments import program_parser, within
 from box_contact_ros.core import native
-from box_contact_ros.solver.arguments import program_parser, within
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from box_contact_ros.solver.arguments import within
+from box_contact_ros.arguments import within
 from box_contact_ros.solver.contact_solver import ContactSolver
 
 from . import output

@@ -25,10 +25,10 @@ import torch
 from benchmarks.contestant import SIZES_FOLDER
 from benchmarks.output import QUICK_RESULTS, make_folder, report_parser
 from benchmarks.paper import jobs
+from box_contact_ros.arguments import within
 from box_contact_ros.core import UNITS_MAX
 from box_contact_ros.networks.mlp import NETWORK
 from box_contact_ros.networks.weights_file import load_weights
-from box_contact_ros.solver.arguments import within
 
 from . import paper, recipe
 

@@ -25,7 +25,7 @@ import numpy as np
 import torch
 from tqdm import tqdm
 
-from box_contact_ros.solver.arguments import within
+from box_contact_ros.arguments import within
 
 from ..output import (
     command_line,

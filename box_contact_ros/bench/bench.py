@@ -31,13 +31,13 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
+from ..arguments import model_name, program_parser, within
 from ..core import native
 from ..extras import require
 from ..models import MODELS
 from ..node.parameters import outside_ros_args
-from ..node.processes import asked_to_end, keep_to_this_host, program, running
 from ..node.runtime import exit_on_refusal, running_node
-from ..solver.arguments import model_name, program_parser, within
+from ..processes import asked_to_end, keep_to_this_host, program, running
 from .drive import NODES, BenchNode
 from .poses import swaying_containers
 from .report import comparison, draw, figures, table, void_reason

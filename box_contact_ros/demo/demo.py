@@ -24,9 +24,9 @@ import time
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 
+from ..arguments import model_name, program_parser
 from ..extras import require
-from ..node.processes import asked_to_end, keep_to_this_host, program, running
-from ..solver.arguments import model_name, program_parser
+from ..processes import asked_to_end, keep_to_this_host, program, running
 
 PAUSE = 1.5  # time [s] between the end of a landing and the next, to see how it ended
 LOOK_PERIOD = 0.05  # time [s] between looks at the processes

@@ -16,7 +16,7 @@ from typing import Any
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 
-from ..solver.arguments import program_parser
+from ..arguments import program_parser
 from ..solver.checks import nearest_name, short_repr, size_fault
 from .rclpy_workarounds import parameter_overrides
 

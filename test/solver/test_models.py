@@ -18,9 +18,9 @@ import yaml
 
 import box_contact_ros
 from box_contact_ros import ContactSolver
+from box_contact_ros.arguments import model_name
 from box_contact_ros.core import native
 from box_contact_ros.models import MODELS, check_model, make_model, most_near
-from box_contact_ros.solver.arguments import model_name
 from box_contact_ros.solver.models import NATIVE
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from ..models import check_model
+from .models import check_model
 
 Number = TypeVar('Number', int, float)
 

@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from box_contact_ros.node import processes
+from box_contact_ros import processes
 
 pytestmark = pytest.mark.usefixtures('signal_handlers')
 

@@ -8,7 +8,7 @@ import argparse
 
 import pytest
 
-from box_contact_ros.solver import arguments
+from box_contact_ros import arguments
 
 
 @pytest.mark.parametrize('low, high, text, wanted', [
