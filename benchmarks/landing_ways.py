@@ -29,7 +29,7 @@ from box_contact_ros.demo.landing import (
     LandingRecord,
 )
 from box_contact_ros.scene.laws import FRICTION
-from box_contact_ros.scene.scene_solver import CONTAINER
+from box_contact_ros.scene.scene import CONTAINER
 from box_contact_ros.solver.contact_solver import ContactSolver
 
 WATCHED, WINDOW = 15.0, 5.0

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from box_contact_ros import Box, Pair, Scene, SceneSolver, read_scene
-from box_contact_ros.scene.scene_solver import EVERY_PAIR
+from box_contact_ros.scene.scene import EVERY_PAIR
 
 from . import output
 from .output import markdown_table, number

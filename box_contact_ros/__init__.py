@@ -15,8 +15,9 @@ from .solver.contact_solver import ContactSolver
 if TYPE_CHECKING:
     from .models import make_model
     from .scene.laws import Body, PatchForces
+    from .scene.scene import Box, Pair, Scene
     from .scene.scene_file import read_scene
-    from .scene.scene_solver import Box, Pair, Scene, SceneSolver
+    from .scene.scene_solver import SceneSolver
 
 __all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Pair', 'PatchForces', 'Scene',
            'SceneSolver', 'make_model', 'read_scene']
@@ -25,7 +26,8 @@ _LOADED_WHEN_USED = {
     'models': ('make_model',),
     'scene.laws': ('Body', 'PatchForces'),
     'scene.scene_file': ('read_scene',),
-    'scene.scene_solver': ('Box', 'Pair', 'Scene', 'SceneSolver'),
+    'scene.scene': ('Box', 'Pair', 'Scene'),
+    'scene.scene_solver': ('SceneSolver',),
 }
 
 

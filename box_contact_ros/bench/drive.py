@@ -28,7 +28,7 @@ from box_contact_msgs.msg import Contacts as ContactsMessage
 from ..node.messages import make_header
 from ..node.ros_client import DEEP_RELIABLE, pose_message
 from ..node.runtime import GuardedNode, spin_for
-from ..scene.scene_solver import CONTAINER
+from ..scene.scene import CONTAINER
 from ..solver.contact_solver import ContactSolver
 from .echo_node import FRAME, raw_stamp, with_stamp
 from .report import AnswerLog

@@ -24,7 +24,7 @@ import mujoco
 import numpy as np
 
 from ..scene.laws import GRAVITY, Body
-from ..scene.scene_solver import CONTAINER
+from ..scene.scene import CONTAINER
 from ..solver.pose import cross, rotation_matrix
 
 PHYSICS_STEP = 5e-4

@@ -36,8 +36,9 @@ from box_contact_msgs.srv import Check
 from ..core import LENGTH_MAX
 from ..models import MODELS, check_model, make_model, most_near
 from ..scene.pairing import PAIRINGS, RESETS
+from ..scene.scene import CONTAINER, Scene, two_boxes
 from ..scene.scene_file import read_scene
-from ..scene.scene_solver import CONTAINER, Scene, SceneSolver, two_boxes
+from ..scene.scene_solver import SceneSolver
 from ..solver.checks import short_repr
 from ..solver.models import NATIVE
 from .check import Checker, Throttle, pair_count

@@ -19,7 +19,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 from ..scene.pairing import OLD, OVERTAKEN, REPEATED, RESETS, TOO_LATE, Pairing, Rejection
-from ..scene.scene_solver import Pair, Scene
+from ..scene.scene import Pair, Scene
 from .messages import make_header
 from .topics import SceneTopics
 

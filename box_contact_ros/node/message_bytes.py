@@ -17,7 +17,8 @@ import numpy as np
 
 from ..core import LENGTH_MAX, QUATERNION_MAX, QUATERNION_MIN, native
 from ..scene.pairing import StampedPose
-from ..scene.scene_solver import Answer, Pair, Scene
+from ..scene.scene import Pair, Scene
+from ..scene.scene_solver import Answer
 from ..solver.checks import MOST_NAME_BYTES, pose_fault
 from .messages import NANOSECONDS, Refused
 

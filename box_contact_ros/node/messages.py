@@ -15,7 +15,8 @@ from std_msgs.msg import Header
 
 from box_contact_msgs.msg import Contact as ContactMessage
 
-from ..scene.scene_solver import ALONE, Answer, Scene
+from ..scene.scene import ALONE, Scene
+from ..scene.scene_solver import Answer
 from ..solver.checks import short_repr
 from ..solver.contact import Contact, Contacts, patch_area
 

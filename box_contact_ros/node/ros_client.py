@@ -14,7 +14,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header
 
 from ..scene.pairing import StampedPose
-from ..scene.scene_solver import ALL_BOXES, Scene
+from ..scene.scene import ALL_BOXES, Scene
 from ..solver.checks import are_poses
 from .message_bytes import PoseReader
 from .messages import NANOSECONDS, Refused

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from ..scene.pairing import NEVER, OVERTAKEN, PAIRINGS, Pairing, StampedPose, Tick
-from ..scene.scene_solver import ALL_BOXES, SceneSolver
+from ..scene.scene import ALL_BOXES
+from ..scene.scene_solver import SceneSolver
 from ..solver.checks import absent_poses, are_poses, pose_fault
 from .diagnostics import TickMonitor
 from .message_bytes import VECTOR_BYTES, ContactWriter, PoseReader, aligned, header_bytes

@@ -18,7 +18,7 @@ from rclpy.subscription import Subscription
 
 from box_contact_msgs.msg import Contacts
 
-from ..scene.scene_solver import ALL_BOXES, Pair, Scene
+from ..scene.scene import ALL_BOXES, Pair, Scene
 from ..solver.checks import short_repr
 from .rclpy_workarounds import RCLError, with_info
 

@@ -62,7 +62,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .scene_solver import ALL_BOXES, Scene
+from .scene import ALL_BOXES, Scene
 
 PATIENCE = 5
 """How many whole ticks a tick waits: a few periods, whatever the rate. Executor and transport let

@@ -19,7 +19,7 @@ import yaml
 
 from ..resources import find_file, resource_path
 from ..solver.checks import SHOWN, short_repr
-from .scene_solver import Box, Fault, Pair, Scene
+from .scene import Box, Fault, Pair, Scene
 
 MOST_STREAMS = 1000
 """Boxes with a topic of their own. Each subscription takes a millisecond and 100 kB; an array has

@@ -27,8 +27,9 @@ from ..node.messages import read_answer
 from ..node.parameters import Setting, declare, warn_of_unknown
 from ..node.ros_client import PoseTopic, pose_topics, stamp_of
 from ..node.runtime import GuardedNode
+from ..scene.scene import Scene, two_boxes
 from ..scene.scene_file import read_scene
-from ..scene.scene_solver import Answer, Scene, two_boxes
+from ..scene.scene_solver import Answer
 
 KEPT = 1000  # poses kept per topic: a second at 1 kHz
 UNANSWERED = 0.5

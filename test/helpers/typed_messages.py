@@ -24,7 +24,7 @@ from box_contact_msgs.msg import Box, BoxPair, Contacts
 from box_contact_msgs.msg import Contact as ContactMessage
 from box_contact_ros.node.messages import NANOSECONDS, UPPER, Refused, make_header
 from box_contact_ros.scene.pairing import StampedPose
-from box_contact_ros.scene.scene_solver import Pair
+from box_contact_ros.scene.scene import Pair
 from box_contact_ros.solver.checks import pose_fault
 from box_contact_ros.solver.contact import FIELDS, Contact, patch_area
 

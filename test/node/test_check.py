@@ -23,7 +23,7 @@ from box_contact_ros import ContactSolver, SceneSolver, make_model
 from box_contact_ros.node.check import MOST_BOXES, MOST_PAIRS, Checker, Throttle
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import contacts_by_pair
-from box_contact_ros.scene.scene_solver import EVERY_PAIR, Box, Pair, Scene
+from box_contact_ros.scene.scene import EVERY_PAIR, Box, Pair, Scene
 
 CUBE = tuple(poses.CUBE)
 SCENE = Scene({name: Box(name, CUBE) for name in ('load', 'stack', 'lorry')},

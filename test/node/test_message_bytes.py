@@ -30,7 +30,8 @@ from box_contact_msgs.msg import Contacts as ContactsMessage
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.message_bytes import ContactWriter, PoseReader, aligned, header_bytes
 from box_contact_ros.node.messages import Refused, contacts_by_pair, make_header, read_answer
-from box_contact_ros.scene.scene_solver import Answer, Pair, two_boxes
+from box_contact_ros.scene.scene import Pair, two_boxes
+from box_contact_ros.scene.scene_solver import Answer
 from box_contact_ros.solver.contact import Contact, Contacts
 
 STAMPS = st.integers(-2**31 * 10**9, 2**31 * 10**9 - 1)

@@ -32,7 +32,7 @@ from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
 from box_contact_ros.node.topics import pose_qos
 from box_contact_ros.resources import resource_path
-from box_contact_ros.scene.scene_solver import ALL_BOXES
+from box_contact_ros.scene.scene import ALL_BOXES
 from box_contact_ros.solver.checks import MOST_NAME_BYTES
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -27,7 +27,7 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import contacts_by_pair, make_header, read_answer
 from box_contact_ros.node.topics import ARRAY_DEPTH, MOST_PAIRS_WITH_TOPICS
-from box_contact_ros.scene.scene_solver import ALONE
+from box_contact_ros.scene.scene import ALONE
 
 MS = 1_000_000  # ns
 SCENE = """\

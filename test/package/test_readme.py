@@ -44,7 +44,8 @@ from box_contact_ros.node.check import Checker
 from box_contact_ros.node.contact_node import PARAMETERS
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene import pairing, scene_file
-from box_contact_ros.scene.scene_solver import SceneSolver, two_boxes
+from box_contact_ros.scene.scene import two_boxes
+from box_contact_ros.scene.scene_solver import SceneSolver
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [*sorted(ROOT.glob('*.md'), key=lambda page: page.name != 'README.md'),

@@ -15,15 +15,8 @@ import pytest
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import native
-from box_contact_ros.scene.scene_solver import (
-    ALONE,
-    EVERY_PAIR,
-    Box,
-    Pair,
-    Scene,
-    SceneSolver,
-    TooManyNear,
-)
+from box_contact_ros.scene.scene import ALONE, EVERY_PAIR, Box, Pair, Scene
+from box_contact_ros.scene.scene_solver import SceneSolver, TooManyNear
 
 ALL = np.ones((1, 1), np.uint8)
 NONE = np.zeros((0, 2), np.int64)
@@ -261,7 +254,8 @@ def test_bad_poses_are_refused_in_a_sweep():
 CROWD = """
 import resource
 import numpy as np
-from box_contact_ros.scene.scene_solver import EVERY_PAIR, Box, Scene, SceneSolver, TooManyNear
+from box_contact_ros.scene.scene import EVERY_PAIR, Box, Scene
+from box_contact_ros.scene.scene_solver import SceneSolver, TooManyNear
 
 boxes = {f'b{n}': Box(f'b{n}', (1.0, 1.0, 1.0)) for n in range(8000)}
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -25,7 +25,7 @@ from box_contact_ros.scene.pairing import (
     StampedPose,
     StampPairing,
 )
-from box_contact_ros.scene.scene_solver import ALL_BOXES, Box, Pair, Scene, two_boxes
+from box_contact_ros.scene.scene import ALL_BOXES, Box, Pair, Scene, two_boxes
 
 TWO = two_boxes((2, 2, 2), (2, 2, 2))
 MS = 1_000_000  # ns

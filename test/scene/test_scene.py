@@ -15,14 +15,8 @@ import pytest
 
 from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.core import native
-from box_contact_ros.scene.scene_solver import (
-    EVERY_PAIR,
-    Box,
-    Pair,
-    Scene,
-    SceneSolver,
-    two_boxes,
-)
+from box_contact_ros.scene.scene import EVERY_PAIR, Box, Pair, Scene, two_boxes
+from box_contact_ros.scene.scene_solver import SceneSolver
 
 IDENTITY = (0, 0, 0, 0, 0, 0, 1)
 

@@ -14,8 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from box_contact_ros.scene import scene_file
+from box_contact_ros.scene.scene import Pair
 from box_contact_ros.scene.scene_file import SceneError, read_scene
-from box_contact_ros.scene.scene_solver import Pair, SceneSolver
+from box_contact_ros.scene.scene_solver import SceneSolver
 
 ROOT = Path(__file__).resolve().parents[2]
 GOOD = """\

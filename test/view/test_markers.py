@@ -23,7 +23,7 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
 from box_contact_ros.resources import resource_path
-from box_contact_ros.scene.scene_solver import Box, Pair, Scene
+from box_contact_ros.scene.scene import Box, Pair, Scene
 from box_contact_ros.solver.contact import Contact
 from box_contact_ros.view.listener import SceneRows, Tick, read_touching
 from box_contact_ros.view.markers import LABELLED, NAMESPACES, MarkersNode, scene_markers

@@ -40,7 +40,7 @@ from box_contact_ros.demo.crane import CraneScenario
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import NANOSECONDS, Refused, make_header
 from box_contact_ros.node.topics import contact_qos
-from box_contact_ros.scene.scene_solver import Box, Pair, Scene, two_boxes
+from box_contact_ros.scene.scene import Box, Pair, Scene, two_boxes
 from box_contact_ros.solver.pose import rotation_matrix
 from box_contact_ros.view import listener
 from box_contact_ros.view.listener import (
