@@ -100,7 +100,7 @@ def pallets(copies: int) -> Boxes:
 
 def scene_of(boxes: Boxes, pairs: np.ndarray | None = None) -> Scene:
     """Return the scene of boxes, with these pairs (m, 2) listed; without them, with all pairs."""
-    named = {f'b{row}': Box(f'b{row}', tuple(size), tuple(pose) if is_fixed else None)
+    named = {f'b{row}': Box(tuple(size), tuple(pose) if is_fixed else None)
              for row, (size, pose, is_fixed) in enumerate(zip(
                  boxes.size.tolist(), boxes.pose.tolist(), boxes.fixed))}
     listed = () if pairs is None else tuple(

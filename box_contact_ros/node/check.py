@@ -163,7 +163,7 @@ class Checker:
                     raise ValueError(f'boxes[{number}] {short_repr(box.name)} has no size, and is '
                                      'no box of the scene'
                                      f'{nearest_name(box.name, self._scene.boxes)}')
-                sizes[number] = known.size
+                sizes[number] = tuple(known.size)
         return sizes
 
 

@@ -10,14 +10,15 @@ from __future__ import annotations
 
 import fnmatch
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..solver.checks import name_fault, pose_fault, short_repr, size_fault
+from ..solver.checks import as_floats, name_fault, pose_fault, short_repr, size_fault
 
 POSE_ARRAY = 'poses'
 """Topic of the poses of all moving boxes, where they come as one message."""
@@ -25,6 +26,8 @@ ALL_BOXES = 'all boxes'
 """Source of these poses: no box of a scene file can have this name."""
 EVERY_PAIR = (('*', '*'),)
 """Patterns of a scene in which each two boxes are a pair, if one of them moves."""
+MOVES = ': leave `pose` out of a box that moves, and give its pose in the call'
+"""What to do about boxes that are all fixed."""
 ALONE = -1
 """Instead of box b, in rows of boxes: all pairs of box a that patterns ask for."""
 
@@ -32,14 +35,51 @@ CONTAINER = (12.192, 2.438, 2.591)
 """Full extents of an ISO 40 ft container [m]."""
 
 
+KeyPath = tuple[str | int, ...]  # ('boxes', 'load', 'size') or ('pairs', 3, 'a')
+
+
+class SceneError(ValueError):
+    """What is wrong with a scene, and where: the path of a key, and of the file if there is one."""
+
+    def __init__(self, path: KeyPath, reason: str, file: str = '') -> None:
+        self.path, self.reason, self.file = path, reason, file
+        dotted = ''.join(f'[{part}]' if isinstance(part, int) else f'.{part}' for part in path)
+        super().__init__(': '.join(filter(None, (file, dotted.removeprefix('.'), reason))))
+
+    def __reduce__(self) -> tuple[type[SceneError], tuple[KeyPath, str, str]]:
+        """Pickle the arguments."""
+        return SceneError, (self.path, self.reason, self.file)
+
+    def within(self, *path: str | int) -> SceneError:
+        """Return the same error of what stands at a path of a larger whole."""
+        return SceneError((*path, *self.path), self.reason, self.file)
+
+
 @dataclass(frozen=True)
 class Box:
-    """A box of the scene: fixed if it has a pose, else moving."""
+    """A box of the scene: fixed if it has a pose, else moving. Raises SceneError."""
 
-    name: str
-    size: tuple[float, ...]  # three full extents [m]
-    pose: tuple[float, ...] | None = None  # `x y z qx qy qz qw` in the common frame, of a fixed box
+    size: Sequence[float] | np.ndarray  # three full extents [m]
+    pose: Sequence[float] | np.ndarray | None = None
+    """`x y z qx qy qz qw` in the common frame, of a fixed box."""
     pose_topic: str = ''  # where a moving box's poses come from
+
+    def __post_init__(self) -> None:
+        def keep(key: str, given: ArrayLike, shape: str, count: int,
+                 fault_of: Callable[[np.ndarray], str | None]) -> None:
+            try:
+                numbers = as_floats(given, key, shape, (count,))
+            except ValueError as error:
+                raise SceneError((key,), str(error).removeprefix(f'{key} ')) from error
+            if fault := fault_of(numbers):
+                raise SceneError((key,), fault)
+            object.__setattr__(self, key, tuple(numbers.tolist()))
+
+        keep('size', self.size, 'full extents (3,)', 3, size_fault)
+        if self.pose is not None:
+            keep('pose', self.pose, 'a pose (x y z qx qy qz qw)', 7, pose_fault)
+            if self.pose_topic:
+                raise SceneError(('pose_topic',), 'a box with a pose never moves')
 
 
 class Pair(NamedTuple):
@@ -66,7 +106,7 @@ Pattern = tuple[str, str]
 
 @dataclass(frozen=True)
 class Scene:
-    """Boxes by name, and which pairs matter. Raises Fault for anything that cannot be computed.
+    """Boxes by name, and which pairs matter. Raises SceneError for what cannot be computed.
 
     A pattern asks for all pairs of two boxes that it matches and of which one moves. If both sides
     match both boxes, a is the one that comes first in the scene.
@@ -84,13 +124,15 @@ class Scene:
     def __post_init__(self) -> None:
         fault = name_fault(self.frame_id)
         if fault:
-            raise Fault(('frame_id',), fault)
-        _check_boxes(self.boxes)
+            raise SceneError(('frame_id',), fault)
+        for name in self.boxes:
+            if fault := name_fault(name):
+                raise SceneError(('boxes',), fault)
         _check_pairs(self.boxes, self.pairs)
         for number, (a, b) in enumerate(self.patterns):
             _check_pattern(self, number, self.matching(a), self.matching(b))
         if not self.pairs and not self.patterns:
-            raise Fault(('pairs',), 'a scene needs at least one pair')
+            raise SceneError(('pairs',), 'a scene needs at least one pair')
 
     def matching(self, pattern: str) -> np.ndarray:
         """Return which boxes (n,) have names that a pattern matches."""
@@ -229,62 +271,26 @@ class Scene:
 
 def two_boxes(size_a: Sequence[float], size_b: Sequence[float]) -> Scene:
     """Return the scene of one pair of moving boxes, box_a and box_b, of full extents (3,) [m]."""
-    boxes = {name: Box(name, tuple(map(float, size)), pose_topic=f'{name}/pose')
+    boxes = {name: Box(size, pose_topic=f'{name}/pose')
              for name, size in (('box_a', size_a), ('box_b', size_b))}
     return Scene(boxes, (Pair('', 'box_a', 'box_b'),))
 
 
-KeyPath = tuple[str | int, ...]  # ('boxes', 'load', 'size') or ('pairs', 3, 'a')
-
-
-def dotted(path: KeyPath) -> str:
-    """Return a path in words: `boxes.load.size` or `pairs[3].a`."""
-    text = ''.join(f'[{part}]' if isinstance(part, int) else f'.{part}' for part in path)
-    return text.removeprefix('.')
-
-
-class Fault(ValueError):
-    """What is wrong with a scene, and where."""
-
-    def __init__(self, path: KeyPath, reason: str) -> None:
-        super().__init__(f'{dotted(path)}: {reason}')
-        self.path, self.reason = path, reason
-
-
-def _check_boxes(boxes: Mapping[str, Box]) -> None:
-    """Raise Fault for the first thing that is wrong with a box."""
-    for name, box in boxes.items():
-        fault = name_fault(name)
-        if fault:
-            raise Fault(('boxes',), fault)
-        for key, given, count in (('size', box.size, 3), ('pose', box.pose, 7)):
-            if given is not None and (not isinstance(given, tuple | list) or len(given) != count):
-                raise Fault(('boxes', name, key),
-                            f'must be a tuple of {count} numbers, not {short_repr(given)}')
-        fault = size_fault(box.size)
-        if fault:
-            raise Fault(('boxes', name, 'size'), fault)
-        if box.pose and box.pose_topic:
-            raise Fault(('boxes', name, 'pose_topic'), 'a box with a pose never moves')
-        fault = pose_fault(box.pose) if box.pose else None
-        if fault:
-            raise Fault(('boxes', name, 'pose'), fault)
-
-
 def _check_pairs(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
-    """Raise Fault for the first thing that is wrong with listed pairs."""
+    """Raise SceneError for the first thing that is wrong with listed pairs."""
     for number, pair in enumerate(pairs):
         path = ('pairs', number)
         fault = name_fault(pair.name)
         if fault and pair.name != f'{pair.a}_{pair.b}':
-            raise Fault((*path, 'name'), fault)
+            raise SceneError((*path, 'name'), fault)
         for side, name in (('a', pair.a), ('b', pair.b)):
             if name not in boxes:
-                raise Fault((*path, side), f'{short_repr(name)} is none of the boxes')
+                raise SceneError((*path, side), f'{short_repr(name)} is none of the boxes')
         if pair.a == pair.b:
-            raise Fault((*path, 'b'), f'{short_repr(pair.b)} is the same box as a')
+            raise SceneError((*path, 'b'), f'{short_repr(pair.b)} is the same box as a')
         if boxes[pair.a].pose and boxes[pair.b].pose:
-            raise Fault(path, f'{short_repr(pair.a)} and {short_repr(pair.b)} are both fixed')
+            raise SceneError(path, f'{short_repr(pair.a)} and {short_repr(pair.b)} are both fixed'
+                                   f'{MOVES}')
     for what, field, values in (
             ('name', ('name',), [pair.label for pair in pairs]),
             ('pair of boxes', (), [tuple(sorted((pair.a, pair.b))) for pair in pairs])):
@@ -293,19 +299,22 @@ def _check_pairs(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
             first = first_of.setdefault(value, number)
             if first != number:
                 a, b = pairs[first].a, pairs[first].b
-                raise Fault(('pairs', number, *field),
+                raise SceneError(('pairs', number, *field),
                             f'the same {what} as that of {short_repr(a)} and {short_repr(b)}')
 
 
 def _check_pattern(scene: Scene, number: int, is_a: np.ndarray, is_b: np.ndarray) -> None:
-    """Raise Fault for a pattern without a pair; is_a, is_b: the boxes (n,) that its sides match."""
+    """Raise SceneError for a pattern without a pair.
+
+    is_a, is_b: the boxes (n,) that its sides match.
+    """
     for side, is_matched, pattern in zip('ab', (is_a, is_b), scene.patterns[number]):
         if not is_matched.any():
-            raise Fault(('patterns', number, side),
+            raise SceneError(('patterns', number, side),
                         f'{short_repr(pattern)} is the name of no box')
     # Ordered pairs of different boxes, less those of two fixed ones.
     every, fixed = (int(a.sum() * b.sum() - (a & b).sum()) for a, b in (
         (is_a, is_b), (is_a & scene.is_fixed, is_b & scene.is_fixed)))
     if every == fixed:
-        raise Fault(('patterns', number), 'no two boxes of this pattern are a pair of which one '
-                                          'moves')
+        raise SceneError(('patterns', number), 'no two boxes of this pattern are a pair of which '
+                                               f'one moves{MOVES}')

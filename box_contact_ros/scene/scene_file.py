@@ -19,7 +19,7 @@ import yaml
 
 from ..resources import find_file, resource_path
 from ..solver.checks import SHOWN, short_repr
-from .scene import Box, Fault, Pair, Scene
+from .scene import Box, Pair, Scene, SceneError
 
 MOST_STREAMS = 1000
 """Boxes with a topic of their own. Each subscription takes a millisecond and 100 kB; an array has
@@ -33,10 +33,6 @@ PLAIN_INT = re.compile(r'[-+]?(0|[1-9][0-9]{0,299})')  # float() takes 308 digit
 PLAIN_FLOAT = re.compile(r'[-+]?[0-9]*(\.[0-9]*)?([eE][-+]?[0-9]+)?')
 _WILDCARDS = re.compile(r'[*?[]')
 _ALL = [{'a': '*', 'b': '*'}]  # what `pairs: all` stands for
-
-
-class SceneError(ValueError):
-    """A scene that is refused: where, and why."""
 
 
 class _Loader(getattr(yaml, 'CSafeLoader', yaml.SafeLoader)):  # type: ignore[misc]
@@ -72,13 +68,14 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
         _check_yaml(text)
         return _scene_of(yaml.load(text, Loader=_Loader))
     except OSError as error:
-        raise SceneError(f'scene {short_repr(os.fspath(path))} cannot be read: '
-                         f'{error.strerror or error}') from error
+        raise SceneError((), f'scene {short_repr(os.fspath(path))} cannot be read: '
+                             f'{error.strerror or error}') from error
     except (ValueError, yaml.YAMLError) as error:
-        reason = ' '.join(str(error).split())
+        fault = error if isinstance(error, SceneError) else SceneError((), str(error))
+        reason = ' '.join(fault.reason.split())
         if len(reason) > 2 * SHOWN:  # it shows what is refused
             reason = f'{reason[:SHOWN]} ... {reason[-SHOWN:]}'
-        raise SceneError(f'{path}: {reason}') from error
+        raise SceneError(fault.path, reason, f'{path}') from error
 
 
 def _read(path: Path) -> str:
@@ -150,44 +147,48 @@ def _is_name(path: str | bytes) -> bool:
 
 
 def _scene_of(data: Any) -> Scene:
-    """Return the scene that data means, or raise Fault."""
+    """Return the scene that data means, or raise SceneError."""
     _check_schema(data)
-    boxes = {name: Box(name, tuple(map(float, entry['size'])),
-                       tuple(map(float, entry['pose'])) if 'pose' in entry else None,
-                       entry.get('pose_topic', ''))
-             for name, entry in data['boxes'].items()}
+    boxes = {name: _box(name, entry) for name, entry in data['boxes'].items()}
     entries = _ALL if data['pairs'] == 'all' else data['pairs']
     listed = {number: entry for number, entry in enumerate(entries) if not _is_pattern(entry)}
     patterns = {number: entry for number, entry in enumerate(entries) if _is_pattern(entry)}
     for number, entry in patterns.items():
         if 'name' in entry:
-            raise Fault(('pairs', number, 'name'), 'a pattern of pairs has no name')
+            raise SceneError(('pairs', number, 'name'), 'a pattern of pairs has no name')
     try:
         scene = Scene(
             boxes, tuple(Pair(entry.get('name', f'{entry["a"]}_{entry["b"]}'), entry['a'],
                               entry['b']) for entry in listed.values()),
             data.get('frame_id', ''), data.get('poses') == 'array',
             tuple((entry['a'], entry['b']) for entry in patterns.values()))
-    except Fault as fault:  # the file has both in one list
+    except SceneError as fault:  # the file has both in one list
         part, *path = fault.path
         if part in ('pairs', 'patterns') and path:
             path[0] = list(listed if part == 'pairs' else patterns)[int(path[0])]
-        raise Fault(('pairs' if part == 'patterns' else part, *path), fault.reason) from None
+        raise SceneError(('pairs' if part == 'patterns' else part, *path), fault.reason) from None
     if len(scene.sources) > MOST_STREAMS:
-        raise Fault(('boxes',), f'{len(scene.sources)} boxes have a topic of their own, and at '
-                                f'most {MOST_STREAMS} may: set poses: array')
+        raise SceneError(('boxes',), f'{len(scene.sources)} boxes have a topic of their own, and '
+                                     f'at most {MOST_STREAMS} may: set poses: array')
     return scene
 
 
+def _box(name: str, entry: Mapping[str, Any]) -> Box:
+    try:
+        return Box(entry['size'], entry.get('pose'), entry.get('pose_topic', ''))
+    except SceneError as fault:
+        raise fault.within('boxes', name) from None
+
+
 def _check_schema(data: Any) -> None:
-    """Raise Fault for the first thing in which the data differs from the schema."""
+    """Raise SceneError for the first thing in which the data differs from the schema."""
     from jsonschema import Draft202012Validator  # only here: it takes 0.1 s
     from jsonschema.exceptions import best_match
 
     schema = json.loads(resource_path('msg_schemas', 'scene.json').read_text('utf-8'))
     error = best_match(Draft202012Validator(schema).iter_errors(data))
     if error is not None:
-        raise Fault(tuple(error.absolute_path), error.message)
+        raise SceneError(tuple(error.absolute_path), error.message)
 
 
 def _is_pattern(entry: Mapping[str, str]) -> bool:

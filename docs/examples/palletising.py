@@ -29,7 +29,7 @@ import numpy as np
 from box_contact_ros import Box, Contacts, Scene, SceneSolver
 
 PLANS = Path(__file__).with_name('pallets') / 'packing_plans.json'
-FLOOR = Box('floor', (4.0, 4.0, 1.0), (0.0, 0.0, -0.5, 0.0, 0.0, 0.0, 1.0))
+FLOOR = Box((4.0, 4.0, 1.0), (0.0, 0.0, -0.5, 0.0, 0.0, 0.0, 1.0))
 
 
 def read_plan(plan: list[dict]) -> tuple[list[str], np.ndarray, np.ndarray]:
@@ -86,7 +86,7 @@ def main() -> None:
     plans = []
     for order, plan in json.loads(PLANS.read_text('utf-8')).items():
         names, size, pose = read_plan(plan)
-        boxes = {name: Box(name, tuple(extents)) for name, extents in zip(names, size.tolist())}
+        boxes = {name: Box(tuple(extents)) for name, extents in zip(names, size.tolist())}
         scene = Scene({**boxes, 'floor': FLOOR}, patterns=(('*', '*'),), pose_array=True)
         answer = SceneSolver(scene, model='exact')(pose)
         left = support(pose, answer.pairs, answer.contacts)

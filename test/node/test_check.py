@@ -26,7 +26,7 @@ from box_contact_ros.node.messages import contacts_by_pair
 from box_contact_ros.scene.scene import EVERY_PAIR, Box, Pair, Scene
 
 CUBE = tuple(poses.CUBE)
-SCENE = Scene({name: Box(name, CUBE) for name in ('load', 'stack', 'lorry')},
+SCENE = Scene({name: Box(CUBE) for name in ('load', 'stack', 'lorry')},
               (Pair('landing', 'load', 'stack'), Pair.between('load', 'lorry')))
 EPISODES = 1  # of each length; 50 were tried
 
@@ -66,7 +66,7 @@ def test_boxes_of_the_scene_need_no_size(checker: Checker) -> None:
 
 
 FIXED = (10, 0, 1, 0, 0, 0, 1)
-YARD = Scene({'load': Box('load', CUBE), 's1': Box('s1', CUBE, FIXED)}, patterns=EVERY_PAIR,
+YARD = Scene({'load': Box(CUBE), 's1': Box(CUBE, FIXED)}, patterns=EVERY_PAIR,
              frame_id='yard')
 
 
@@ -82,7 +82,7 @@ def test_a_fixed_box_is_where_the_scene_says(place: Any, depths: list[float], s1
 
 
 @pytest.mark.parametrize('s1, frame, words', [
-    ((10, 0, 1.5, 0, 0, 0, 1), 'yard', "boxes[1] 's1' is fixed in the scene at (10, 0, 1, 0, 0, 0"),
+    ((10, 0, 1.5, 0, 0, 0, 1), 'yard', "boxes[1] 's1' is fixed in the scene at (10.0, 0.0, 1.0, "),
     ((0, 0, 0, 0, 0, 1, 0), 'yard', 'not at (0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0): leave its pose'),
     (ORIGIN, 'map', "header.frame_id: the scene is in frame 'yard', the request in 'map': send"),
     (ORIGIN, '/yard', 'the leading slash is the difference'),

@@ -206,7 +206,7 @@ def test_the_pairs_of_a_scene(patterns, listed):
     size, pose = made(rng, scattered, n)
     pose[:, :3] *= 0.4
     names = [f'{"ab"[number % 2]}{number}' for number in range(n)]
-    boxes = {name: Box(name, tuple(size[i]), tuple(pose[i]) if i % 4 == 0 else None)
+    boxes = {name: Box(tuple(size[i]), tuple(pose[i]) if i % 4 == 0 else None)
              for i, name in enumerate(names)}
     pairs = tuple(Pair(f'p{i}', names[2 * i + 1], names[2 * i]) for i in rng.permutation(listed))
     scene = Scene(boxes, pairs, patterns=patterns, pose_array=True)
@@ -240,7 +240,7 @@ def test_the_pairs_of_a_scene(patterns, listed):
 
 def test_bad_poses_are_refused_in_a_sweep():
     names = [f'm{number}' for number in range(90)]
-    scene = Scene({name: Box(name, (1.0, 1.0, 1.0)) for name in names}, patterns=EVERY_PAIR,
+    scene = Scene({name: Box((1.0, 1.0, 1.0)) for name in names}, patterns=EVERY_PAIR,
                   pose_array=True)
     rows = np.tile(poses.IDENTITY, (90, 1))
     rows[4, 0] = np.inf
@@ -257,7 +257,7 @@ import numpy as np
 from box_contact_ros.scene.scene import EVERY_PAIR, Box, Scene
 from box_contact_ros.scene.scene_solver import SceneSolver, TooManyNear
 
-boxes = {f'b{n}': Box(f'b{n}', (1.0, 1.0, 1.0)) for n in range(8000)}
+boxes = {f'b{n}': Box((1.0, 1.0, 1.0)) for n in range(8000)}
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 solver = SceneSolver(Scene(boxes, patterns=EVERY_PAIR, pose_array=True), model='exact',
                      most_near=1000)
@@ -278,7 +278,7 @@ def test_a_crowd_in_one_place_costs_no_memory():
 
 def test_more_pairs_than_are_to_be_answered():
     """Listed ones as those of patterns."""
-    boxes = {name: Box(name, (1.0, 1.0, 1.0)) for name in 'abc'}
+    boxes = {name: Box((1.0, 1.0, 1.0)) for name in 'abc'}
     place = np.tile([0.0, 0, 0, 0, 0, 0, 1], (3, 1))
     for scene in (Scene(boxes, (Pair.between('a', 'b'), Pair.between('b', 'c')), pose_array=True),
                   Scene(boxes, patterns=(('b', '*'),), pose_array=True)):

@@ -35,8 +35,8 @@ START = 10**17  # ns: a stamp of the host's clock
 
 def scene(moving='abc', pairs=('ab', 'bc')):
     """Boxes that move, and pairs of them; `F` is a fixed one."""
-    boxes = {name: Box(name, (1.0, 1.0, 1.0)) for name in moving}
-    boxes['F'] = Box('F', (1.0, 1.0, 1.0), (0, 0, 0, 0, 0, 0, 1))
+    boxes = {name: Box((1.0, 1.0, 1.0)) for name in moving}
+    boxes['F'] = Box((1.0, 1.0, 1.0), (0, 0, 0, 0, 0, 0, 1))
     return Scene(boxes, tuple(Pair(pair, *pair) for pair in pairs))
 
 
@@ -308,7 +308,7 @@ def test_a_pose_that_gives_way_to_a_nearer_one_is_counted():
 
 @pytest.mark.parametrize('policy', PAIRINGS.values())
 def test_an_array_has_all_poses_of_its_tick(policy):
-    boxes = {name: Box(name, (1.0, 1.0, 1.0)) for name in 'ab'}
+    boxes = {name: Box((1.0, 1.0, 1.0)) for name in 'ab'}
     pairing = policy(Scene(boxes, (Pair('', 'a', 'b'),), pose_array=True))
     assert [stamps(pairing.add(ALL_BOXES, pose(stamp))) for stamp in (1, 2)] == [[1], [2]]
 

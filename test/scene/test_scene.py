@@ -15,7 +15,8 @@ import pytest
 
 from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.core import native
-from box_contact_ros.scene.scene import EVERY_PAIR, Box, Pair, Scene, two_boxes
+from box_contact_ros.scene.scene import EVERY_PAIR, Box, Pair, Scene, SceneError, two_boxes
+from box_contact_ros.scene.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import SceneSolver
 
 IDENTITY = (0, 0, 0, 0, 0, 0, 1)
@@ -23,9 +24,9 @@ IDENTITY = (0, 0, 0, 0, 0, 0, 1)
 
 def yard(columns=10, rows=20, tiers=5):
     """Containers in a yard, and one that hangs: 1,000 pairs. Columns 12.7 m, rows 2.7 m apart."""
-    boxes = {'load': Box('load', poses.CONTAINER, pose_topic='load/pose')}
+    boxes = {'load': Box(poses.CONTAINER, pose_topic='load/pose')}
     for n, (i, j, k) in enumerate(np.ndindex(columns, rows, tiers)):
-        boxes[f's{n}'] = Box(f's{n}', poses.CONTAINER, (12.7 * i, 2.7 * j, 2.591 * k, 0, 0, 0, 1))
+        boxes[f's{n}'] = Box(poses.CONTAINER, (12.7 * i, 2.7 * j, 2.591 * k, 0, 0, 0, 1))
     return Scene(boxes, tuple(Pair(f'load_s{n}', f's{n}', 'load')
                               for n in range(len(boxes) - 1)))
 
@@ -68,7 +69,7 @@ def test_a_tick_is_every_pair_alone(model, origin):
         n = 9
         sizes = np.exp(rng.uniform(-1, 1, (n, 3)))
         where = np.hstack((origin + rng.uniform(-1.8, 1.8, (n, 3)), poses.unit_quaternions(rng, n)))
-        boxes = {f'b{i}': Box(f'b{i}', tuple(sizes[i]), tuple(where[i]) if i % 3 == 0 else None,
+        boxes = {f'b{i}': Box(tuple(sizes[i]), tuple(where[i]) if i % 3 == 0 else None,
                               '' if i % 3 == 0 else f'b{i}/pose') for i in range(n)}
         pairs = tuple(Pair(f'p{i}{j}', f'b{i}', f'b{j}') for i in range(n)
                       for j in range(i) if (i % 3 or j % 3) and rng.random() < 0.5)
@@ -96,7 +97,7 @@ def test_close_pairs_are_those_within_the_margin(patterns, origin):
         n = 40
         sizes = np.exp(rng.uniform(-1, 1, (n, 3)))
         where = np.hstack((origin + rng.uniform(-6, 6, (n, 3)), poses.unit_quaternions(rng, n)))
-        boxes = {f'b{i}': Box(f'b{i}', tuple(sizes[i]), pose_topic=f'b{i}/pose') for i in range(n)}
+        boxes = {f'b{i}': Box(tuple(sizes[i]), pose_topic=f'b{i}/pose') for i in range(n)}
         pairs = tuple(Pair.between(f'b{i}', f'b{j}') for i in range(n) for j in range(i))
         scene = Scene(boxes, () if patterns else pairs, patterns=patterns)
         solver = SceneSolver(scene, model='exact', margin=margin)
@@ -145,8 +146,8 @@ def test_a_yard_leaves_few_pairs():
 
 
 def test_one_pair_with_a_fixed_box():
-    scene = Scene({'floor': Box('floor', (10, 10, 1), (0, 0, -0.5, 0, 0, 0, 1)),
-                   'load': Box('load', (1, 1, 1), pose_topic='load/pose')},
+    scene = Scene({'floor': Box((10, 10, 1), (0, 0, -0.5, 0, 0, 0, 1)),
+                   'load': Box((1, 1, 1), pose_topic='load/pose')},
                   (Pair('down', 'floor', 'load'),))
     solver = SceneSolver(scene, model='exact')
     (pair, contact), = solver([np.array([1.0, 2.0, 0.4, 0, 0, 0, 1])]).named()
@@ -176,7 +177,7 @@ def test_numbers_that_are_no_pose_are_refused(pose, words):
 @pytest.mark.parametrize('pairs', [1, 2])
 def test_what_is_no_pose_is_refused(bad, pairs):
     """With many pairs as with one: nothing is broadcast, and text is no number."""
-    boxes = {name: Box(name, (1.0, 1.0, 1.0), pose_topic=name) for name in 'abc'[:pairs + 1]}
+    boxes = {name: Box((1.0, 1.0, 1.0), pose_topic=name) for name in 'abc'[:pairs + 1]}
     scene = Scene(boxes, (Pair('ab', 'a', 'b'), Pair('bc', 'b', 'c'))[:pairs])
     with pytest.raises(ValueError, match='pose'):
         SceneSolver(scene, model='exact')([bad] + [poses.IDENTITY] * pairs)
@@ -184,7 +185,7 @@ def test_what_is_no_pose_is_refused(bad, pairs):
 
 @pytest.mark.parametrize('pairs', [1, 2])
 def test_as_many_poses_as_boxes_that_move(pairs):
-    boxes = {name: Box(name, (1.0, 1.0, 1.0), pose_topic=name) for name in 'abc'[:pairs + 1]}
+    boxes = {name: Box((1.0, 1.0, 1.0), pose_topic=name) for name in 'abc'[:pairs + 1]}
     scene = Scene(boxes, (Pair('ab', 'a', 'b'), Pair('bc', 'b', 'c'))[:pairs])
     solver = SceneSolver(scene, model='exact')
     assert len(solver([None] * (pairs + 1)).stale) == pairs
@@ -196,13 +197,13 @@ def test_as_many_poses_as_boxes_that_move(pairs):
 def test_a_pair_that_is_listed_twice_is_refused():
     pair = Pair.between('a', 'b')
     with pytest.raises(ValueError, match=r"pairs\[1\].name: the same name as that of 'a' and 'b'"):
-        Scene({name: Box(name, (1, 1, 1)) for name in 'ab'}, (pair, pair))
+        Scene({name: Box((1, 1, 1)) for name in 'ab'}, (pair, pair))
 
 
 def test_a_name_is_no_longer_than_ros_takes():
     """Made names of pairs may be: they are two names."""
     def scene(a, name, frame_id=''):
-        return Scene({each: Box(each, (1, 1, 1)) for each in (a, 'b')}, (Pair(name, a, 'b'),),
+        return Scene({each: Box((1, 1, 1)) for each in (a, 'b')}, (Pair(name, a, 'b'),),
                      frame_id)
 
     assert scene('a' * 255, f'{"a" * 255}_b').pairs[0].label.endswith('a_b')
@@ -211,6 +212,46 @@ def test_a_name_is_no_longer_than_ros_takes():
                              (('a', '', 'ö' * 128), "frame_id: 'ööö")):
         with pytest.raises(ValueError, match=words):
             scene(*arguments)
+
+
+@pytest.mark.parametrize('size, pose', [
+    ((1, 2, 3), (0, 0, 0, 0, 0, 0, 1)), ([1.0, 2.0, 3.0], [0, 0, 0, 0, 0, 0, 1]),
+    (np.array([1, 2, 3]), np.array([0, 0, 0, 0, 0, 0, 1], np.float32))])
+def test_a_box_takes_numbers_of_any_kind(size, pose):
+    """And keeps its own."""
+    box = Box(size, pose)
+    assert box == Box((1.0, 2.0, 3.0), (0.0,) * 6 + (1.0,)) and hash(box)
+    assert Box(size).pose is None
+
+
+@pytest.mark.parametrize('key, value, reason', [
+    ('size', (1, 2, -3), '(1, 2, -3) is not positive'), ('size', (1, 2), 'must be full extents'),
+    ('size', ('1', '1', '1'), 'must be full extents'), ('size', (1, 2, 10**60), 'is outside'),
+    ('pose', (0,) * 7, 'has zero length'), ('pose', (0,) * 6, 'must be a pose'),
+    ('pose', '0000001', 'must be a pose')])
+def test_a_scene_file_refuses_a_box_in_the_words_of_box(tmp_path, key, value, reason):
+    """But for what the schema refuses first: kinds and lengths."""
+    with pytest.raises(SceneError) as refused:
+        Box(**{'size': (1, 1, 1)} | {key: value})
+    fault = refused.value
+    assert fault.path == (key,) and reason in fault.reason
+    assert str(fault) == f'{key}: {fault.reason}'
+    assert str(pickle.loads(pickle.dumps(fault))) == str(fault)
+    path = tmp_path / 'scene.yaml'
+    entry = {'size': [1, 1, 1]} | {key: list(value)}
+    path.write_text(f'boxes: {{a: {{size: [1, 1, 1]}}, b: {entry}}}\npairs: all')
+    with pytest.raises(SceneError) as of_file:
+        read_scene(path)
+    assert of_file.value.path[:3] == ('boxes', 'b', key)
+    if not fault.reason.startswith('must') and min(value) >= 0:
+        assert str(of_file.value) == f'{path}: boxes.b.{key}: {fault.reason}'
+
+
+def test_a_plan_in_which_nothing_moves_is_told_what_to_do():
+    fixed = {name: Box((1, 1, 1), (0, 0, 0, 0, 0, 0, 1)) for name in 'ab'}
+    for asked in ({'pairs': (Pair('ab', 'a', 'b'),)}, {'patterns': EVERY_PAIR}):
+        with pytest.raises(SceneError, match='leave `pose` out of a box that moves, and give its'):
+            Scene(fixed, **asked)
 
 
 def test_two_boxes_is_the_solver():
@@ -234,14 +275,14 @@ class Upwards:
 
 
 def test_a_model_object_answers_a_scene():
-    scene = Scene({name: Box(name, poses.CUBE) for name in 'abc'}, patterns=EVERY_PAIR)
+    scene = Scene({name: Box(poses.CUBE) for name in 'abc'}, patterns=EVERY_PAIR)
     answer = SceneSolver(scene, model=Upwards())(
         [poses.IDENTITY, np.array([1.9, 0, 0, 0, 0, 0, 1]), None])
     assert answer.pairs.tolist() == [[0, 1]] and answer.contacts.normal.tolist() == [[0, 0, 1]]
 
 
 def test_a_solver_can_be_copied_and_pickled():
-    scene = Scene({name: Box(name, poses.CUBE) for name in 'ab'}, patterns=EVERY_PAIR)
+    scene = Scene({name: Box(poses.CUBE) for name in 'ab'}, patterns=EVERY_PAIR)
     solver = SceneSolver(scene, model='exact', margin=1.0)
     where = [poses.IDENTITY, np.array([2.5, 0, 0, 0, 0, 0, 1])]
     for twin in (copy.deepcopy(solver), pickle.loads(pickle.dumps(solver))):
@@ -259,6 +300,6 @@ def test_models_that_do_not_know_a_size_refuse_the_scene():
     ((), 'pairs: a scene needs at least one pair'),
     ((Pair('p', 'a', 'c'),), r"pairs\[0\].b: 'c' is none of the boxes")])
 def test_a_scene_made_in_python_is_checked_too(pairs, words):
-    boxes = {name: Box(name, poses.CUBE) for name in 'ab'}
+    boxes = {name: Box(poses.CUBE) for name in 'ab'}
     with pytest.raises(ValueError, match=words):
         Scene(boxes, pairs)

@@ -31,9 +31,9 @@ from box_contact_ros.view.markers import LABELLED, NAMESPACES, MarkersNode, scen
 SLAB, CUBE = (2.0, 4.0, 1.0), (2.0, 2.0, 2.0)
 STAMP = 1_500_000_000
 HEADER = make_header(STAMP, 'yard')
-YARD = Scene({'slab': Box('slab', SLAB, pose_topic='slab/pose'),
-              's1': Box('s1', CUBE, (1.0, 2.0, 3.0, 0.0, 0.0, 1.2, 1.6)),
-              's2': Box('s2', CUBE, (9.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0))},
+YARD = Scene({'slab': Box(SLAB, pose_topic='slab/pose'),
+              's1': Box(CUBE, (1.0, 2.0, 3.0, 0.0, 0.0, 1.2, 1.6)),
+              's2': Box(CUBE, (9.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0))},
              (Pair.between('slab', 's1'), Pair.between('slab', 's2')))
 CONTACT = Contact(True, -0.0125, np.array([0.0, 0.6, 0.8]), np.array([1.0, 2.0, 3.0]), 0.05,
                   np.eye(3) / 12)
@@ -95,8 +95,8 @@ def test_a_contact_is_point_normal_depth_and_patch():
 
 def test_all_contacts_are_drawn_and_the_deepest_labelled():
     """With normals of their own; ids count from the deepest on."""
-    boxes = {f's{n}': Box(f's{n}', CUBE, (n, 0, 0, 0, 0, 0, 1)) for n in range(30)}
-    boxes['load'] = Box('load', CUBE, pose_topic='load/pose')
+    boxes = {f's{n}': Box(CUBE, (n, 0, 0, 0, 0, 0, 1)) for n in range(30)}
+    boxes['load'] = Box(CUBE, pose_topic='load/pose')
     pairs = tuple(Pair(f'p{n}', 'load', f's{n}') for n in range(30))
     touching = {pair: changed(CONTACT, separation=-1e-3 * n, point=np.full(3, n))
                 for n, pair in enumerate(pairs)}

@@ -167,7 +167,7 @@ def test_contacts_of_another_scene_are_refused():
 def test_the_deepest_contact_comes_first():
     """Near pairs are left out; a model without a patch gives NaN."""
     pairs = tuple(Pair.between('a', b) for b in 'bcd')
-    scene = Scene({name: Box(name, CUBE, pose_topic=name) for name in 'abcd'}, pairs)
+    scene = Scene({name: Box(CUBE, pose_topic=name) for name in 'abcd'}, pairs)
     nothing = changed(EXACT, volume=math.nan, covariance=np.full((3, 3), math.nan))
     apart = changed(EXACT, point=np.full(3, math.nan), separation=0.1)
     message = contacts_at(1, {pairs[0]: EXACT, pairs[1]: changed(nothing, separation=-1.0)})
@@ -452,8 +452,8 @@ def test_the_page_in_a_browser(page, width):
 def test_two_hundred_boxes_in_a_browser():
     """All are drawn, in map coordinates too, and all contacts."""
     places = np.array([(5e5 + 5.0 * (n % 10), 4e6 + 5.0 * (n // 10)) for n in range(100)])
-    boxes = {f'load_{n}': Box(f'load_{n}', CUBE, pose_topic=f'load_{n}/pose') for n in range(100)}
-    boxes |= {f's{n}': Box(f's{n}', CUBE, (*place, 0, 0, 0, 0, 1))
+    boxes = {f'load_{n}': Box(CUBE, pose_topic=f'load_{n}/pose') for n in range(100)}
+    boxes |= {f's{n}': Box(CUBE, (*place, 0, 0, 0, 0, 1))
               for n, place in enumerate(places)}
     pairs = tuple(Pair.between(f'load_{n}', f's{n}') for n in range(100))
     scene = Scene(boxes, pairs)
