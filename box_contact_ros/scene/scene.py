@@ -75,11 +75,14 @@ class Box:
                 raise SceneError((key,), fault)
             object.__setattr__(self, key, tuple(numbers.tolist()))
 
+        if not isinstance(self.pose_topic, str):
+            raise SceneError(('pose_topic',), f'must be text, not {short_repr(self.pose_topic)}')
         keep('size', self.size, 'full extents (3,)', 3, size_fault)
         if self.pose is not None:
             keep('pose', self.pose, 'a pose (x y z qx qy qz qw)', 7, pose_fault)
             if self.pose_topic:
-                raise SceneError(('pose_topic',), 'a box with a pose never moves')
+                raise SceneError(('pose_topic',), f'{short_repr(self.pose_topic)}: a box with a '
+                                                  'pose never moves')
 
 
 class Pair(NamedTuple):
@@ -122,12 +125,7 @@ class Scene:
     patterns: tuple[Pattern, ...] = ()
 
     def __post_init__(self) -> None:
-        fault = name_fault(self.frame_id)
-        if fault:
-            raise SceneError(('frame_id',), fault)
-        for name in self.boxes:
-            if fault := name_fault(name):
-                raise SceneError(('boxes',), fault)
+        _check_kinds(self)
         _check_pairs(self.boxes, self.pairs)
         for number, (a, b) in enumerate(self.patterns):
             _check_pattern(self, number, self.matching(a), self.matching(b))
@@ -274,6 +272,32 @@ def two_boxes(size_a: Sequence[float], size_b: Sequence[float]) -> Scene:
     boxes = {name: Box(size, pose_topic=f'{name}/pose')
              for name, size in (('box_a', size_a), ('box_b', size_b))}
     return Scene(boxes, (Pair('', 'box_a', 'box_b'),))
+
+
+def _check_kinds(scene: Scene) -> None:
+    """Raise SceneError for the first field of a scene that is of another kind."""
+    def check(is_kind: bool, path: KeyPath, kind: str, value: object) -> None:
+        if not is_kind:
+            raise SceneError(path, f'must be {kind}, not {short_repr(value)}')
+
+    check(isinstance(scene.boxes, Mapping), ('boxes',), 'boxes by name', scene.boxes)
+    for name, box in scene.boxes.items():
+        check(isinstance(name, str), ('boxes',), 'boxes by name', scene.boxes)
+        check(isinstance(box, Box), ('boxes', name), 'a Box', box)
+    for part in ('pairs', 'patterns'):
+        rows = getattr(scene, part)
+        check(isinstance(rows, tuple | list), (part,), f'a tuple of {part}', rows)
+        for number, row in enumerate(rows):
+            check(isinstance(row, Pair) if part == 'pairs' else len(row) == 2, (part, number),
+                  'a Pair' if part == 'pairs' else 'the names a and b', row)
+            for value in row:
+                check(isinstance(value, str), (part, number), 'of text', row)
+    check(isinstance(scene.frame_id, str), ('frame_id',), 'text', scene.frame_id)
+    check(isinstance(scene.pose_array, bool), ('pose_array',), 'True or False', scene.pose_array)
+    for path, names in ((('frame_id',), (scene.frame_id,)), (('boxes',), scene.boxes)):
+        for name in names:
+            if fault := name_fault(name):
+                raise SceneError(path, fault)
 
 
 def _check_pairs(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:

@@ -62,7 +62,7 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
     Raises SceneError, a ValueError whose words name file and field.
     """
     if not isinstance(path, str | os.PathLike) or not _is_name(os.fspath(path)):
-        raise SceneError(f'path must be that of a file, not {short_repr(path)}')
+        raise SceneError(('path',), f'must be that of a file, not {short_repr(path)}')
     try:
         text = _read(find_file(path))
         _check_yaml(text)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from box_contact_ros import (
     PatchForces,
     Scene,
     SceneSolver,
+    make_model,
     read_scene,
 )
 
@@ -31,7 +33,7 @@ SOLVER = ContactSolver(UNIT, UNIT)
 BODY = Body.of_box(UNIT, 1.0)
 FORCES = PatchForces([BODY, BODY])
 CONTACTS = SOLVER.batch(POSES[:1], POSES[1:])
-BOXES = {name: Box(name, UNIT) for name in 'ab'}
+BOXES = {name: Box(UNIT) for name in 'ab'}
 PAIR = Pair.between('a', 'b')
 SCENE = SceneSolver(Scene(BOXES, (PAIR,)))
 NAN, INF = math.nan, math.inf
@@ -43,7 +45,7 @@ def body(mass: Any = 1.0, inertia: Any = UNIT, **more: Any) -> Body:
 
 def hold(pairs: Any = ((0, 1),), contacts: Any = CONTACTS, poses: Any = POSES, *,
          field: str = '', value: Any = None, **more: Any) -> None:
-    given = contacts._replace(**{field: np.array([value], float)}) if field else contacts
+    given = replace(contacts, **{field: np.array([value], float)}) if field else contacts
     FORCES.hold(pairs, given, poses, **more)
 
 
@@ -57,7 +59,7 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: ContactSolver(UNIT, UNIT, model='mpl'), 'model', "'mpl'"),
     (lambda: ContactSolver(UNIT, UNIT, margin='far'), 'margin', "'far'"),
     (lambda: ContactSolver(UNIT, UNIT, margin=NAN), 'margin', 'nan'),
-    (lambda: ContactSolver(UNIT, UNIT, weights=5), 'weights', '5'),
+    (lambda: make_model('mlp', weights=5), 'weights', '5'),
     (lambda: SOLVER(POSE, 'pose'), 'pose_b', "'pose'"),
     (lambda: SOLVER(POSE[:6], POSE), 'pose_a', '(6,)'),
     (lambda: SOLVER.batch(POSES, POSES * NAN), 'poses_b[0]', 'nan'),
@@ -100,8 +102,7 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: hold([(0.0, 1.0)]), 'pairs', '(0.0, 1.0)'),
     (lambda: hold([(0, 2)]), 'pairs[0]', 'no body 2'),
     (lambda: hold([(1, 1)]), 'pairs[0]', 'body 1'),
-    (lambda: hold([(0, 1), (1, 0)], Contacts(*(np.repeat(rows, 2, axis=0) for rows in CONTACTS))),
-     'pairs', 'twice'),
+    (lambda: hold([(0, 1), (1, 0)], Contacts.of([*CONTACTS, *CONTACTS])), 'pairs', 'twice'),
     (lambda: hold(contacts=None), 'contacts', 'None'),
     (lambda: hold(poses=POSES[:1]), 'poses', '(1, 7)'),
     (lambda: hold(poses=POSES * [1, 1, 1, 0, 0, 0, 0]), 'poses[0]', '(0, 0, 0, 0)'),
@@ -130,11 +131,11 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: FORCES.wrenches(0.1, POSES, STILL, STILL + NAN), 'wrenches[0]', 'nan'),
     (lambda: FORCES.wrenches(0.1, POSES, STILL[:, :5]), 'velocities', '(2, 5)'),
 
-    (lambda: Box('a', (1, 2, -1)), 'boxes.a.size', '(1, 2, -1)'),
-    (lambda: Box('a', ('1', '2', '3')), 'boxes.a.size', "('1', '2', '3')"),
-    (lambda: Box('a', UNIT, (0,) * 7), 'boxes.a.pose', 'w=0'),
-    (lambda: Box('a', UNIT, pose_topic=5), 'boxes.a.pose_topic', '5'),
-    (lambda: scene(boxes=[BOXES['a']]), 'boxes', "name='a'"),
+    (lambda: Box((1, 2, -1)), 'size', '(1, 2, -1)'),
+    (lambda: Box(('1', '2', '3')), 'size', "('1', '2', '3')"),
+    (lambda: Box(UNIT, (0,) * 7), 'pose', 'w=0'),
+    (lambda: Box(UNIT, pose_topic=5), 'pose_topic', '5'),
+    (lambda: scene(boxes=[BOXES['a']]), 'boxes', 'size='),
     (lambda: scene(boxes={'a': None}), 'boxes.a', 'None'),
     (lambda: scene(pairs=None), 'pairs', 'None'),
     (lambda: scene(pairs=(('a', 'b'),)), 'pairs[0]', "('a', 'b')"),
@@ -193,8 +194,8 @@ def test_the_limits_themselves_are_accepted() -> None:
     """Bodies of 1e-50 and 1e50 kg, moments of a rod, a normal and a covariance that are rounded."""
     light, heavy = (Body(mass=mass, inertia=(mass, mass, mass)) for mass in (1e-50, 1e50))
     rod = body(inertia=(1.0, 1.0, 2.0 * (1.0 + 4e-10)))
-    thin = CONTACTS._replace(normal=np.array([(0, 0, 1.0 + 5e-7)]),
-                             covariance=np.array([np.diag([1.0, 1.0, -1e-9])]))
+    thin = replace(CONTACTS, normal=np.array([(0, 0, 1.0 + 5e-7)]),
+                   covariance=np.array([np.diag([1.0, 1.0, -1e-9])]))
     for bodies in ([light, heavy], [light, light], [heavy, heavy], [rod, rod]):
         forces = PatchForces(bodies)
         forces.hold([(0, 1)], thin, POSES)

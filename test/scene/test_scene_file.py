@@ -147,7 +147,7 @@ def test_files_that_cannot_be_read(tmp_path):
                         (tmp_path, 'cannot be read: it is not a regular file'),
                         (tmp_path / 'pipe', 'cannot be read: it is not a regular file'),
                         (tmp_path / 'large', 'cannot be read: it has more than 67108864 bytes'),
-                        (tmp_path / 'null\0', 'path must be that of a file'),
+                        (tmp_path / 'null\0', 'path: must be that of a file'),
                         (tmp_path / 'latin', "codec can't decode byte")):
         with pytest.raises(SceneError, match=words):
             read_scene(path)
