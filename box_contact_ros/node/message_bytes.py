@@ -4,18 +4,17 @@
 """Messages as the bytes that are sent (CDR), without message objects: poses in, contacts out.
 
 Poses are read by what CDR promises, whichever middleware wrote them. All other bytes are refused.
-Here, and nowhere else in the node, a pose is judged.
+What a pose is, the core decides.
 Bytes halve the latency: docs/contributing/decisions/contact-node.md.
 """
 from __future__ import annotations
 
 import struct
 from functools import lru_cache
-from math import hypot
 
 import numpy as np
 
-from ..core import LENGTH_MAX, QUATERNION_MAX, QUATERNION_MIN, native
+from ..core import native
 from ..scene.pairing import StampedPose
 from ..scene.scene import Pair, Scene
 from ..scene.scene_solver import Answer
@@ -43,8 +42,6 @@ MOST_NAMES = 2**16
 """Pairs whose names are kept as bytes, some 10 MB."""
 FRAME_AT = _HEAD.size + 4
 """Where frame_id's characters are: behind stamp and length."""
-_LEAST, _MOST = 2.0 * QUATERNION_MIN, 0.5 * QUATERNION_MAX
-"""Norms of quaternions that are certainly good, whatever the rounding."""
 _new_tuple = tuple.__new__  # a named tuple's own constructor is Python code
 
 
@@ -118,15 +115,13 @@ class PoseReader:
     def read_pose(self, data: bytes) -> StampedPose:
         """Return the pose of a serialised PoseStamped, or raise Refused."""
         try:
-            order, sec, nanosec, frame, x, y, z, qx, qy, qz, qw = self._unpack(data)
+            order, sec, nanosec, frame, *_ = fields = self._unpack(data)
         except struct.error:  # another length
             return self._read_slowly(data)
-        # What is certainly good passes here (NaN fails every comparison); the rest is looked at.
+        numbers = fields[4:]
         if (frame == self._frame and order == LITTLE and nanosec < NANOSECONDS
-                and hypot(x, y, z) < LENGTH_MAX
-                and _LEAST < hypot(qx, qy, qz, qw) < _MOST):
-            return _new_tuple(StampedPose, ((x, y, z, qx, qy, qz, qw), self._frame_id,
-                                            sec * NANOSECONDS + nanosec))
+                and not native.pose_fault(numbers)):
+            return _new_tuple(StampedPose, (numbers, self._frame_id, sec * NANOSECONDS + nanosec))
         return self._read_slowly(data)
 
     def _read_slowly(self, data: bytes) -> StampedPose:

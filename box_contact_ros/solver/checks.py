@@ -3,7 +3,8 @@
 
 """What is accepted as a pose and as a size, and the words in which the rest is refused.
 
-The limits are those of the core (core/src/poses.hpp). Every refusal names the field and the value.
+The limits are those of the core (core/src/poses.hpp), which judges poses. Every refusal names the
+field and the value.
 """
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core import LENGTH_MAX, LENGTH_MIN, QUATERNION_MAX, QUATERNION_MIN
+from ..core import LENGTH_MAX, LENGTH_MIN, QUATERNION_MAX, native
 
 SHOWN = 200  # characters of a refused value that an error shows
 MOST_NAME_BYTES = 255
@@ -57,25 +58,21 @@ def name_fault(name: str) -> str | None:
     return f'{short_repr(name)} has {size} bytes, more than {MOST_NAME_BYTES}'
 
 
+_POSITION, _QUATERNION = ('position ({0:g}, {1:g}, {2:g})',
+                          'quaternion (x={3:g}, y={4:g}, z={5:g}, w={6:g})')
+_POSE_FAULTS = ('', f'{_POSITION} is not finite', f'{_POSITION} exceeds {LENGTH_MAX:g} m',
+                f'{_QUATERNION} is not finite', f'{_QUATERNION} has zero length',
+                f'{_QUATERNION} is longer than {QUATERNION_MAX:g}')
+"""By the codes of core/binding/pose_faults.hpp, which decides what a pose is."""
+
+
 def pose_fault(pose: Sequence[float] | np.ndarray) -> str | None:
     """Return why 7 numbers `x y z qx qy qz qw` are not a pose, or None.
 
     A quaternion may have any length within the limits.
     """
-    x, y, z, qx, qy, qz, qw = (float(value) for value in pose)
-    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
-        return f'position ({x:g}, {y:g}, {z:g}) is not finite'
-    if max(abs(x), abs(y), abs(z)) > LENGTH_MAX:
-        return f'position ({x:g}, {y:g}, {z:g}) exceeds {LENGTH_MAX:g} m'
-    text = f'quaternion (x={qx:g}, y={qy:g}, z={qz:g}, w={qw:g})'
-    if not all(math.isfinite(value) for value in (qx, qy, qz, qw)):
-        return f'{text} is not finite'
-    norm2 = (qx * qx + qy * qy) + (qz * qz + qw * qw)  # to the bit as the core has it
-    if norm2 < QUATERNION_MIN * QUATERNION_MIN:
-        return f'{text} has zero length'
-    if norm2 > QUATERNION_MAX * QUATERNION_MAX:
-        return f'{text} is longer than {QUATERNION_MAX:g}'
-    return None
+    fault = native.pose_fault(pose)
+    return _POSE_FAULTS[fault].format(*map(float, pose)) if fault else None
 
 
 def absent_poses(poses: np.ndarray) -> np.ndarray:
@@ -85,12 +82,7 @@ def absent_poses(poses: np.ndarray) -> np.ndarray:
 
 def are_poses(poses: np.ndarray) -> np.ndarray:
     """Return which rows (n, 7) are poses: those in which `pose_fault` finds nothing."""
-    qx, qy, qz, qw = poses[:, 3:].T
-    with np.errstate(over='ignore', invalid='ignore'):
-        norm2 = (qx * qx + qy * qy) + (qz * qz + qw * qw)
-        return ((np.abs(poses[:, :3]).max(axis=1) <= LENGTH_MAX)
-                & (norm2 >= QUATERNION_MIN * QUATERNION_MIN)
-                & (norm2 <= QUATERNION_MAX * QUATERNION_MAX))
+    return native.pose_faults(poses) == 0
 
 
 def size_fault(size: Sequence[float] | np.ndarray) -> str | None:

@@ -7,6 +7,7 @@
 #include "forces.hpp"
 #include "pair_solver.hpp"
 #include "patch_area.hpp"
+#include "pose_faults.hpp"
 #include "probes.hpp"
 
 namespace {
@@ -28,6 +29,10 @@ PyMethodDef module_methods[] = {
      "Return the instruction sets that were built and that this machine can run, best last."},
     {"use_contacts", method<use_contacts>(), METH_O,
      "use_contacts(type)\n--\n\nSet the class of what batches return: with a slot for each field."},
+    {"pose_fault", method<pose_fault>(), METH_O,
+     "pose_fault(pose)\n--\n\nReturn why seven numbers are no pose, a PoseFault; 0 if they are."},
+    {"pose_faults", method<pose_faults>(), METH_O,
+     "pose_faults(poses)\n--\n\nReturn the same of poses (n, 7), (n,)."},
     {"write_poses", method<write_poses>(), METH_FASTCALL,
      "write_poses(to, rows, poses)\n--\n\n"
      "Write a list of poses (7,), or None for NaN, to rows (n,) of an array (m, 7).\n\n"
