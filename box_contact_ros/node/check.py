@@ -14,10 +14,11 @@ import numpy as np
 from box_contact_msgs.srv import Check
 
 from ..models import most_near
+from ..scene.pairing import frames_differ
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import name_fault, nearest_name, pose_fault, short_repr, size_fault
 from ..solver.contact_solver import ContactSolver
-from .messages import contact_message, frames_differ
+from .messages import contact_message
 
 MOST_BOXES = 256
 MOST_PAIRS = 4096

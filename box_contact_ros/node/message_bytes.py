@@ -115,10 +115,9 @@ class PoseReader:
     def read_pose(self, data: bytes) -> StampedPose:
         """Return the pose of a serialised PoseStamped, or raise Refused."""
         try:
-            order, sec, nanosec, frame, *_ = fields = self._unpack(data)
+            order, sec, nanosec, frame, *numbers = self._unpack(data)
         except struct.error:  # another length
             return self._read_slowly(data)
-        numbers = fields[4:]
         if (frame == self._frame and order == LITTLE and nanosec < NANOSECONDS
                 and not native.pose_fault(numbers)):
             return _new_tuple(StampedPose, (numbers, self._frame_id, sec * NANOSECONDS + nanosec))

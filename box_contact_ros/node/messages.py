@@ -33,14 +33,6 @@ class Refused(ValueError):
         self.reason = reason
 
 
-def frames_differ(first: str, frame: str, other: str, other_frame: str) -> str:
-    """Return the refusal of what is in another frame than the first, and what to do."""
-    advice = ('the leading slash is the difference' if frame.lstrip('/') == other_frame.lstrip('/')
-              else 'send all poses in one frame')
-    return (f'{first} is in frame {short_repr(frame)}, {other} in {short_repr(other_frame)}: '
-            f'{advice}')
-
-
 def make_header(stamp: int, frame_id: str) -> Header:
     """Return the header of a stamp [ns]."""
     return Header(stamp=Time(sec=stamp // NANOSECONDS, nanosec=stamp % NANOSECONDS),

@@ -15,13 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from ..scene.pairing import NEVER, OVERTAKEN, PAIRINGS, Pairing, StampedPose, Tick
+from ..scene.pairing import OVERTAKEN, PAIRINGS, Pairing, StampedPose, Tick
 from ..scene.scene import ALL_BOXES
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import absent_poses, are_poses, pose_fault
 from .diagnostics import TickMonitor
 from .message_bytes import VECTOR_BYTES, ContactWriter, PoseReader, aligned, header_bytes
-from .messages import NANOSECONDS, Refused, frames_differ
+from .messages import NANOSECONDS, Refused
 from .parameters import reason_of
 from .topics import PoseCallback, SceneTopics
 
@@ -111,7 +111,7 @@ class TickAnswerer:
                 return
             for tick in ticks:
                 try:
-                    self._answer(tick, arrived)
+                    self._answer(Tick.of(self.solver.scene, tick), arrived)
                 except Exception as error:  # one tick that is refused keeps back no other
                     self._refuse(error, topic)
         return callback
@@ -143,18 +143,16 @@ class TickAnswerer:
 
         arrived: when the pose came that completes the tick, by the wall clock [ns]; 0: unknown.
         """
-        is_array = self.solver.scene.pose_array
-        stamp, frame_id = self._header_of(tick)
         started = time.perf_counter_ns()
-        answer = self.solver(tick[0].numbers if is_array and tick[0] is not None
-                             else [pose and pose.numbers for pose in tick])
+        answer = self.solver(tick.poses)
         took = time.perf_counter_ns() - started
-        header = head = header_bytes(stamp, frame_id)
+        header = head = header_bytes(tick.stamp, tick.frame_id)
         touching, of_pair = answer.touching, self._topics.of_pair
         points, normals = answer.contacts.point.tobytes(), answer.contacts.normal.tobytes()
         for row, (a, b) in enumerate(answer.pairs.tolist()[:touching] if of_pair else ()):
             if self._stamps_differ:
-                head = header_bytes(self._newest_stamp(tick, a, b), frame_id)
+                newest = max([tick.stamps[side] for side in self._sides[a, b]])
+                head = header_bytes(newest, tick.frame_id)
             start, numbers = aligned(head), slice(VECTOR_BYTES * row, VECTOR_BYTES * (row + 1))
             publishers = of_pair[a, b]
             publishers[0].publish(start + points[numbers])
@@ -163,37 +161,12 @@ class TickAnswerer:
         # What nobody waits for comes last. A box that an array leaves out is not there: nobody
         # asks for its pairs.
         age = time.time_ns() - arrived if arrived else 0
+        is_array = self.solver.scene.pose_array
         self._monitor.evaluated(took, age, [] if is_array else answer.named_stale())
         counts = self._counts
         counts['contacts'] += touching
         counts['evaluations'] += 1
         counts['stale pairs'] += len(answer.stale)
-
-    def _newest_stamp(self, tick: Tick, a: int, b: int) -> int:
-        """Return the newer stamp [ns] of the poses of a pair that has topics."""
-        return max([pose.stamp for side in self._sides[a, b] if (pose := tick[side])])
-
-    def _header_of(self, tick: Tick) -> tuple[int, str]:
-        """Return the newest stamp [ns] of a tick and its frame; raise Refused if frames differ."""
-        stamp, frame_id = NEVER, self.solver.scene.frame_id or None
-        for pose in tick:
-            if pose is not None:
-                if frame_id is None:
-                    frame_id = pose.frame_id
-                elif pose.frame_id != frame_id:
-                    raise Refused('frame_id differs', self._frames(tick, pose))
-                if pose.stamp > stamp:
-                    stamp = pose.stamp
-        return stamp, frame_id or ''
-
-    def _frames(self, tick: Tick, odd: StampedPose) -> str:
-        """Describe the frame of a tick, by the scene or the first box, and that of a pose."""
-        scene = self.solver.scene
-        known = [(box, pose) for box, pose in zip(scene.streams, tick) if pose is not None]
-        first, frame = ('the scene', scene.frame_id) if scene.frame_id else (
-            known[0][0], known[0][1].frame_id)
-        box = next(box for box, pose in known if pose is odd)
-        return frames_differ(first, frame, box, odd.frame_id)
 
     def _refuse(self, error: Exception, topic: str, box: str = '') -> None:
         """Count what was refused, and hand it to the next report."""

@@ -62,6 +62,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..solver.checks import short_repr
 from .scene import ALL_BOXES, Scene
 
 PATIENCE = 5
@@ -98,8 +99,53 @@ class Rejection(NamedTuple):
     newest: int  # newest stamp of the box so far [ns]
 
 
-Tick = list['StampedPose | None']
+TickPoses = list['StampedPose | None']
 """A pose of each of `scene.streams`, None for a box that has none recent enough."""
+
+
+class Tick(NamedTuple):
+    """Poses that belong together, as a `SceneSolver` takes them."""
+
+    stamp: int  # the newest of its poses [ns]
+    frame_id: str
+    poses: Any
+    """Seven floats of each of `scene.moving`, None for a box that has none recent enough; of a
+    message of all poses an array (n, 7), NaN instead of None."""
+    stamps: list[int]  # of each of `scene.streams` [ns], NEVER for a box that has no pose
+
+    @classmethod
+    def of(cls, scene: Scene, poses: TickPoses) -> Tick:
+        """Return the tick of poses; raises FramesDiffer."""
+        frame_id = scene.frame_id or None
+        for pose in poses:
+            if pose is not None and pose.frame_id != frame_id:
+                if frame_id is not None:
+                    raise FramesDiffer(scene, poses, pose)
+                frame_id = pose.frame_id
+        stamps = [NEVER if pose is None else pose.stamp for pose in poses]
+        numbers = [pose and pose.numbers for pose in poses]
+        return cls(max(stamps), frame_id or '', numbers[0] if scene.pose_array else numbers, stamps)
+
+
+class FramesDiffer(ValueError):
+    """A tick whose poses are in several frames."""
+
+    reason = 'frame_id differs'
+
+    def __init__(self, scene: Scene, poses: TickPoses, odd: StampedPose) -> None:
+        known = [(box, pose) for box, pose in zip(scene.streams, poses) if pose is not None]
+        first, frame = ('the scene', scene.frame_id) if scene.frame_id else (
+            known[0][0], known[0][1].frame_id)
+        box = next(box for box, pose in known if pose is odd)
+        super().__init__(frames_differ(first, frame, box, odd.frame_id))
+
+
+def frames_differ(first: str, frame: str, other: str, other_frame: str) -> str:
+    """Return the refusal of what is in another frame than the first, and what to do."""
+    advice = ('the leading slash is the difference' if frame.lstrip('/') == other_frame.lstrip('/')
+              else 'send all poses in one frame')
+    return (f'{first} is in frame {short_repr(frame)}, {other} in {short_repr(other_frame)}: '
+            f'{advice}')
 
 
 def _remembered() -> deque[int]:
@@ -153,7 +199,7 @@ class Pairing(ABC):
         self._behind: set[str] = set()  # boxes that have begun anew behind the others
 
     @abstractmethod
-    def add(self, box: str, pose: StampedPose) -> list[Tick]:
+    def add(self, box: str, pose: StampedPose) -> list[TickPoses]:
         """Take a pose; return the ticks that can be answered now, in their order."""
 
     def reset(self, kept: Collection[str] = ()) -> None:
@@ -252,7 +298,7 @@ class StampPairing(Pairing):
                 self._whole.pop(key, None)
         self._newest_missed = NEVER
 
-    def add(self, box: str, pose: StampedPose) -> list[Tick]:
+    def add(self, box: str, pose: StampedPose) -> list[TickPoses]:
         """Take a pose; return the ticks that await nothing any more, in their order."""
         stamp = pose.stamp
         state = self._state_at(box, stamp)
@@ -348,7 +394,7 @@ class StampPairing(Pairing):
         gap = min(state.gaps, default=1)
         return gap - 1 <= tick.number - state.heard_at < gap + PATIENCE
 
-    def _answer(self, key: int) -> Tick:
+    def _answer(self, key: int) -> TickPoses:
         """Remove a tick from those that wait, and return its poses."""
         poses = self._waiting.pop(key).poses
         self._whole.pop(key, None)
@@ -376,7 +422,7 @@ class LatestPairing(Pairing):
         super().reset(kept)
         self._can_answer = False
 
-    def add(self, box: str, pose: StampedPose) -> list[Tick]:
+    def add(self, box: str, pose: StampedPose) -> list[TickPoses]:
         """Take a pose; return the tick that it makes, once both boxes of a pair have been seen."""
         stamp = pose.stamp
         state = self._state_at(box, stamp)
