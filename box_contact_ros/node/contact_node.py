@@ -66,7 +66,7 @@ NAMED_TOPICS = 3  # how many pose topics the node names when it is ready
 
 
 def model(name: str, value: Any) -> str:
-    """Check the name of a model."""
+    """Validate the name of a model."""
     check_model(name, text(name, value))
     return str(value)
 
@@ -91,14 +91,15 @@ PARAMETERS = {
 
 
 def live_model(name: str, value: Any) -> str:
-    """Check the name of a model that a running node takes: one in C++, ready at once."""
+    """Validate the name of a model that a running node takes: one in C++, ready at once."""
     if model(name, value) not in NATIVE:
         raise ValueError(f'{name} {value!r} needs a new start: a running node takes '
                          f'{" or ".join(NATIVE)}')
     return str(value)
 
 
-LIVE = {'model': live_model} | {name: PARAMETERS[name].check for name in ('tolerance', 'max_age')}
+LIVE = {'model': live_model} | {
+    name: PARAMETERS[name].validate for name in ('tolerance', 'max_age')}
 """The parameters that may be set while the node runs, and what they may be then; none of them
 touches a topic."""
 
@@ -230,7 +231,7 @@ class ContactNode(GuardedNode, LifecycleNode):
         """Take new values of LIVE, all or none; rclpy refuses those that are read-only."""
         try:
             checks = LIVE if self._answerer is not None else {
-                name: setting.check for name, setting in self.parameters.items()}
+                name: setting.validate for name, setting in self.parameters.items()}
             given = {parameter.name: checks[parameter.name](parameter.name, parameter.value)
                      for parameter in parameters if parameter.name in LIVE}
             values = {**self._values, **given}

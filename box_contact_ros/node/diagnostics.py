@@ -18,7 +18,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
-from ..scene.pairing import OLD, OVERTAKEN, REPEATED, RESETS, TOO_LATE, Pairing, Rejection
+from ..scene.pairing import OLD, OVERTAKEN, REPEATED, RESETS, TOO_LATE, Pairing, RejectedPose
 from ..scene.scene import Pair, Scene
 from .messages import make_header
 from .topics import SceneTopics
@@ -313,7 +313,7 @@ def _without_partner(unmatched: Sequence[Pair], pairing: Pairing) -> Finding:
     return Finding('alone', message, 'none could be answered, as no tick had all its boxes')
 
 
-def _rejection_line(reason: str, rejection: Rejection) -> str:
+def _rejection_line(reason: str, rejection: RejectedPose) -> str:
     """Return the log line, with its remedy, of what the pairing did to a pose."""
     box = rejection.box
     stamp, newest = (f'{1e-9 * value:.12g} s' for value in (rejection.stamp, rejection.newest))

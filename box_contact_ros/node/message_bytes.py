@@ -19,7 +19,7 @@ from ..scene.pairing import StampedPose
 from ..scene.scene import Pair, Scene
 from ..scene.scene_solver import Answer
 from ..solver.checks import MOST_NAME_BYTES, pose_fault
-from .messages import NANOSECONDS, Refused
+from .messages import NANOSECONDS, MessageError
 
 ENCAPSULATION = 4
 """Bytes before the body: two name its kind, two are options, which say nothing about a pose."""
@@ -51,25 +51,27 @@ def numbers_at(length: int) -> int:
 
 
 def parse_pose(data: bytes) -> tuple[tuple[float, ...], str, int, int]:
-    """Return numbers, frame_id, seconds and nanoseconds of a PoseStamped, or raise Refused."""
+    """Return numbers, frame_id, seconds and nanoseconds of a PoseStamped, or raise MessageError."""
     order, sec, nanosec, length = _parse_head(data, 'PoseStamped')
     at = numbers_at(length)
     if not 0 <= len(data) - (at + _POSE.size) <= _PADDING:
-        raise Refused('not a PoseStamped',
-                      f'{len(data)} bytes, where a frame_id of {length} needs {at + _POSE.size}')
+        raise MessageError('not a PoseStamped',
+                           f'{len(data)} bytes, where a frame_id of {length} needs '
+                           f'{at + _POSE.size}')
     frame_id = _parse_frame(data, length, 'PoseStamped')
     return struct.unpack_from(f'{order}7d', data, at), frame_id, sec, nanosec
 
 
 def parse_poses(data: bytes) -> tuple[np.ndarray, str, int, int]:
-    """Return numbers (n, 7), frame_id, seconds and nanoseconds of a PoseArray, or raise Refused."""
+    """Return the same of a PoseArray, numbers (n, 7), or raise MessageError."""
     order, sec, nanosec, length = _parse_head(data, 'PoseArray')
     count_at = -(-(FRAME_AT + length) // 4) * 4
     count = struct.unpack_from(f'{order}I', data, count_at)[0] if count_at + 4 <= len(data) else 0
     at = ENCAPSULATION + -(-count_at // 8) * 8 if count else count_at + 4
     if not 0 <= len(data) - (at + count * _POSE.size) <= _PADDING:
-        raise Refused('not a PoseArray', f'{len(data)} bytes, where {count} poses with a frame_id '
-                                         f'of {length} need {at + count * _POSE.size}')
+        raise MessageError('not a PoseArray', f'{len(data)} bytes, where {count} poses with a '
+                                              f'frame_id of {length} need '
+                                              f'{at + count * _POSE.size}')
     numbers = np.frombuffer(data, f'{order}f8', 7 * count, at).reshape(count, 7).astype(np.float64)
     return numbers, _parse_frame(data, length, 'PoseArray'), sec, nanosec
 
@@ -77,30 +79,33 @@ def parse_poses(data: bytes) -> tuple[np.ndarray, str, int, int]:
 def _parse_head(data: bytes, message: str) -> tuple[str, int, int, int]:
     """Return the order of bytes, seconds, nanoseconds, and the length of frame_id."""
     if len(data) < FRAME_AT:
-        raise Refused(f'not a {message}', f'{len(data)} bytes, where a header needs {FRAME_AT}')
+        raise MessageError(f'not a {message}',
+                           f'{len(data)} bytes, where a header needs {FRAME_AT}')
     order = _ORDERS.get(data[:2])
     if order is None:
-        raise Refused(f'not a {message}', f'encapsulation 0x{data[:2].hex()} is neither CDR_BE '
-                                          '(0x0000) nor CDR_LE (0x0001): let its sender use XCDR1')
+        raise MessageError(f'not a {message}',
+                           f'encapsulation 0x{data[:2].hex()} is neither CDR_BE (0x0000) nor '
+                           'CDR_LE (0x0001): let its sender use XCDR1')
     return (order, *struct.unpack_from(f'{order}iII', data, ENCAPSULATION))
 
 
 def _parse_frame(data: bytes, length: int, message: str) -> str:
     frame = data[FRAME_AT:FRAME_AT + length]
     if length and frame.find(b'\0') != length - 1:
-        raise Refused(f'not a {message}', 'frame_id does not end with its first zero')
+        raise MessageError(f'not a {message}', 'frame_id does not end with its first zero')
     if length > MOST_NAME_BYTES + 1:  # with its zero
-        raise Refused('bad header', f'frame_id has {length - 1} bytes, more than {MOST_NAME_BYTES}')
+        raise MessageError('bad header',
+                           f'frame_id has {length - 1} bytes, more than {MOST_NAME_BYTES}')
     try:
         return frame[:-1].decode('utf-8')
     except UnicodeDecodeError:
-        raise Refused('bad header', f'frame_id {frame[:-1][:100]!r} is not UTF-8') from None
+        raise MessageError('bad header', f'frame_id {frame[:-1][:100]!r} is not UTF-8') from None
 
 
 def _stamp(sec: int, nanosec: int) -> int:
-    """Return a stamp [ns], or raise Refused."""
+    """Return a stamp [ns], or raise MessageError."""
     if nanosec >= NANOSECONDS:
-        raise Refused('bad header', f'stamp has {nanosec} nanoseconds, a second or more')
+        raise MessageError('bad header', f'stamp has {nanosec} nanoseconds, a second or more')
     return sec * NANOSECONDS + nanosec
 
 
@@ -113,7 +118,7 @@ class PoseReader:
         self._unpack = struct.Struct(_LAYOUT.format(0, 0)).unpack
 
     def read_pose(self, data: bytes) -> StampedPose:
-        """Return the pose of a serialised PoseStamped, or raise Refused."""
+        """Return the pose of a serialised PoseStamped, or raise MessageError."""
         try:
             order, sec, nanosec, frame, *numbers = self._unpack(data)
         except struct.error:  # another length
@@ -129,7 +134,7 @@ class PoseReader:
         stamp = _stamp(sec, nanosec)
         fault = pose_fault(numbers)
         if fault:
-            raise Refused('bad pose', fault)
+            raise MessageError('bad pose', fault)
         if data[:2] == LITTLE:
             length = int.from_bytes(data[FRAME_AT - 4:FRAME_AT], 'little')  # 0 or 1 of an empty one
             start, end = FRAME_AT - 4, FRAME_AT + length
@@ -139,7 +144,7 @@ class PoseReader:
         return StampedPose(numbers, frame_id, stamp)
 
     def read_poses(self, data: bytes) -> StampedPose:
-        """Return all poses of a serialised PoseArray, numbers (n, 7), or raise Refused.
+        """Return all poses of a serialised PoseArray, numbers (n, 7), or raise MessageError.
 
         A row may be no pose: the box of that row has none.
         """

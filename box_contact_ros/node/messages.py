@@ -25,7 +25,7 @@ UPPER = np.triu_indices(3)
 """Places of the six numbers of a message's covariance: xx xy xz yy yz zz."""
 
 
-class Refused(ValueError):
+class MessageError(ValueError):
     """A message that is not taken; `reason` is what it is counted as."""
 
     def __init__(self, reason: str, text: str) -> None:
@@ -62,7 +62,7 @@ def contacts_by_pair(message: Any) -> dict[str, Contact]:
 def read_answer(message: Any, scene: Scene) -> Answer:
     """Return the answer that a `Contacts` message tells, as a `SceneSolver` gives it.
 
-    scene: that of the node. Raises Refused for a pair that the scene lacks.
+    scene: that of the node. Raises MessageError for a pair that the scene lacks.
     """
     index, rows = scene.index_of, {pair.label: row for pair, row in zip(scene.pairs, scene.rows)}
     if scene.patterns:
@@ -73,8 +73,8 @@ def read_answer(message: Any, scene: Scene) -> Answer:
                              for entry, pair in zip(entries, pairs)),
                            *((name, name in rows) for name in message.stale)):
         if not is_known:
-            raise Refused('unknown pair', f'{short_repr(name)} is no pair of the scene: read the '
-                                          'scene file that the node has')
+            raise MessageError('unknown pair', f'{short_repr(name)} is no pair of the scene: read '
+                                               'the scene file that the node has')
     boxes, stale = (np.array(part, np.int64).reshape(-1, 2)
                     for part in (pairs, [rows[name] for name in message.stale]))
     return Answer(boxes, Contacts.of([_contact(entry) for entry in entries]), len(boxes), stale,

@@ -3,7 +3,7 @@
 
 """The parameters of a node as one table: checked, declared to rclpy, and listed by `--help`.
 
-Parameters are declared with dynamic typing. So the check of each one refuses a value of another
+Parameters are declared with dynamic typing. So the validator of each one refuses a value of another
 type, and not rclpy. Where a double is meant, 200 is as good as 200.0.
 """
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..arguments import program_parser
 from ..solver.checks import nearest_name, short_repr, size_fault
 from .rclpy_workarounds import parameter_overrides
 
-Check = Callable[[str, Any], Any]
+Validator = Callable[[str, Any], Any]
 """From a parameter's name and value to the value as the node uses it; ValueError if it is wrong."""
 
 
@@ -30,36 +30,36 @@ class Setting:
 
     default: Any
     description: str
-    check: Check
+    validate: Validator
 
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-def number(low: float, high: float) -> Check:
-    """Check for a number within [low, high]; integers are as good as floats."""
-    def check(name: str, value: Any) -> float:
+def number(low: float, high: float) -> Validator:
+    """Validate a number within [low, high]; integers are as good as floats."""
+    def validate(name: str, value: Any) -> float:
         if not _is_number(value):
             raise ValueError(f'{name} must be a number, not {short_repr(value)}')
         if not low <= value <= high:
             raise ValueError(f'{name} must lie within {low:g} and {high:g}, not {value:g}')
         return float(value)
-    return check
+    return validate
 
 
-def whole_number(low: int, high: int) -> Check:
-    """Check for a whole number within [low, high]."""
-    def check(name: str, value: Any) -> int:
+def whole_number(low: int, high: int) -> Validator:
+    """Validate a whole number within [low, high]."""
+    def validate(name: str, value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
             raise ValueError(f'{name} must be a whole number from {low} to {high}, '
                              f'not {short_repr(value)}')
         return value
-    return check
+    return validate
 
 
 def size(name: str, value: Any) -> tuple[float, ...]:
-    """Check three full extents [m]."""
+    """Validate three full extents [m]."""
     given = list(value) if isinstance(value, Sequence) else value
     if not isinstance(given, list) or len(given) != 3 or not all(map(_is_number, given)):
         raise ValueError(f'{name} must be 3 numbers, not {short_repr(given)}')
@@ -70,25 +70,25 @@ def size(name: str, value: Any) -> tuple[float, ...]:
 
 
 def text(name: str, value: Any) -> str:
-    """Check for a string."""
+    """Validate a string."""
     if not isinstance(value, str):
         raise ValueError(f'{name} must be a string, not {short_repr(value)}')
     return value
 
 
-def one_of(choices: Iterable[str]) -> Check:
-    """Check for one of some strings."""
-    def check(name: str, value: Any) -> str:
+def one_of(choices: Iterable[str]) -> Validator:
+    """Validate one of some strings."""
+    def validate(name: str, value: Any) -> str:
         choice = text(name, value)
         if choice not in choices:
             raise ValueError(f'{name} {short_repr(value)} is not one of: {", ".join(choices)}'
                              f'{nearest_name(choice, choices)}')
         return choice
-    return check
+    return validate
 
 
 def flag(name: str, value: Any) -> bool:
-    """Check for true or false."""
+    """Validate true or false."""
     if not isinstance(value, bool):
         raise ValueError(f'{name} must be true or false, not {short_repr(value)}')
     return value
@@ -102,9 +102,9 @@ def declare(node: Node, settings: Mapping[str, Setting], *, live: Collection[str
     Raises ValueError for the first bad value.
     """
     given = parameter_overrides(node)
-    values = {name: setting.check(name, node.get_parameter(name).value if node.has_parameter(name)
-                                  else given.get(name, setting.default))
-              for name, setting in settings.items()}
+    values = {name: setting.validate(
+        name, node.get_parameter(name).value if node.has_parameter(name)
+        else given.get(name, setting.default)) for name, setting in settings.items()}
     for name, setting in settings.items():
         if not node.has_parameter(name):
             value = values[name]  # the checked value holds the override

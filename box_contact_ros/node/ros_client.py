@@ -17,7 +17,7 @@ from ..scene.pairing import StampedPose
 from ..scene.scene import ALL_BOXES, Scene
 from ..solver.checks import are_poses
 from .message_bytes import PoseReader
-from .messages import NANOSECONDS, Refused
+from .messages import NANOSECONDS, MessageError
 from .topics import pose_qos
 
 CRANE_WRENCH = 'crane/wrench'  # where the crane publishes the force of the contacts on its load
@@ -33,7 +33,10 @@ class PoseTopic(NamedTuple):
     qos: QoSProfile
     boxes: Sequence[str]
     read: Callable[[bytes], StampedPose]
-    """Return the poses (n, 7) of these boxes, NaN for one that is not there; or raise Refused."""
+    """Return the poses (n, 7) of these boxes, NaN for one that is not there.
+
+    Raises MessageError.
+    """
 
 
 def pose_topics(scene: Scene) -> list[PoseTopic]:
@@ -57,8 +60,8 @@ def _read_array(reader: PoseReader, count: int, data: bytes) -> StampedPose:
     """Return the poses of so many boxes. A bad pose becomes NaN: the contact node reports it."""
     poses = reader.read_poses(data)
     if len(poses.numbers) != count:
-        raise Refused('wrong number of poses',
-                      f'{len(poses.numbers)} poses, but {count} boxes of the scene move')
+        raise MessageError('wrong number of poses',
+                           f'{len(poses.numbers)} poses, but {count} boxes of the scene move')
     poses.numbers[~are_poses(poses.numbers)] = np.nan
     return poses
 

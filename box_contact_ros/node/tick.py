@@ -21,7 +21,7 @@ from ..scene.scene_solver import SceneSolver
 from ..solver.checks import absent_poses, are_poses, pose_fault
 from .diagnostics import TickMonitor
 from .message_bytes import VECTOR_BYTES, ContactWriter, PoseReader, aligned, header_bytes
-from .messages import NANOSECONDS, Refused
+from .messages import NANOSECONDS, MessageError
 from .parameters import reason_of
 from .topics import PoseCallback, SceneTopics
 
@@ -128,11 +128,11 @@ class TickAnswerer:
         """Return the poses of all moving boxes; a bad one is counted, and its box absent."""
         poses, moving = self._reader.read_poses(data), self.solver.scene.moving
         if len(poses.numbers) != len(moving):
-            raise Refused('wrong number of poses',
-                          f'{len(poses.numbers)} poses, but {len(moving)} boxes move')
+            raise MessageError('wrong number of poses',
+                               f'{len(poses.numbers)} poses, but {len(moving)} boxes move')
         bad = ~are_poses(poses.numbers) & ~absent_poses(poses.numbers)
         for row in np.flatnonzero(bad):
-            self._refuse(Refused('bad pose', f'{pose_fault(poses.numbers[row])}'), moving[row])
+            self._refuse(MessageError('bad pose', f'{pose_fault(poses.numbers[row])}'), moving[row])
         poses.numbers[bad] = np.nan
         self._monitor.absent = [
             box for box, absent in zip(moving, absent_poses(poses.numbers)) if absent]

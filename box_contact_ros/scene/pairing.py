@@ -91,7 +91,7 @@ class StampedPose(NamedTuple):
     stamp: int  # [ns]
 
 
-class Rejection(NamedTuple):
+class RejectedPose(NamedTuple):
     """The last pose that was refused, dropped or begins a new time, for the log."""
 
     box: str
@@ -190,7 +190,7 @@ class Pairing(ABC):
         """
         self.tolerance, self.max_age = tolerance, max_age
         self.counts: Counter[str] = Counter() if counts is None else counts
-        self.rejections: dict[str, Rejection] = {}
+        self.rejections: dict[str, RejectedPose] = {}
         """The last pose of each kind that is counted. Whoever logs them clears them."""
         self._scene = scene
         self._boxes = {box: BoxState() for box in scene.streams}
@@ -262,7 +262,7 @@ class Pairing(ABC):
     def _count(self, reason: str, box: str, stamp: int) -> None:
         """Count a pose, and note it for the log."""
         self.counts[reason] += 1
-        self.rejections[reason] = Rejection(box, stamp, self._boxes[box].newest)
+        self.rejections[reason] = RejectedPose(box, stamp, self._boxes[box].newest)
 
     def _has_partner(self, box: str, present: Mapping[str, Any]) -> bool:
         """Return whether the other box of some pair of a box is present, or fixed."""

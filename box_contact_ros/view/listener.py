@@ -66,7 +66,7 @@ class Tick:
 def read_touching(message: Any, scene: Scene) -> Answer:
     """Return what touches by a box_contact_msgs/Contacts, the deepest first.
 
-    Raises Refused for a pair that is not in the scene.
+    Raises MessageError for a pair that is not in the scene.
     """
     answer = read_answer(message, scene)
     touching = np.flatnonzero(answer.contacts.colliding)

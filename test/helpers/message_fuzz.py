@@ -32,7 +32,7 @@ from rclpy.serialization import deserialize_message
 from typed_messages import read_pose, read_poses
 
 from box_contact_ros.node.message_bytes import PoseReader
-from box_contact_ros.node.messages import Refused
+from box_contact_ros.node.messages import MessageError
 from box_contact_ros.scene.pairing import StampedPose
 
 MESSAGES = 100_000
@@ -197,7 +197,7 @@ def outcome_of(read: Callable[[Any], StampedPose], message: Any) -> Outcome:
     """Return numbers, shape, frame and stamp, or the reason of a refusal."""
     try:
         pose = read(message)
-    except Refused as refused:
+    except MessageError as refused:
         return (refused.reason,)
     numbers = np.array(pose.numbers)
     return numbers.tobytes(), numbers.shape, pose.frame_id, pose.stamp

@@ -22,7 +22,7 @@ from std_msgs.msg import Header
 
 from box_contact_msgs.msg import Box, BoxPair, Contacts
 from box_contact_msgs.msg import Contact as ContactMessage
-from box_contact_ros.node.messages import NANOSECONDS, UPPER, Refused, make_header
+from box_contact_ros.node.messages import NANOSECONDS, UPPER, MessageError, make_header
 from box_contact_ros.scene.pairing import StampedPose
 from box_contact_ros.scene.scene import Pair
 from box_contact_ros.solver.checks import pose_fault
@@ -55,17 +55,17 @@ def _pose(numbers: Iterable[float]) -> Pose:
 
 
 def read_pose(message: PoseStamped) -> StampedPose:
-    """Return the pose of a message, or raise Refused."""
+    """Return the pose of a message, or raise MessageError."""
     numbers = _numbers(message.pose)
     pose = _stamped(np.array(numbers), message.header)
     fault = pose_fault(numbers)
     if fault:
-        raise Refused('bad pose', fault)
+        raise MessageError('bad pose', fault)
     return pose
 
 
 def read_poses(message: PoseArray) -> StampedPose:
-    """Return all poses of a message, numbers (n, 7) as they are, or raise Refused."""
+    """Return all poses of a message, numbers (n, 7) as they are, or raise MessageError."""
     numbers = np.array([_numbers(pose) for pose in message.poses], dtype=float).reshape(-1, 7)
     return _stamped(numbers, message.header)
 
@@ -77,11 +77,11 @@ def _numbers(pose: Pose) -> Sequence[float]:
 
 def _stamped(numbers: np.ndarray, header: Header) -> StampedPose:
     if header.stamp.nanosec >= NANOSECONDS:
-        raise Refused('bad header', 'a second or more of nanoseconds')
+        raise MessageError('bad header', 'a second or more of nanoseconds')
     if '\N{REPLACEMENT CHARACTER}' in header.frame_id:  # what rclpy makes of other bytes
-        raise Refused('bad header', 'frame_id is not UTF-8')
+        raise MessageError('bad header', 'frame_id is not UTF-8')
     if len(header.frame_id.encode()) > 255:
-        raise Refused('bad header', 'frame_id is too long')
+        raise MessageError('bad header', 'frame_id is too long')
     return StampedPose(numbers, header.frame_id,
                        header.stamp.sec * NANOSECONDS + header.stamp.nanosec)
 

@@ -29,7 +29,7 @@ from typed_messages import (
 from box_contact_msgs.msg import Contacts as ContactsMessage
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.message_bytes import ContactWriter, PoseReader, aligned, header_bytes
-from box_contact_ros.node.messages import Refused, contacts_by_pair, make_header, read_answer
+from box_contact_ros.node.messages import MessageError, contacts_by_pair, make_header, read_answer
 from box_contact_ros.scene.scene import Pair, two_boxes
 from box_contact_ros.scene.scene_solver import Answer
 from box_contact_ros.solver.contact import Contact, Contacts
@@ -123,7 +123,8 @@ def test_mutated_messages_are_read_as_rclpy_reads_them(message_type):
 def test_another_encapsulation_is_refused_by_its_name(kind):
     """A list of parameters, three forms of XCDR2, and one that nobody has defined."""
     for read, good in ((PoseReader().read_pose, GOOD), (PoseReader().read_poses, ARRAY)):
-        with pytest.raises(Refused, match=f'encapsulation 0x{kind.hex()} is neither .* use XCDR1'):
+        with pytest.raises(MessageError,
+                           match=f'encapsulation 0x{kind.hex()} is neither .* use XCDR1'):
             read(kind + good[2:])
 
 
@@ -132,11 +133,11 @@ def test_another_encapsulation_is_refused_by_its_name(kind):
                  st.integers(0, len(GOOD) - 1).map(lambda n: GOOD[:n]),
                  st.binary(min_size=4, max_size=9).map(lambda b: GOOD + b)))
 def test_other_bytes_are_refused(warm, data):
-    """Garbage, cut short, too long: Refused and no other exception, whatever was read before."""
+    """Garbage, cut short, too long: MessageError alone, whatever was read before."""
     reader = PoseReader()
     if warm:
         reader.read_pose(GOOD)
-    with pytest.raises(Refused):
+    with pytest.raises(MessageError):
         reader.read_pose(data)
 
 
@@ -147,7 +148,7 @@ def test_other_bytes_are_refused(warm, data):
 def test_a_pose_that_is_none_is_refused_with_its_reason(numbers, reason):
     reader = PoseReader()
     reader.read_pose(GOOD)
-    with pytest.raises(Refused, match=reason) as refused:
+    with pytest.raises(MessageError, match=reason) as refused:
         reader.read_pose(bytes(serialize_message(pose_stamped(numbers, 'map', STAMP))))
     assert refused.value.reason == 'bad pose'
 
@@ -161,7 +162,7 @@ def test_a_pose_that_is_none_is_refused_with_its_reason(numbers, reason):
 def test_headers_are_checked(change, reason):
     """A second of nanoseconds, a frame that is not UTF-8 or no string, a length beyond the end."""
     for read, good in ((PoseReader().read_pose, GOOD), (PoseReader().read_poses, ARRAY)):
-        with pytest.raises(Refused) as refused:
+        with pytest.raises(MessageError) as refused:
             read(change(good))
         assert refused.value.reason.startswith(reason)
 
@@ -174,7 +175,7 @@ COUNT_AT = ARRAY.index(b'\2\0\0\0')
     ARRAY[:COUNT_AT] + b'\3\0\0\0' + ARRAY[COUNT_AT + 4:],
     ARRAY[:COUNT_AT] + b'\xff' * 4 + ARRAY[COUNT_AT + 4:], GOOD], ids=range(8))
 def test_bytes_that_are_no_pose_array_are_refused(data):
-    with pytest.raises(Refused) as refused:
+    with pytest.raises(MessageError) as refused:
         PoseReader().read_poses(data)
     assert refused.value.reason == 'not a PoseArray'
 
@@ -233,5 +234,5 @@ def test_what_a_client_reads_is_the_contact_again():
                                   equal_nan=True)
     message = make_contacts(make_header(0, 'map'), [(Pair('p', 'a', 'b'), overlap)])
     assert list(contacts_by_pair(message)) == ['p']
-    with pytest.raises(Refused, match="'p' is no pair of the scene"):
+    with pytest.raises(MessageError, match="'p' is no pair of the scene"):
         read_answer(message, scene)

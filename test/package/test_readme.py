@@ -189,7 +189,7 @@ def parameter(words: list[str], **_) -> None:
     """`ros2 param set NODE NAME VALUE`: the node has it, and takes the value."""
     node, name, value = words[3:]
     assert node == '/contact_node'
-    PARAMETERS[name].check(name, yaml.safe_load(value))
+    PARAMETERS[name].validate(name, yaml.safe_load(value))
 
 
 def pip(words: list[str], setup_arguments, **_) -> None:
