@@ -135,21 +135,24 @@ inline PyObject* model_clipped(PyObject* self, void*) {
   return PyLong_FromLong(ModelObject::of(self)->clipped.load());
 }
 
-#define BC_SOLVE                                                                              \
-  {"solve", method<model_solve>(), METH_FASTCALL,                                             \
-   "solve(a, b, size_a, size_b, threads=1, patch=True, pairs=None, margin=0.0, /)\n--\n\n"     \
-   "Return Contacts, and the first refused row or -1.\n\n"                                    \
-   "Poses a and b are (m, 7), full extents (m, 3) or (1, 3) [m]. pairs (n, 2): places of the\n" \
-   "boxes of each row. margin: up to which separation pairs apart have a normal [m]."}
+inline PyMethodDef solve_method(PyCFunction solve) {
+  return {"solve", solve, METH_FASTCALL,
+          "solve(a, b, size_a, size_b, threads=1, patch=True, pairs=None, margin=0.0, /)\n--\n\n"
+          "Return Contacts, and the first refused row or -1.\n\n"
+          "Poses a and b are (m, 7), full extents (m, 3) or (1, 3) [m]. pairs (n, 2): places of\n"
+          "the boxes of each row. margin: up to which separation pairs apart have a normal [m]."};
+}
 inline PyMethodDef exact_methods[] = {
-    BC_SOLVE, {"__reduce__", method<exact_reduce>(), METH_NOARGS, "Pickle nothing."}, {}};
-inline PyMethodDef mlp_methods[] = {
-    BC_SOLVE, {"__reduce__", method<mlp_reduce>(), METH_NOARGS, "Pickle the network."}, {}};
-#undef BC_SOLVE
-inline PyGetSetDef model_attributes[] = {
-    {"clipped", Guarded<model_clipped>::call, nullptr, "Contacts of `Exact` that were clipped.",
-     nullptr},
+    solve_method(method<model_solve>()),
+    {"__reduce__", method<exact_reduce>(), METH_NOARGS, "Pickle nothing."},
     {}};
+inline PyMethodDef mlp_methods[] = {
+    solve_method(method<model_solve>()),
+    {"__reduce__", method<mlp_reduce>(), METH_NOARGS, "Pickle the network."},
+    {}};
+inline PyGetSetDef model_attributes[] = {{"clipped", Guarded<model_clipped>::call, nullptr,
+                                          "Contacts of `Exact` that were clipped.", nullptr},
+                                         {}};
 
 inline PyType_Slot exact_slots[] = {
     {Py_tp_doc, const_cast<char*>("Exact()\n--\n\n"

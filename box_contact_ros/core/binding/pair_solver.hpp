@@ -113,7 +113,8 @@ struct PlainBatch {
     by_place = given == 1;
     rows.poses_a = plain_rows<double>(PyTuple_GET_ITEM(args, 0), poses, 7);
     if (!rows.poses_a) return false;
-    rows.poses_b = by_place ? rows.poses_a : plain_rows<double>(PyTuple_GET_ITEM(args, 1), poses, 7);
+    rows.poses_b =
+        by_place ? rows.poses_a : plain_rows<double>(PyTuple_GET_ITEM(args, 1), poses, 7);
     if (!rows.poses_b) return false;
     count = poses;
     PyObject *key, *value;
