@@ -38,10 +38,11 @@ constexpr double safely_inside = 1e-6;
 // Distance from a box [of the size] up to which rounding alone puts a point outside.
 constexpr double outside_by_rounding = 0x1p-48;
 
-// Shares of the accuracy that the twelve equations may be off by. A piece that is lost at the tip of a
-// column moves the covariance by up to 30 times as much as the diagonal.
+// Shares of the accuracy that the twelve equations may be off by. The covariance may be wrong by some
+// times as much as the diagonal is, and by as much again for each time that the square of the centroid's
+// distance from the origin holds its trace.
 constexpr double off_diagonal_share = 0.01, diagonal_share = 0.3, closure_share = 0.1;
-constexpr double covariance_diagonal_share = 0.03;
+constexpr double covariance_diagonal_share = 0.25;
 
 // Whether sums over planes are right.
 template <class T>
@@ -52,19 +53,21 @@ struct Certificate {
 };
 
 // The twelve equations, and that no line has too long a lever. `x_n`, `normal` and `size` as in Surface,
-// over both boxes; `lever`: of the lines, times the length of the edges' pieces; `radius`: √trace of the
-// covariance.
+// over both boxes; `lever`: of the lines, times the length of the edges' pieces; `trace`: of the
+// covariance; `way2`: squared distance of the centroid from the origin.
 template <bool squares, class T>
 BC_INLINE Certificate<T> certificate(const Columns<T>& x_n, const Triple<T>& normal,
-                                     const Triple<T>& size, T lever, T volume, T radius,
+                                     const Triple<T>& size, T lever, T volume, T trace, T way2,
                                      T pair_size, T depth) {
   T rounding = centroid_rounding * pair_size / depth;
   T error = pair_size * max(splat<T>(least_centroid_error), rounding);
   T covariance_error = max(splat<T>(least_covariance_error), rounding);
-  T off_diagonal = (0.5 * off_diagonal_share) * min(error, covariance_error * radius);
+  T off_diagonal = (0.5 * off_diagonal_share) * error;
   T diagonal = diagonal_share * error, closure = closure_share * error;
   if constexpr (squares) {
-    diagonal = min(diagonal, covariance_diagonal_share * covariance_error * pair_size);
+    off_diagonal = min(off_diagonal, (0.5 * off_diagonal_share) * covariance_error * sqrt(trace));
+    diagonal = min(diagonal, (covariance_diagonal_share * covariance_error) *
+                                 (pair_size * (trace / (trace + way2))));
   }
   Columns<T> entries = diagonals(x_n);
   Triple<T> own = abs(entries[0] + (-volume)) * uniform(pair_size);
@@ -118,20 +121,21 @@ BC_INLINE planes::Certificate<T> overlap_by_planes(const Pair<T>& pair,
   T volume = (1.0 / 6.0) * (p.volume + q.volume), by_volume = 1.0 / volume;
   Triple<T> from_origin = ((1.0 / 12.0) * by_volume) * (p.first + m * q.first);
   Triple<T> centroid = boxes.p.origin + from_origin;
-  T radius = splat<T>(infinity);
+  T trace{}, way2{};
   if constexpr (squares) {
     OneOf<T, Columns<T>> axes = one_of<T>(boxes.p_is_a, pair.axes_a, pair.axes_b);
     Squares<T> from_q = turned<T>(m, q.second), mean2 = square_of<T>(from_origin);
     T by_20_volume = 0.05 * by_volume;
     Squares<T> covariance{by_20_volume * (p.second.diagonal + from_q.diagonal) - mean2.diagonal,
                           by_20_volume * (p.second.beside + from_q.beside) - mean2.beside};
-    radius = sqrt(max(sum(covariance.diagonal), T{}));
+    trace = max(sum(covariance.diagonal), T{});
+    way2 = sum(mean2.diagonal);
     found.covariance = sym<T>(turned<T>(axes, covariance));
   }
   T lever = sum(lengths) * sqrt(largest(largest_lever2));
   Triple<T> normal = p.normal + m * q.normal, area = p.size + abs(m) * q.size;
   Certificate<T> certain =
-      certificate<squares>(x_n, normal, area, lever, volume, radius, pair.size, depth);
+      certificate<squares>(x_n, normal, area, lever, volume, trace, way2, pair.size, depth);
   certain.holds &= p.gross + q.gross <= (6.0 * most_cancelled) * volume;
   Mask<T> shallow = depth < safely_inside * pair.size;
   if (any(shallow)) {
