@@ -15,9 +15,7 @@ from setuptools import Distribution, Extension, find_packages, setup
 from setuptools.command.build_ext import build_ext
 
 NAME = 'box_contact_ros'
-CORE = f'{NAME}/core'
 CORE_EXTENSION = f'{NAME}.core._native'
-LIBRARY = 'libbox_contact.so'
 COMPILER = os.environ.get('CXX', 'c++').split()
 # A wheel of CMake may lie in an environment that is not activated.
 os.environ['PATH'] += os.pathsep + sysconfig.get_path('scripts')
@@ -46,6 +44,10 @@ class PipDistribution(Distribution):
         self.get_option_dict('develop').pop('script_dir', None)
         self.get_option_dict('install').pop('install_scripts', None)
 
+    def has_data(self):
+        """Let `pip install -e` install data files, too: CMake finds the library by them."""
+        return True
+
 
 class BuildCore(build_ext):
     """Builds the library and Python's module by CMake, and names what is missing to do so."""
@@ -71,30 +73,21 @@ class BuildCore(build_ext):
         # A new folder for what CMake does not look at once it has configured one.
         compiler = subprocess.run([*COMPILER, '--version'], stdout=subprocess.PIPE).stdout
         settings = repr((sources, compiler, COMPILER, os.environ.get('CXXFLAGS')))
-        folder = Path(self.build_temp, hashlib.sha256(settings.encode()).hexdigest()[:8])
+        folder = Path(self.build_temp, hashlib.sha256(settings.encode()).hexdigest()[:8]).absolute()
         includes = f'{sysconfig.get_path("include")};{numpy.get_include()}'
-        subprocess.run(['cmake', '-S', sources, '-B', str(folder), '-DCMAKE_BUILD_TYPE=Release',
-                        '-DCMAKE_PLATFORM_NO_VERSIONED_SONAME=ON',
-                        f'-DBOX_CONTACT_PYTHON_INCLUDES={includes}'], check=True)
-        subprocess.run(['cmake', '--build', str(folder), '--parallel', str(os.cpu_count())],
-                       check=True)
-        module = Path(self.get_ext_fullpath(ext.name))
-        library = module.with_name(LIBRARY)
-        self.mkpath(str(module.parent))
-        self.copy_file(str(folder / '_native.so'), str(module))
-        self.copy_file(str(folder / LIBRARY), str(library))
-        if not BY_PIP:  # where linkers look; `install_data` and colcon come to it after this
-            self.distribution.data_files.append(('lib', [str(library)]))
-
-    def copy_extensions_to_source(self):
-        super().copy_extensions_to_source()
-        built = Path(self.build_lib, CORE, LIBRARY)
-        self.copy_file(str(built), str(Path(CORE, LIBRARY)))
-
-    def get_outputs(self):
-        # Of `develop` and of installations that list their files.
-        extension = self.get_ext_fullpath(CORE_EXTENSION)
-        return [*super().get_outputs(), str(Path(extension).with_name(LIBRARY))]
+        prefix = folder / 'prefix'
+        shutil.rmtree(prefix, ignore_errors=True)  # a header that was deleted since
+        for words in (['-S', sources, '-B', str(folder), '-DCMAKE_BUILD_TYPE=Release',
+                       '-DCMAKE_INSTALL_LIBDIR=lib', f'-DBOX_CONTACT_PYTHON_INCLUDES={includes}'],
+                      ['--build', str(folder), '--parallel', str(os.cpu_count())],
+                      ['--install', str(folder), '--prefix', str(prefix)]):
+            subprocess.run(['cmake', *words], check=True)
+        self.mkpath(str(Path(self.get_ext_fullpath(ext.name)).parent))
+        self.copy_file(str(folder / '_native.so'), self.get_ext_fullpath(ext.name))
+        # The library for C and C++, for `install_data` and colcon, which come to it after this.
+        self.distribution.data_files += [
+            (path.relative_to(prefix).parent.as_posix(), [str(path)])
+            for path in sorted(prefix.rglob('*')) if path.is_file()]
 
 
 def data_files() -> list[tuple[str, list[str]]]:
@@ -109,13 +102,6 @@ def data_files() -> list[tuple[str, list[str]]]:
             # is_file() also drops links that colcon --symlink-install left to deleted files.
             if path.is_file() and '__pycache__' not in path.parts:
                 files.setdefault(f'{share}/{path.parent.as_posix()}', []).append(path.as_posix())
-    # Where find_package looks below a prefix, such as colcon's.
-    files[f'{share}/cmake'] = sorted(
-        path.as_posix() for path in Path(CORE, 'cmake').glob('*.cmake'))
-    if not BY_PIP:
-        files[f'include/{NAME}/box_contact'] = sorted(
-            path.as_posix() for folder in (CORE, f'{NAME}/node')
-            for path in Path(folder, 'include', 'box_contact').iterdir())
     return list(files.items())
 
 
@@ -134,8 +120,7 @@ setup(
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     # Said in so many words, it makes an editable install a path that type checkers follow.
     package_dir={'': '.'},
-    package_data={NAME: ['py.typed', '**/*.pyi', 'core/cmake/*', 'core/include/**/*.h*',
-                         'node/include/**/*.hpp']},
+    package_data={NAME: ['py.typed', '**/*.pyi']},
     # What it is made of stands in CMakeLists.txt.
     ext_modules=[Extension(CORE_EXTENSION, [])],
     data_files=data_files(),

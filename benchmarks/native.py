@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from box_contact_ros.core import FORCE, instruction_sets, native
+from box_contact_ros.core import FORCE, instruction_sets
 
 from . import output, settled
 from .output import markdown_table, percentiles
@@ -45,7 +45,7 @@ UNIT = 'mjc_BoxBox, single'
 OURS = tuple(f'exact {finds}, {way}' for way in ('single', 'batch')
              for finds in ('volume', 'covariance'))
 CALLS_FOLDER = Path(__file__).with_name('native_calls')
-CORE = Path(native.__file__).parent  # with the library and its headers
+LIBRARY = Path(sys.prefix, 'lib', 'libbox_contact.so')  # its headers are in include/
 OPTIONAL = {'coal': 'pip install coal cmeel-eigen', 'bullet': 'apt install libbullet-dev'}
 """By file of native_calls/ and by name for pkg-config: what brings headers and library."""
 CLEAR = 1e-6
@@ -106,11 +106,11 @@ def compiled(folder: Path) -> tuple[Path, list[str]]:
     flags = [flag for name, more in rivals.items() for flag in (f'-DWITH_{name.upper()}', *more)]
     done = subprocess.run(
         [os.environ.get('CXX', 'g++'), '-std=c++17', '-O2', '-Wall', '-Wextra',
-         f'-I{CORE / "include"}', f'-I{mujoco / "include"}',
+         f'-I{Path(sys.prefix, "include")}', f'-I{mujoco / "include"}',
          *[str(CALLS_FOLDER / f'{name}.cpp') for name in ('main', 'mujoco', 'ours', *rivals)],
-         '-o', str(folder / 'native'), str(CORE / 'libbox_contact.so'),
-         str(next(mujoco.glob('libmujoco.so*'))), f'-Wl,-rpath,{CORE}', f'-Wl,-rpath,{mujoco}',
-         *flags], capture_output=True, text=True)
+         '-o', str(folder / 'native'), str(LIBRARY),
+         str(next(mujoco.glob('libmujoco.so*'))), f'-Wl,-rpath,{LIBRARY.parent}',
+         f'-Wl,-rpath,{mujoco}', *flags], capture_output=True, text=True)
     if done.returncode:
         raise RuntimeError(f'native_calls does not compile:\n{done.stderr}')
     return folder / 'native', [name for name in OPTIONAL if name not in rivals]

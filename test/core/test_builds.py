@@ -17,10 +17,9 @@ import poses
 import pytest
 
 from box_contact_ros import Body, ContactSolver, PatchForces
-from box_contact_ros.core import native
 from box_contact_ros.scene.laws import GRAVITY
 
-CORE = Path(native.__file__).parent
+CORE = Path(__file__).resolve().parents[2] / 'box_contact_ros' / 'core'
 FLAGS = ('-std=c++17', '-O2', '-ffp-contract=off', '-Wno-psabi', '-DBOX_CONTACT_VERSION=""')
 BUILDS: dict[str, tuple[str, tuple[str, ...]]] = {
     'clang++': ('clang++', ()),

@@ -12,6 +12,7 @@ import copy
 import ctypes
 import json
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -19,6 +20,7 @@ import sys
 import sysconfig
 from collections.abc import Iterator
 from ctypes import POINTER, byref, c_bool, c_double, c_int, c_int32, c_int64, c_size_t
+from importlib import metadata
 from pathlib import Path
 
 import numpy as np
@@ -33,9 +35,14 @@ from box_contact_ros.solver.contact import FIELDS, Contacts
 from box_contact_ros.solver.pose import rotation_matrix
 
 ROOT = Path(__file__).resolve().parents[2]
-CORE = Path(native.__file__).resolve().parent
-LIBRARY = CORE / 'libbox_contact.so'
-INCLUDES = f'-I{CORE / "include"}'
+PREFIX = next(prefix for prefix in map(Path, [*os.environ.get('AMENT_PREFIX_PATH', '').split(':'),
+                                              sys.prefix])
+              if (prefix / 'lib' / 'libbox_contact.so').is_file())
+"""Where colcon or pip has installed the library."""
+LIBRARY = PREFIX / 'lib' / 'libbox_contact.so'
+INCLUDES = f'-I{PREFIX / "include"}'
+LINKED = (str(LIBRARY), f'-Wl,-rpath,{LIBRARY.parent}')
+"""What a compiler is told to link the library."""
 EXAMPLE = ROOT / 'docs' / 'examples' / 'cpp'
 STRICT = ('-Wall', '-Wextra', '-Werror', '-pedantic')
 EXAMPLE_SAYS = [
@@ -79,7 +86,7 @@ def test_a_c_program(tmp_path: Path) -> None:
     """Contacts, rows, refusals; by every instruction set."""
     program = tmp_path / 'library_test'
     run(tool('gcc'), '-std=c11', *STRICT, INCLUDES, ROOT / 'test/core/library_test.c',
-        LIBRARY, f'-Wl,-rpath,{CORE}', '-lm', '-o', program)
+        *LINKED, '-lm', '-o', program)
     for name in instruction_sets():
         assert run(program, **{FORCE: name}).endswith(f', {name}: 0 failures\n')
     assert subprocess.run([program], env={FORCE: 'none'}).returncode == 1
@@ -168,7 +175,7 @@ def test_forces_have_the_bits_of_python(tmp_path: Path, source: str) -> None:
     compiler, standard = ('gcc', 'c11') if source.endswith('.c') else ('g++', 'c++17')
     program = tmp_path / 'force_test'
     run(tool(compiler), f'-std={standard}', '-O2', '-ffp-contract=off', *STRICT,
-        INCLUDES, ROOT / 'test/core' / source, LIBRARY, f'-Wl,-rpath,{CORE}', '-lm',
+        INCLUDES, ROOT / 'test/core' / source, *LINKED, '-lm',
         '-o', program)
     *found, failures, _ = run(program).split()
     assert failures == '0'
@@ -210,10 +217,10 @@ def example(program: Path) -> list[str]:
 
 
 def test_by_the_compiler_alone(tmp_path: Path) -> None:
-    """`--includes`; without a warning, and with C++20."""
+    """Without a warning, and with C++20."""
     for standard in ('c++17', 'c++20'):
         run(tool('g++'), f'-std={standard}', *STRICT, INCLUDES,
-            EXAMPLE / 'first_contact.cpp', LIBRARY, f'-Wl,-rpath,{CORE}', '-o', tmp_path / standard)
+            EXAMPLE / 'first_contact.cpp', *LINKED, '-o', tmp_path / standard)
         assert example(tmp_path / standard) == EXAMPLE_SAYS
 
 
@@ -226,7 +233,7 @@ def test_without_exceptions(tmp_path: Path) -> None:
                       '  b.size.extent[2] = 2.0 - argc;\n'
                       '  return box_contact::collide(a, b).colliding - 1;\n}\n')
     run(tool('g++'), '-std=c++17', *STRICT, '-fno-exceptions', '-fno-rtti', INCLUDES,
-        source, LIBRARY, f'-Wl,-rpath,{CORE}', '-o', program)
+        source, *LINKED, '-o', program)
     assert run(program) == ''
     assert subprocess.run([program, 'flat']).returncode < 0
 
@@ -236,36 +243,30 @@ def configure(source: Path, folder: Path, *options: str, **environment: str) -> 
     run(tool('cmake'), '--build', folder, '--parallel', **environment)
 
 
-def test_by_find_package_of_pip(tmp_path: Path) -> None:
-    """`--cmakedir`, as CMake is told by hand; and a version that there is not."""
-    places = run(sys.executable, '-m', 'box_contact_ros', '--cmakedir').strip()
-    assert places == str(CORE / 'cmake')
-    assert run(sys.executable, '-m', 'box_contact_ros', '--includes').strip() == INCLUDES
-    configure(EXAMPLE, tmp_path, f'-Dbox_contact_ros_DIR={places}')
+def test_by_find_package(tmp_path: Path) -> None:
+    """CMake needs no option where the environment is active; and a version that there is not."""
+    active = f'{PREFIX / "bin"}:{os.environ["PATH"]}'
+    configure(EXAMPLE, tmp_path, PATH=active)
+    found = re.search('^box_contact_ros_DIR:PATH=(.*)$', (tmp_path / 'CMakeCache.txt').read_text(),
+                      re.M)
+    assert found[1] == str(PREFIX / 'lib/cmake/box_contact_ros')
     assert example(tmp_path / 'first_contact') == EXAMPLE_SAYS
     says = example(tmp_path / 'stack')
     assert len(says) == 3
     assert '\n'.join(f'//   {line}' for line in says) in (EXAMPLE / 'stack.cpp').read_text()
+    version = metadata.version('box_contact_ros')
     (tmp_path / 'CMakeLists.txt').write_text(
         'cmake_minimum_required(VERSION 3.18)\nproject(one LANGUAGES CXX)\n'
-        'find_package(box_contact_ros 0.1 REQUIRED)\n'
-        'find_package(box_contact_ros 0.1.0 EXACT REQUIRED)\n'
+        f'find_package(box_contact_ros {version.rpartition(".")[0]} REQUIRED)\n'
+        f'find_package(box_contact_ros {version} EXACT REQUIRED)\n'
         'find_package(box_contact_ros 99 QUIET)\n'
         'if(box_contact_ros_FOUND)\n  message(FATAL_ERROR found)\nendif()\n')
-    run(tool('cmake'), '-S', tmp_path, '-B', tmp_path / 'versions',
-        f'-DCMAKE_PREFIX_PATH={places}')
-
-
-def test_versions_agree(setup_arguments: dict) -> None:
-    version = setup_arguments['version']
-    for name in ('box_contact_rosConfigVersion.cmake', 'box_contact.pc'):
-        assert version in (CORE / 'cmake' / name).read_text()
-    assert f'VERSION {version} ' in (ROOT / 'CMakeLists.txt').read_text()
+    run(tool('cmake'), '-S', tmp_path, '-B', tmp_path / 'versions', PATH=active)
 
 
 def test_by_pkg_config(tmp_path: Path) -> None:
     found = run(tool('pkg-config'), '--cflags', '--libs', 'box_contact',
-                PKG_CONFIG_PATH=str(CORE / 'cmake'))
+                PKG_CONFIG_PATH=str(PREFIX / 'lib' / 'pkgconfig'))
     run(tool('g++'), '-std=c++17', EXAMPLE / 'first_contact.cpp', *shlex.split(found), '-o',
         tmp_path / 'one')
     assert example(tmp_path / 'one') == EXAMPLE_SAYS
@@ -305,8 +306,8 @@ def test_rows_by_place(tmp_path: Path) -> None:
     No sizes are refused.
     """
     (tmp_path / 'rows.cpp').write_text(ROWS)
-    run(tool('g++'), '-std=c++17', *STRICT, INCLUDES, tmp_path / 'rows.cpp', LIBRARY,
-        f'-Wl,-rpath,{CORE}', '-o', tmp_path / 'rows')
+    run(tool('g++'), '-std=c++17', *STRICT, INCLUDES, tmp_path / 'rows.cpp', *LINKED, '-o',
+        tmp_path / 'rows')
     assert run(tmp_path / 'rows') == (
         '-1 -0.5 7\n-0.5 7\n-2 -4\nsizes must be one, or one for each pose, not 0\n')
 
@@ -364,18 +365,22 @@ def test_from_source(tmp_path: Path, from_source: tuple[str, ...]) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize('kind', ['ON', 'OFF'])
 def test_a_plain_installation(tmp_path: Path, from_source: tuple[str, ...], kind: str) -> None:
-    """Shared and static: find_package below a prefix, and pkg-config."""
+    """Shared and static: find_package below a prefix, pkg-config, and the files that pip has."""
     prefix = tmp_path / 'prefix'
     configure(ROOT, tmp_path / 'library', *from_source, f'-DBUILD_SHARED_LIBS={kind}',
               '-DCMAKE_INSTALL_LIBDIR=lib')
     run(tool('cmake'), '--install', tmp_path / 'library', '--prefix', prefix)
+    installed = {path.relative_to(prefix) for path in prefix.rglob('*') if path.is_file()}
+    assert Path('include/box_contact/contact_message.hpp') in installed
+    assert [path for path in installed
+            if path.suffix != '.a' and not (PREFIX / path).is_file()] == []
     configure(EXAMPLE, tmp_path / 'example', f'-DCMAKE_PREFIX_PATH={prefix}')
     assert example(tmp_path / 'example' / 'first_contact') == EXAMPLE_SAYS
     found = run(tool('pkg-config'), '--cflags', '--libs', 'box_contact',
                 PKG_CONFIG_PATH=str(prefix / 'lib' / 'pkgconfig'))
     run('g++', '-std=c++17', EXAMPLE / 'first_contact.cpp', *shlex.split(found), '-o',
         tmp_path / 'one')
-    assert run(tmp_path / 'one', LD_LIBRARY_PATH=str(prefix / 'lib')).splitlines() == EXAMPLE_SAYS
+    assert example(tmp_path / 'one') == EXAMPLE_SAYS
 
 
 # --- machines -------------------------------------------------------------------------------------
@@ -384,8 +389,8 @@ def test_a_machine_without_avx_takes_the_baseline(tmp_path: Path) -> None:
     """One library runs on each: it asks the processor. A set that this one lacks is refused."""
     program = tmp_path / 'library_test'
     emulator = tool('qemu-x86_64')
-    run(tool('gcc'), '-std=c11', INCLUDES, ROOT / 'test/core/library_test.c', LIBRARY,
-        f'-Wl,-rpath,{CORE}', '-lm', '-o', program)
+    run(tool('gcc'), '-std=c11', INCLUDES, ROOT / 'test/core/library_test.c', *LINKED, '-lm', '-o',
+        program)
     assert run(emulator, '-cpu', 'Nehalem', program).endswith(', baseline: 0 failures\n')
     done = subprocess.run([emulator, '-cpu', 'Nehalem', program], text=True,
                           env=os.environ | {FORCE: 'avx2'}, capture_output=True)

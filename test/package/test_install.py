@@ -155,12 +155,12 @@ def test_kernels_share_no_symbol(installed: Installation) -> None:
 
 
 def test_cmake_finds_the_library(installed: Installation, tmp_path: Path) -> None:
-    """By `--cmakedir`; the example runs."""
+    """In the active environment, without an option; the example runs."""
     cmake = tool('cmake')
-    folder = run(installed.bin / 'python', '-m', NAME, '--cmakedir', cwd=tmp_path).strip()
-    assert Path(folder).is_relative_to(installed.folder)
-    run(cmake, '-S', ROOT / 'docs' / 'examples' / 'cpp', '-B', tmp_path, f'-D{NAME}_DIR={folder}',
-        cwd=tmp_path)
+    run('env', f'PATH={installed.bin}:{os.environ["PATH"]}', cmake, '-S',
+        ROOT / 'docs' / 'examples' / 'cpp', '-B', tmp_path, cwd=tmp_path)
+    found = f'{NAME}_DIR:PATH={installed.bin.parent}/lib/cmake/{NAME}\n'
+    assert found in (tmp_path / 'CMakeCache.txt').read_text()
     run(cmake, '--build', tmp_path, cwd=tmp_path)
     assert 'batch: 1 0, volumes 0.030 0.000 m3' in run(tmp_path / 'first_contact', cwd=tmp_path)
 

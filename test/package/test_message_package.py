@@ -5,12 +5,11 @@
 from __future__ import annotations
 
 import re
-import xml.etree.ElementTree as ElementTree
-from importlib import import_module
+import sys
+from importlib import import_module, metadata
 from pathlib import Path
 
 import pytest
-import tomllib
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ROOT / 'box_contact_msgs'
@@ -49,12 +48,11 @@ def test_every_definition_is_built() -> None:
             assert list(message.get_fields_and_field_types()) == names and names
 
 
-def test_versions_agree() -> None:
+def test_manifest_is_valid() -> None:
     """What catkin_pkg rejects, colcon takes for a package of another kind."""
-    version = tomllib.loads((SOURCES / 'pyproject.toml').read_text('utf-8'))['project']['version']
-    manifest = ElementTree.parse(SOURCES / 'package.xml').getroot()
-    assert manifest.findtext('version') == version
     catkin = pytest.importorskip('catkin_pkg.package', reason='catkin-pkg is not installed')
     package = catkin.parse_package(str(SOURCES / 'package.xml'))
     package.validate()
     assert package.get_build_type() == 'ament_cmake'
+    if Path(sys.prefix, 'lib', 'libbox_contact.so').is_file():  # pip has read the manifest
+        assert metadata.version('box_contact_msgs') == package.version

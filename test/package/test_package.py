@@ -131,13 +131,15 @@ def test_help_of_each_program(program: str, module: str) -> None:
 
 
 def test_versions_agree() -> None:
-    """The release tools of catkin rewrite both, so both are written out; here they are compared."""
+    """The release tools of catkin rewrite manifests and setup.py; CMake and pip read manifests."""
     manifest = ElementTree.parse(ROOT / 'package.xml').getroot()
     done = _run('setup.py', '--name', '--version')
     name, version = manifest.findtext('name'), manifest.findtext('version')
     assert done.stdout.split() == [name, version]
-    for file in ('CITATION.cff', 'msg_schemas/asyncapi.yaml'):
-        assert f'version: {version}\n' in (ROOT / file).read_text('utf-8'), file
+    messages = ElementTree.parse(ROOT / 'box_contact_msgs' / 'package.xml').getroot()
+    assert messages.findtext('version') == version
+    schema = (ROOT / 'msg_schemas' / 'asyncapi.yaml').read_text('utf-8')
+    assert f'\n  version: {version}\n' in schema
     changelog = (ROOT / 'CHANGELOG.rst').read_text('utf-8')
     assert re.search(rf'^{version} \(\d{{4}}-\d\d-\d\d\)\n-+\n', changelog, re.MULTILINE)
 

@@ -31,6 +31,7 @@ import yaml
 from conftest import PROGRAMS
 from geometry_msgs.msg import PoseStamped
 from patience import PATIENCE
+from test_library import INCLUDES, LINKED
 
 from benchmarks import hard_poses, judge
 from box_contact_msgs.msg import Box
@@ -477,9 +478,8 @@ def test_cpp_examples(tmp_path):
                + '  return 0;\n}' for name, text in zip(names, texts)]
     calls = ' '.join(f'{name}();' for name in names)
     (tmp_path / 'examples.cpp').write_text('\n'.join([*program, f'int main() {{ {calls} }}']))
-    core = ROOT / 'box_contact_ros' / 'core'
-    run('g++', '-std=c++17', f'-I{core}/include', str(tmp_path / 'examples.cpp'),
-        str(core / 'libbox_contact.so'), f'-Wl,-rpath,{core}', '-o', str(tmp_path / 'examples'))
+    run('g++', '-std=c++17', INCLUDES, str(tmp_path / 'examples.cpp'), *LINKED,
+        '-o', str(tmp_path / 'examples'))
     assert run(str(tmp_path / 'examples')).splitlines() == [
         line for text in texts
         for line in re.findall(r'printf\(.*\);  // (.*)$', text, re.MULTILINE)]
