@@ -37,8 +37,6 @@ struct Results {
   double *volume, *covariance;
   int32_t* axis;
   double margin;  // [m]; normals are given up to this separation
-
-  bool want_overlap() const { return point || volume || covariance; }
 };
 
 // How many contacts took another way than most.

@@ -16,6 +16,10 @@ namespace box_contact::BOX_CONTACT_SET {
 // cache. Eight of eight pairs have 32 kB.
 constexpr int blocks_at_once = 8;
 
+BC_INLINE bool want_overlap(const Results& results) {
+  return results.point || results.volume || results.covariance;
+}
+
 // Pairs side by side, and their rows.
 template <class T>
 struct Block {
@@ -105,7 +109,7 @@ template <class Model>
                                         const Results& results, Counts& counts) {
   Query<double> query;
   query_rows(rows, row, row + 1, query);
-  if (query.touching && results.want_overlap()) {
+  if (query.touching && want_overlap(results)) {
     typename Model::template Found<double> found;
     model.solve(query, found, counts);
     write_overlaps<double>(found, 1, {row}, results);
@@ -139,7 +143,7 @@ template <class T, class Model>
         note(write_query(block.query, first, last, results));
         for (int i = 0; i < lanes; ++i) block.rows[i] = first + i;
       }
-      if (!results.want_overlap()) continue;
+      if (!want_overlap(results)) continue;
       for (int n = 0; n < count; ++n) queue.add(blocks[n], only_block);
     }
     queue.finish();
