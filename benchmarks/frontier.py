@@ -19,13 +19,12 @@ import math
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
-from inspect import getdoc
 from pathlib import Path
 
 from box_contact_ros.core import instruction_sets, native
 
 from . import output
-from .accuracy import CLASSES, Summary
+from .accuracy import Summary
 from .contestant import (
     CORE_MODELS,
     MODELS,
@@ -138,25 +137,6 @@ def calls_table(engines: Iterable[Contestant]) -> str:
         for engine in engines], words=5)
 
 
-def set_table(rows: Sequence[FrontierRow], name: str) -> str:
-    """Return all contestants on one set."""
-    def in_one(values: Sequence[float]) -> str:
-        return '/'.join(map(number, values))
-
-    labels = ('all', *CLASSES)
-    return markdown_table(
-        ['', 'call p50 [µs]', 'p99', 'max', 'batch [ns]', 'judged', 'best point',
-         *[f'{label}: p50/p99/worst' for label in labels], 'normal p99/worst [°]', 'missed',
-         'invented'],
-        [[f'{row.name}, {row.instruction_set}' if row.name in CORE_MODELS else row.name,
-          *[number(value / 1e3) for value in row.single], number(row.batch),
-          f'{row.judged:,}', row.best if len(row.choices) > 1 else '–',
-          *[in_one(row.errors.points[label][2:]) if label in row.errors.points else '–'
-            for label in labels],
-          in_one(row.errors.normal), row.errors.missed, row.errors.invented]
-         for row in rows if row.set == name])
-
-
 def write_page(folder: Path, args: Sequence[str] | None, rows: Sequence[FrontierRow],
                models: Sequence[Contestant], engines: Sequence[Contestant],
                missing: Sequence[str], plan: Plan) -> None:
@@ -175,9 +155,7 @@ def write_page(folder: Path, args: Sequence[str] | None, rows: Sequence[Frontier
         stacks=by_exact(by['mlp', 'stacks'], rows)[1],
         paper=by['paper', 'random cubes'].errors.points['all'].p50,
         verdict=VERDICT, few_pairs=FEW_PAIRS, timed_pairs=plan.timed_pairs,
-        calls=calls_table(engines), sets='\n\n'.join(
-            f'### {name.capitalize()}\n\n{getdoc(make)}\n\n{set_table(rows, name)}'
-            for name, make in TIMED_SETS.items()))
+        calls=calls_table(engines))
 
 
 def csv_rows(rows: Sequence[FrontierRow], contestants: Sequence[Contestant],
