@@ -3,7 +3,8 @@
 
 """Workarounds for rclpy: every use of its private attributes, and of its objects' memory.
 
-All were seen with rclpy 7.1 (Jazzy). Each names the symptom, and the test that guards it.
+All were seen with rclpy 7.1 (Jazzy). Each names the symptom, the upstream report, and the test that
+guards it. "Not reported": a search of the trackers of rclpy and Fast DDS found nothing.
 """
 from __future__ import annotations
 
@@ -21,10 +22,11 @@ from rclpy.node import Node
 
 CallbackWithInfo = Callable[[Any, Mapping[str, Any]], None]
 RCLError = rclpy_implementation.RCLError
-"""Symptom: what the middleware refuses raises a type without a public name.
+"""Symptom: what the middleware refuses raises a type without a public name. Not reported.
 Test: test_contact_node.py::test_a_bad_start_is_one_clear_line."""
 UnknownROSArgsError = rclpy_implementation.UnknownROSArgsError
 """Symptom: so does a word after --ros-args that is no option, and rclpy raises a RuntimeError.
+Not reported.
 Test: test_parameters.py::test_a_word_that_ros_does_not_know_ends_the_program."""
 
 
@@ -32,6 +34,7 @@ def parameter_overrides(node: Node) -> dict[str, Any]:
     """Return the parameters that were given at the start, by name.
 
     Symptom: rclpy silently ignores names that are never declared, and has no public list of them.
+    Not reported.
     Test: test_parameters.py::test_an_unknown_name_is_logged_with_the_nearest_one.
     """
     return {name: parameter.value
@@ -41,7 +44,7 @@ def parameter_overrides(node: Node) -> dict[str, Any]:
 def lifecycle_state(node: LifecycleNode) -> str:
     """Return the label of a node's state: unconfigured, inactive, active or finalized.
 
-    Symptom: a lifecycle node tells its state by a service alone.
+    Symptom: a lifecycle node tells its state by a service alone. Not reported.
     Test: test_first_run.py::test_the_state_is_told.
     """
     return str(node._state_machine.current_state[1])
@@ -51,6 +54,7 @@ def with_info(callback: CallbackWithInfo) -> Callable[..., None]:
     """Return the callback of a subscription for a message and what is known of it.
 
     Symptom: EventsExecutor gives both as one tuple; the other executors give two arguments.
+    Not reported.
     Test: test_runtime.py::test_a_message_comes_with_its_time_and_number.
     """
     @wraps(callback)  # rclpy asks for the signature
@@ -67,6 +71,7 @@ def ends_within(seconds: float) -> Iterator[None]:
 
     Symptom: destroying a node spins for ever in Fast DDS (`DomainParticipant::set_listener`), with
     Python's lock, while another participant of the host stands still. It is rare.
+    Report: https://github.com/eProsima/Fast-DDS/issues/6513 (open).
     Test: test_runtime.py::test_an_end_that_hangs_is_ended.
     """
     faulthandler.dump_traceback_later(seconds, exit=True, file=2)  # standard error
@@ -80,7 +85,7 @@ def shut_down(context: Context) -> None:
     """Shut a context down, unless it is shut down already.
 
     Symptom: a thread of rclpy's does the same after a signal; where both do it at once,
-    `try_shutdown` raises.
+    `try_shutdown` raises. Report: https://github.com/ros2/rclpy/issues/1352, fixed in rolling.
     Test: test_runtime.py::test_two_threads_shut_a_context_down.
     """
     try:
@@ -94,7 +99,7 @@ def keep_for_ever(executor: Any) -> None:
     """Keep an executor from being destroyed, even as the interpreter ends.
 
     Symptom: EventsExecutor aborts the process if it is destroyed while it has something of a node.
-    A signal during add_node brings that about.
+    A signal during add_node brings that about. Not reported.
     Test: test_contact_node.py::test_ends_cleanly; the symptom is rare.
     """
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(executor))
