@@ -18,7 +18,6 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-from collections.abc import Iterator
 from ctypes import POINTER, byref, c_bool, c_double, c_int, c_int32, c_int64, c_size_t
 from importlib import metadata
 from pathlib import Path
@@ -319,68 +318,6 @@ def test_a_debug_build_is_as_fast(tmp_path: Path) -> None:
     commands = json.loads((tmp_path / 'compile_commands.json').read_text())
     assert len(commands) >= 3
     assert all(' -O3 ' in command['command'] for command in commands)
-
-
-FETCHED = f"""
-cmake_minimum_required(VERSION 3.18)
-project(fetched LANGUAGES CXX)
-include(FetchContent)
-FetchContent_Declare(box_contact_ros SOURCE_DIR "{ROOT}")
-FetchContent_MakeAvailable(box_contact_ros)
-add_executable(first_contact "{EXAMPLE}/first_contact.cpp")
-target_link_libraries(first_contact PRIVATE box_contact_ros::box_contact)
-"""
-LAUNCHER = """#!/bin/sh
-# Compile, or copy what the first project has compiled: sources and flags are the same.
-for word; do
-    case $word in *DBOX_CONTACT_*) library=$library-library ;; esac
-    if [ "$before" = -o ]; then output=$word; fi
-    before=$word
-done
-kept=$(dirname "$0")/$(basename "$before").o$library
-if [ ! -e "$kept" ]; then "$@" -Og && cp "$output" "$kept" || exit 1; fi
-cp "$kept" "$output"
-"""
-
-
-@pytest.fixture(scope='module')
-def from_source(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, ...]]:
-    """Return options of CMake: the baseline alone, hardly optimised, compiled once."""
-    tool('cmake')
-    launcher = tmp_path_factory.mktemp('launcher') / 'launcher'
-    launcher.write_text(LAUNCHER)
-    launcher.chmod(0o755)
-    return (f'-DCMAKE_CXX_COMPILER_LAUNCHER={launcher}', '-DBOX_CONTACT_INSTRUCTION_SETS=',
-            f'-DCMAKE_CXX_COMPILER={tool("g++")}')
-
-
-@pytest.mark.slow
-def test_from_source(tmp_path: Path, from_source: tuple[str, ...]) -> None:
-    """By FetchContent, which calls add_subdirectory; without Python."""
-    (tmp_path / 'CMakeLists.txt').write_text(FETCHED)
-    configure(tmp_path, tmp_path / 'build', *from_source)
-    assert example(tmp_path / 'build' / 'first_contact') == EXAMPLE_SAYS
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('kind', ['ON', 'OFF'])
-def test_a_plain_installation(tmp_path: Path, from_source: tuple[str, ...], kind: str) -> None:
-    """Shared and static: find_package below a prefix, pkg-config, and the files that pip has."""
-    prefix = tmp_path / 'prefix'
-    configure(ROOT, tmp_path / 'library', *from_source, f'-DBUILD_SHARED_LIBS={kind}',
-              '-DCMAKE_INSTALL_LIBDIR=lib')
-    run(tool('cmake'), '--install', tmp_path / 'library', '--prefix', prefix)
-    installed = {path.relative_to(prefix) for path in prefix.rglob('*') if path.is_file()}
-    assert Path('include/box_contact/contact_message.hpp') in installed
-    assert [path for path in installed
-            if path.suffix != '.a' and not (PREFIX / path).is_file()] == []
-    configure(EXAMPLE, tmp_path / 'example', f'-DCMAKE_PREFIX_PATH={prefix}')
-    assert example(tmp_path / 'example' / 'first_contact') == EXAMPLE_SAYS
-    found = run(tool('pkg-config'), '--cflags', '--libs', 'box_contact',
-                PKG_CONFIG_PATH=str(prefix / 'lib' / 'pkgconfig'))
-    run('g++', '-std=c++17', EXAMPLE / 'first_contact.cpp', *shlex.split(found), '-o',
-        tmp_path / 'one')
-    assert example(tmp_path / 'one') == EXAMPLE_SAYS
 
 
 # --- machines -------------------------------------------------------------------------------------

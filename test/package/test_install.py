@@ -1,10 +1,11 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""A wheel and a source distribution, each made from a copy of the tracked files.
+"""A wheel, a source distribution, and what CMake alone builds from the sources.
 
-The sources of the wheel are deleted before it is looked at: nothing may reach back to them. All
-other tests run in an editable install; `make test-colcon` runs them as colcon installs them.
+The wheel is made from a copy of the tracked files, which is deleted before it is looked at: nothing
+may reach back to it. All other tests run in an editable install; `make test-colcon` runs them as
+colcon installs them.
 """
 from __future__ import annotations
 
@@ -25,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from test_library import tool
+from test_library import EXAMPLE, EXAMPLE_SAYS, PREFIX, configure, example, tool
 
 from box_contact_ros.core import instruction_sets
 
@@ -53,6 +54,29 @@ print(json.dumps({
     'places': [box_contact_ros.__file__, core.native.__file__, *map(str, folders.values())],
     'files': sorted(f'{name}/{path.relative_to(folder)}' for name, folder in folders.items()
                     for path in folder.rglob('*') if path.is_file() and path.suffix != '.pyc')}))
+"""
+FETCHED = f"""
+cmake_minimum_required(VERSION 3.18)
+project(fetched LANGUAGES CXX)
+include(FetchContent)
+FetchContent_Declare(box_contact_ros SOURCE_DIR "{ROOT}")
+FetchContent_MakeAvailable(box_contact_ros)
+add_executable(first_contact "{EXAMPLE}/first_contact.cpp")
+target_link_libraries(first_contact PRIVATE box_contact_ros::box_contact)
+"""
+COMPILER = f"""#!/bin/sh
+# Compile each object once, hardly optimised: all builds below have the same sources and flags.
+# CMake's folder of the target and the name of the source tell objects apart.
+for word; do
+    if [ "$before" = -o ]; then output=$word; fi
+    before=$word
+done
+kept=$(dirname "$0")/$(echo "${{output##*CMakeFiles/}}" | tr / -)
+case $output in
+    *.dir/*) [ -e "$kept" ] && exec cp "$kept" "$output" ;;
+    *) exec {os.environ.get('CXX', 'g++')} "$@" -Og ;;
+esac
+{os.environ.get('CXX', 'g++')} "$@" -Og -fno-inline && cp "$output" "$kept"
 """
 USER = """
 from box_contact_ros import ContactSolver
@@ -102,15 +126,18 @@ class Installation:
 
 
 @pytest.fixture(scope='module')
-def installed(tmp_path_factory: pytest.TempPathFactory) -> Installation:
-    """Install a wheel into an environment that borrows the dependencies from this one.
+def compiler(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the compiler of all builds here."""
+    path = tmp_path_factory.mktemp('compiler') / 'c++'
+    path.write_text(COMPILER)
+    path.chmod(0o755)
+    return path
 
-    The compiler hardly optimises, which saves a minute.
-    """
+
+@pytest.fixture(scope='module')
+def installed(tmp_path_factory: pytest.TempPathFactory, compiler: Path) -> Installation:
+    """Install a wheel into an environment that borrows the dependencies from this one."""
     folder = tmp_path_factory.mktemp('installed')
-    compiler = folder / 'c++'
-    compiler.write_text(f'#!/bin/sh\nexec {os.environ.get("CXX", "g++")} "$@" -Og -fno-inline\n')
-    compiler.chmod(0o755)
     sources = copy_sources(folder / 'sources')
     options = ('--no-index', '--no-deps', '--no-build-isolation')
     run('env', f'CXX={compiler}', sys.executable, '-m', 'pip', 'wheel', *options,
@@ -158,11 +185,37 @@ def test_cmake_finds_the_library(installed: Installation, tmp_path: Path) -> Non
     """In the active environment, without an option; the example runs."""
     cmake = tool('cmake')
     run('env', f'PATH={installed.bin}:{os.environ["PATH"]}', cmake, '-S',
-        ROOT / 'docs' / 'examples' / 'cpp', '-B', tmp_path, cwd=tmp_path)
+        EXAMPLE, '-B', tmp_path, cwd=tmp_path)
     found = f'{NAME}_DIR:PATH={installed.bin.parent}/lib/cmake/{NAME}\n'
     assert found in (tmp_path / 'CMakeCache.txt').read_text()
     run(cmake, '--build', tmp_path, cwd=tmp_path)
     assert 'batch: 1 0, volumes 0.030 0.000 m3' in run(tmp_path / 'first_contact', cwd=tmp_path)
+
+
+def test_from_source(compiler: Path, tmp_path: Path) -> None:
+    """By FetchContent, which calls add_subdirectory; without Python."""
+    (tmp_path / 'CMakeLists.txt').write_text(FETCHED)
+    configure(tmp_path, tmp_path / 'build', f'-DCMAKE_CXX_COMPILER={compiler}')
+    assert example(tmp_path / 'build' / 'first_contact') == EXAMPLE_SAYS
+
+
+@pytest.mark.parametrize('kind', ['ON', 'OFF'])
+def test_a_plain_installation(compiler: Path, tmp_path: Path, kind: str) -> None:
+    """Shared and static: find_package below a prefix, pkg-config, and the files that pip has."""
+    prefix = tmp_path / 'prefix'
+    configure(ROOT, tmp_path / 'library', f'-DCMAKE_CXX_COMPILER={compiler}',
+              f'-DBUILD_SHARED_LIBS={kind}', '-DCMAKE_INSTALL_LIBDIR=lib')
+    run(tool('cmake'), '--install', tmp_path / 'library', '--prefix', prefix, cwd=tmp_path)
+    made = {path.relative_to(prefix) for path in prefix.rglob('*') if path.is_file()}
+    assert Path('include/box_contact/contact_message.hpp') in made
+    assert [path for path in made if path.suffix != '.a' and not (PREFIX / path).is_file()] == []
+    configure(EXAMPLE, tmp_path / 'example', f'-DCMAKE_PREFIX_PATH={prefix}')
+    assert example(tmp_path / 'example' / 'first_contact') == EXAMPLE_SAYS
+    found = run('env', f'PKG_CONFIG_PATH={prefix}/lib/pkgconfig', tool('pkg-config'), '--cflags',
+                '--libs', 'box_contact', cwd=tmp_path)
+    run('g++', '-std=c++17', EXAMPLE / 'first_contact.cpp', *found.split(), '-o', 'one',
+        cwd=tmp_path)
+    assert example(tmp_path / 'one') == EXAMPLE_SAYS
 
 
 def test_the_programs_are_in_bin(installed: Installation, setup_arguments: dict[str, Any],
