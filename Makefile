@@ -10,7 +10,7 @@ SHELL := bash
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
 .PHONY: help demo view test check reports docs docs-links tables dist coverage clean
-.PHONY: test-arm test-colcon test-debian13 test-schemas
+.PHONY: test-arm test-colcon test-debian13 test-schemas test-training
 
 # Arguments for the program behind the target: make test ARGS='-k sat -x'
 ARGS ?=
@@ -35,7 +35,8 @@ LINT := echo ruff; $(PY) -m ruff check .; echo mypy; $(PY) -m mypy
 help:
 	@echo 'make demo     the crane, the contact node, and contacts live in this terminal'
 	echo 'make view     the same in the browser, again and again'
-	echo 'make test     ruff, mypy and all tests'
+	echo 'make test     ruff, mypy, and all tests that need no PyTorch'
+	echo 'make test-training  the tests of training, for which it fetches PyTorch'
 	echo 'make check    linters, and the quick tests of core, solver and scene: a minute'
 	echo 'make test-colcon  the quick tests, as `colcon test` runs them in a workspace'
 	echo 'make test-schemas  the AsyncAPI document, by its own parser, which npm fetches'
@@ -97,6 +98,10 @@ reports:
 	    $(PY) docs/tables.py || failed+=' docs/tables.py'
 	fi
 	if [ -n "$$failed" ]; then echo "failed:$$failed" >&2; exit 1; fi
+
+test-training:
+	@.ci/setup training
+	exec $(PYTEST) -m training $(ARGS)
 
 # All tests there, which takes four times as long: make test-colcon ARGS=test
 test-colcon:

@@ -113,11 +113,11 @@ EXTRAS = {
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Put the longest files first; leave out what needs the network, unless -m asks for it."""
-    if 'network' not in config.option.markexpr:
-        remote = [item for item in items if item.get_closest_marker('network')]
-        config.hook.pytest_deselected(items=remote)
-        items[:] = [item for item in items if item not in remote]
+    """Put the longest files first; leave out what has a make target of its own, unless -m asks."""
+    for marker in {'network', 'training'} - set(config.option.markexpr.split()):
+        apart = [item for item in items if item.get_closest_marker(marker)]
+        config.hook.pytest_deselected(items=apart)
+        items[:] = [item for item in items if item not in apart]
     items.sort(key=lambda item: FIRST.index(item.path.name) if item.path.name in FIRST
                else len(FIRST))
 
@@ -153,7 +153,8 @@ def skip_without_extra(missing: str | None) -> None:
     """Skip what cannot import a module, if that is one of an extra."""
     for extra, modules in EXTRAS.items():
         if missing in modules:
-            pytest.skip(f'{missing} is not installed: pip install .[{extra}]',
+            pytest.skip(f'{missing} is not installed: pip install .[{extra}]'
+                        + (', or make test-training' if extra == 'train' else ''),
                         allow_module_level=True)
 
 

@@ -65,7 +65,9 @@ def test_every_program_is_listed() -> None:
     assert programs - {'benchmarks.searched'} <= set(listed())
 
 
-@pytest.mark.parametrize('name', listed())
+@pytest.mark.parametrize('name', [
+    pytest.param(name, marks=[pytest.mark.training] * (name == 'benchmarks.paper.search'))
+    for name in listed()])
 def test_a_listed_report_is_a_program(name: str, tmp_path: Path) -> None:
     """A module, or a folder with `__main__`; its `main` takes --quick and --out."""
     folder = importlib.util.find_spec(name).submodule_search_locations

@@ -9,12 +9,10 @@ from pathlib import Path
 
 import pytest
 
-torch = pytest.importorskip('torch')
-pytest.importorskip('matplotlib')
-
 from benchmarks.paper import search
 from benchmarks.paper.search import Candidate
 
+pytestmark = pytest.mark.training
 QUICK = ['--quick', '--candidates', '48', '--seed', '2']
 
 

@@ -255,7 +255,10 @@ COMMANDS = {
 }
 
 
-@pytest.mark.parametrize('command', commands())
+@pytest.mark.parametrize('command', [
+    pytest.param(command, marks=[pytest.mark.training] * bool(
+        re.match(r'python -m (training|benchmarks\.paper\.search)\b', command)))
+    for command in commands()])
 def test_command(command, program, setup_arguments):
     matching = [check for pattern, check in COMMANDS.items() if re.fullmatch(pattern, command)]
     assert len(matching) == 1, f'no check, or several, for: {command}'

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-torch = pytest.importorskip('torch')
+import torch
 
 from benchmarks.paper import dataset
 from benchmarks.paper.errors import (
@@ -26,6 +25,7 @@ from box_contact_ros.networks.weights_file import load_weights
 from training import __main__ as train
 from training import paper
 
+pytestmark = pytest.mark.training
 SMALL = PaperSettings((6, 9, 7, 4), networks=3, epochs=12, batch=50, rate=0.05)
 
 

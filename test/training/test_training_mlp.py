@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-torch = pytest.importorskip('torch')
+import torch
 
 from benchmarks.errors import contact_errors
 from benchmarks.pose_sets import SETS, Pairs
@@ -23,6 +22,7 @@ from training import recipe, samples
 from training.fit import PatchNetwork, errors_of, fit, loss_of, tensors
 from training.samples import MlpSamples, describe
 
+pytestmark = pytest.mark.training
 PAIRS = 20_000
 
 
