@@ -19,8 +19,7 @@ PYTHON = """#!/bin/bash
 # In the place of Python and uv: each writes what it is asked for into the file `calls`.
 case "$0 $*" in
     *'-m venv'*) mkdir -p .venv/bin; for name in python uv; do cp "$0" .venv/bin/$name; done ;;
-    *--version*) echo 'Python 3.12.0' ;;
-    *uv*compile*) echo 'numpy==2.4.6' >.venv/roots.txt; exit ;;
+    *uv*compile*) echo "$*" >compiled; touch .venv/roots.txt; exit ;;
     *' -e '*) echo built >box_contact_ros/core.so ;;
 esac
 case "$*" in *install*|*'-m venv'*) echo "$*" >>calls; sleep "${SLOW:-0}" ;; esac
@@ -101,6 +100,12 @@ def test_a_second_call_does_what_is_missing_alone(clone: Path) -> None:
     (clone / '.ci' / 'lock.txt').write_text('# an older lock')
     assert set_up(clone) == ['tools', 'roots', 'box-contact-ros']
     assert set_up(clone, 'test') == ['tools', 'roots']
+
+
+def test_pytorch_is_for_training_alone(clone: Path) -> None:
+    for target, asked in (('test', False), ('training', True), ('reports', True)):
+        set_up(clone, target)
+        assert ('--extra=train' in (clone / 'compiled').read_text().split()) == asked, target
 
 
 def test_a_killed_set_up_begins_anew_and_a_second_one_waits(clone: Path) -> None:
