@@ -41,8 +41,8 @@ from .rclpy_workarounds import (
 REFUSALS = (ValueError, rclpy.exceptions.ParameterException, RCLError)
 """What a node raises on parameters or arguments that it cannot start with."""
 SPIN_SECONDS = 10.0
-"""EventsExecutor hangs when it spins without a timeout (not reported), so it is spun in slices. Each
-leaves some 32 bytes behind in rclpy (7.1): of slices this long, 0.3 MB a day."""
+"""EventsExecutor hangs when it spins without a timeout (not reported), so it is spun in slices.
+Each leaves some 32 bytes behind in rclpy (7.1): of slices this long, 0.3 MB a day."""
 END_SECONDS = 8.0  # for a clean end; launch kills after ten
 NodeKind = TypeVar('NodeKind', bound=Node)
 LOG_SECONDS = 1.0  # the same complaint is logged at most this often
@@ -53,8 +53,8 @@ class GuardedNode(Node):
 
     Each request gets an answer, also where rclpy raises: its client would wait for ever.
 
-    EventsExecutor ends the process with SIGSEGV where the callback of a future raises, as tasks do in
-    https://github.com/ros2/rclpy/issues/1641 (fixed in rolling). It raises
+    EventsExecutor ends the process with SIGSEGV where the callback of a future raises, as it does
+    where a task raises: https://github.com/ros2/rclpy/issues/1641 (fixed in rolling). It raises
     what other callbacks raise, under two unthrottled lines that name no topic.
     """
 

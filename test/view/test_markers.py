@@ -142,6 +142,10 @@ def test_the_foxglove_layout_names_topics_and_fields_that_exist():
             found = json.loads(resource_path('msg_schemas', schemas[topic]).read_text('utf-8'))
             for field in fields:
                 found = found['properties'][field]
+                file, _, name = found.get('$ref', '').partition('#/$defs/')
+                if file:
+                    shared = json.loads(resource_path('msg_schemas', file).read_text('utf-8'))
+                    found = shared['$defs'][name]
             assert topic in known and path['enabled']
 
 
