@@ -243,7 +243,7 @@ def configure(source: Path, folder: Path, *options: str, **environment: str) -> 
 
 
 def test_by_find_package(tmp_path: Path) -> None:
-    """CMake needs no option where the environment is active; and a version that there is not."""
+    """No option is needed where the environment is active; and a version that there is not."""
     active = f'{PREFIX / "bin"}:{os.environ["PATH"]}'
     configure(EXAMPLE, tmp_path, PATH=active)
     found = re.search('^box_contact_ros_DIR:PATH=(.*)$', (tmp_path / 'CMakeCache.txt').read_text(),
