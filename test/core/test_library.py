@@ -29,7 +29,7 @@ from patience import PATIENCE
 from poses import Pairs, fields
 
 from box_contact_ros import Body, ContactSolver, PatchForces, make_model
-from box_contact_ros.core import FORCE, instruction_sets, native
+from box_contact_ros.core import FORCE, instruction_sets
 from box_contact_ros.solver.contact import FIELDS, Contacts
 from box_contact_ros.solver.pose import rotation_matrix
 
