@@ -90,7 +90,7 @@ def test_patterns_stand_for_pairs_of_which_one_box_moves(scene_of):
     (GOOD, '[' * 100_000, 'more than 16 collections are within each other in'),
     (GOOD, '{"a": ' * 100_000, 'more than 16 collections are within each other in'),
     (GOOD, 'a0: &a0 [1]\n' + ''.join(f'a{i}: &a{i} [{f"*a{i - 1}, " * 10}]\n'
-                                      for i in range(1, 30)),
+                                     for i in range(1, 30)),
      'aliases stand for more than 67108864 nodes in'),
     ('[0, 0, 1.2955, 0, 0, 0, 1]', '[0, 0, 1, 0, 0, 0, 0]', 'boxes.s1.pose: quaternion'),
     ('pose_topic: /crane/spreader', 'pose_topic: 2 crane', 'boxes.spreader.pose_topic: '),
