@@ -52,7 +52,7 @@ class SceneRows:
 
 
 @dataclass(frozen=True, eq=False)
-class Tick:
+class DrawnTick:
     """The poses of all boxes at one stamp, and the contacts that answer them."""
 
     rows: SceneRows
@@ -136,7 +136,7 @@ class Listener(GuardedNode):
         self._answer = stamp, read_touching(message, self.rows.scene), latency
         self._unanswered = math.inf
 
-    def tick(self) -> Tick | None:
+    def tick(self) -> DrawnTick | None:
         """Return the last contacts with their poses, or the last poses if nobody answers.
 
         Return None before the first pose.
@@ -150,4 +150,4 @@ class Listener(GuardedNode):
         poses = self.rows.poses.copy()
         for track in tracks:
             poses[track.boxes] = track.at(stamp)
-        return Tick(self.rows, stamp, self._frame_id, poses, answer, latency)
+        return DrawnTick(self.rows, stamp, self._frame_id, poses, answer, latency)

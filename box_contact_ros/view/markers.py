@@ -27,7 +27,7 @@ from ..node.runtime import run_node
 from ..node.topics import contact_qos
 from ..solver.contact import Contacts
 from . import style
-from .listener import SCENE_PARAMETERS, Listener, Tick
+from .listener import SCENE_PARAMETERS, DrawnTick, Listener
 
 PERIOD = 1 / 30  # time [s] between marker arrays
 LABELLED = 10  # contacts whose depth is written beside them, the deepest
@@ -54,7 +54,7 @@ def line_marker(header: Header, name: str, lines: np.ndarray, *, width: float,
     return marker
 
 
-def scene_markers(tick: Tick) -> list[Marker]:
+def scene_markers(tick: DrawnTick) -> list[Marker]:
     """Return what draws a tick: boxes by their row as id, contacts the deepest first."""
     header = make_header(tick.stamp, tick.frame_id)
     markers = list(_boxes(header, tick))
@@ -64,7 +64,7 @@ def scene_markers(tick: Tick) -> list[Marker]:
     return markers
 
 
-def _boxes(header: Header, tick: Tick) -> Iterator[Marker]:
+def _boxes(header: Header, tick: DrawnTick) -> Iterator[Marker]:
     """Yield a translucent cube for each box that has a pose."""
     poses = style.unit_poses(tick.poses)
     for row in np.flatnonzero(~np.isnan(poses[:, 0])):

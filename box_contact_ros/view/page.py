@@ -30,7 +30,7 @@ from ..node.messages import NANOSECONDS
 from ..scene.scene_solver import Answer
 from ..solver.pose import rotation_matrix
 from . import style
-from .listener import SceneRows, Tick
+from .listener import DrawnTick, SceneRows
 
 HISTORY = 12.0  # length [s] of the charts
 ROOM = 0.1  # above the values of a chart, as a share of them
@@ -151,7 +151,7 @@ class Page:
 
     # --- the drawing ------------------------------------------------------------------------------
 
-    def draw(self, tick: Tick) -> None:
+    def draw(self, tick: DrawnTick) -> None:
         """Show boxes and contacts."""
         with self._server.atomic():
             known = ~np.isnan(tick.poses[:, 0])
@@ -196,7 +196,7 @@ class Page:
         self._edges = add('/edges', CUBE_EDGES.reshape(-1, 3), np.arange(36).reshape(12, 3),
                           colours // 2, wireframe=True)
 
-    def _draw_boxes(self, tick: Tick, known: np.ndarray) -> None:
+    def _draw_boxes(self, tick: DrawnTick, known: np.ndarray) -> None:
         """Move the boxes; those without a pose shrink to nothing."""
         poses = style.unit_poses(np.where(known[:, None], tick.poses, [0, 0, 0, 0, 0, 0, 1]))
         for mesh in (self._faces, self._edges):
@@ -221,7 +221,7 @@ class Page:
 
     # --- the camera -------------------------------------------------------------------------------
 
-    def _look_at(self, tick: Tick, known: np.ndarray) -> None:
+    def _look_at(self, tick: DrawnTick, known: np.ndarray) -> None:
         """Put origin, ground and the first camera where the boxes `known` (n,) are."""
         self._seen = known.sum()
         poses, sizes = tick.poses[known], tick.rows.sizes[known]
@@ -239,7 +239,7 @@ class Page:
 
     # --- figures and charts -----------------------------------------------------------------------
 
-    def show(self, tick: Tick | None, force: float, *, model: str) -> None:
+    def show(self, tick: DrawnTick | None, force: float, *, model: str) -> None:
         """Show figures and charts of a tick; without a tick, that the page waits for poses.
 
         The charts then stay as they are until the next tick begins them anew.
@@ -287,7 +287,7 @@ class Page:
             legend={'show': False}, padding=(10, 24, 0, 0), height=145)
 
 
-def figures(tick: Tick | None, force: float, *, model: str) -> str:
+def figures(tick: DrawnTick | None, force: float, *, model: str) -> str:
     """Return a line in plain words and a table, as HTML; each value has its name as id."""
     words, rows = 'waiting for poses', [('model', 'model', model or '–')]
     if tick is not None:

@@ -25,7 +25,7 @@ from box_contact_ros.node.messages import make_header
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.scene import Box, Pair, Scene
 from box_contact_ros.solver.contact import Contact
-from box_contact_ros.view.listener import SceneRows, Tick, read_touching
+from box_contact_ros.view.listener import DrawnTick, SceneRows, read_touching
 from box_contact_ros.view.markers import LABELLED, NAMESPACES, MarkersNode, scene_markers
 
 SLAB, CUBE = (2.0, 4.0, 1.0), (2.0, 2.0, 2.0)
@@ -50,7 +50,7 @@ def drawing(touching, scene=YARD):
     rows = SceneRows(scene)
     poses = np.where(np.isnan(rows.poses), [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0], rows.poses)
     answer = read_touching(contacts_at(STAMP, touching), scene)
-    markers = scene_markers(Tick(rows, STAMP, 'yard', poses, answer, 0.0))
+    markers = scene_markers(DrawnTick(rows, STAMP, 'yard', poses, answer, 0.0))
     return markers, {name: [m for m in markers if m.ns == name] for name in NAMESPACES}
 
 

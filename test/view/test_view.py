@@ -45,9 +45,9 @@ from box_contact_ros.solver.pose import rotation_matrix
 from box_contact_ros.view import listener
 from box_contact_ros.view.listener import (
     SCENE_PARAMETERS,
+    DrawnTick,
     Listener,
     SceneRows,
-    Tick,
     read_touching,
 )
 from box_contact_ros.view.page import CUBE as CUBE_CORNERS
@@ -262,7 +262,7 @@ def test_all_corners_are_in_view_whatever_its_shape(aspect, extents):
 
 def tick_of(stamp, pose_b, contacts):
     """Return a tick of two boxes with contacts by pair, box a at the origin."""
-    return Tick(ROWS, stamp, 'yard', np.array([ORIGIN, pose_b], dtype=float),
+    return DrawnTick(ROWS, stamp, 'yard', np.array([ORIGIN, pose_b], dtype=float),
                 read_touching(contacts_at(stamp, contacts), BOTH), 2e-3)
 
 
@@ -463,9 +463,8 @@ def test_two_hundred_boxes_in_a_browser():
     contacts = {pair: solver(pose, boxes[pair.b].pose) for pair, pose in zip(pairs[:99], placed)}
     message = contacts_at(START, contacts, [pairs[99].label])
     with closing(Page('127.0.0.1', 8450, rows)) as page, open_page(page.url) as tab:
-        bring(page, Tick(rows, START, 'yard', np.where(np.isnan(rows.poses), np.r_[placed, placed],
-                                                       rows.poses),
-                         read_touching(message, scene), 1e-3))
+        known = np.where(np.isnan(rows.poses), np.r_[placed, placed], rows.poses)
+        bring(page, DrawnTick(rows, START, 'yard', known, read_touching(message, scene), 1e-3))
         tab.wait_for('document.getElementById("pairs")?.innerText == "99 of 100"')
         assert tab.text('stale') == '1'
         wait_for_drawing(tab, 5e-4)
