@@ -22,7 +22,7 @@ import mujoco
 import numpy as np
 
 from box_contact_ros import Body, ContactSolver, PatchForces
-from box_contact_ros.scene.laws import FRICTION, GRAVITY
+from box_contact_ros.scene.forces import FRICTION, GRAVITY
 from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 
 # MuJoCo would write warnings to a file MUJOCO_LOG.TXT in the working directory.

@@ -14,7 +14,7 @@ from .solver.contact_solver import ContactSolver
 
 if TYPE_CHECKING:
     from .models import make_model
-    from .scene.laws import Body, PatchForces
+    from .scene.forces import Body, PatchForces
     from .scene.scene import Box, Pair, Scene
     from .scene.scene_file import read_scene
     from .scene.scene_solver import SceneSolver
@@ -24,7 +24,7 @@ __all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Pair', 'Patch
 
 _LOADED_WHEN_USED = {
     'models': ('make_model',),
-    'scene.laws': ('Body', 'PatchForces'),
+    'scene.forces': ('Body', 'PatchForces'),
     'scene.scene_file': ('read_scene',),
     'scene.scene': ('Box', 'Pair', 'Scene'),
     'scene.scene_solver': ('SceneSolver',),

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from ..scene.laws import GRAVITY, Body
+from ..scene.forces import GRAVITY, Body
 from ..scene.scene import CONTAINER
 from ..solver.pose import cross, rotation_matrix
 

@@ -17,7 +17,7 @@ import poses
 import pytest
 
 from box_contact_ros import Body, ContactSolver, PatchForces
-from box_contact_ros.scene.laws import GRAVITY
+from box_contact_ros.scene.forces import GRAVITY
 
 CORE = Path(__file__).resolve().parents[2] / 'box_contact_ros' / 'core'
 FLAGS = ('-std=c++17', '-O2', '-ffp-contract=off', '-Wno-psabi', '-DBOX_CONTACT_VERSION=""')

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from box_contact_ros import Body, Contacts, ContactSolver, PatchForces
-from box_contact_ros.scene.laws import GRAVITY
+from box_contact_ros.scene.forces import GRAVITY
 from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 
 STEP = 0.001  # [s]
