@@ -441,3 +441,37 @@ def test_reset_forgets_all() -> None:
     world = World(pose(z=0.5)).run(50)
     world.forces.reset()
     assert np.abs(world.wrenches()).max() < 1e-9
+
+
+# --- other frames and units -----------------------------------------------------------------------
+
+
+def landed(turn=(0.0, 0.0, 0.0, 1.0), shift=(0.0, 0.0, 0.0), carrier=(0.0, 0.0, 0.0),
+           factor: float = 1.0) -> np.ndarray:
+    """Return where two tilted boxes are, .4 s after they were let go, one upon the other.
+
+    All is moved and turned, on a carrier at a speed [m/s], and masses are multiplied; the poses
+    returned are as if they were not.
+    """
+    world = World(pose(z=0.52, turn=(0.02, 0.01, 0.0, 1.0)),
+                  pose(0.2, 0.1, 1.55, (0.0, 0.03, 0.2, 1.0)), mass=MASS * factor)
+    turn = np.array(turn) / np.linalg.norm(turn)
+    rotation = rotation_matrix(turn[None])[0]
+    world.poses[:, 3:] = quaternion_multiply(np.tile(turn, (3, 1)), world.poses[:, 3:])
+    world.poses[:, :3] = world.poses[:, :3] @ rotation.T + shift
+    world.velocities[:, :3] = carrier
+    world.outside[:, :3] = world.outside[:, :3] @ rotation.T
+    world.run(400)
+    found = world.poses.copy()
+    found[:, :3] = (found[:, :3] - shift - 0.4 * np.array(carrier)) @ rotation
+    back = np.tile(turn * (-1, -1, -1, 1), (3, 1))
+    found[:, 3:] = quaternion_multiply(back, found[:, 3:])
+    return found / np.hstack([np.ones((3, 6)), np.sign(found[:, 6:])])
+
+
+@pytest.mark.parametrize('other', [
+    {'turn': (0.3, -0.5, 0.2, 0.7)}, {'shift': (100.0, -50.0, 20.0)}, {'carrier': (3.0, 1.0, 0.5)},
+    {'factor': 1000.0}], ids=lambda other: next(iter(other)))
+def test_the_same_motion_in_another_frame_and_unit(other) -> None:
+    """Turned, moved by 100 m, on a carrier at 3 m/s, and with masses of 1,000 times as much."""
+    assert landed(**other) == pytest.approx(landed(), abs=1e-9)

@@ -72,7 +72,7 @@ struct Patch {
 
   double press, spin;      // N [N s], m [N m s]
   Vec<double> slip, rock;  // f [N s], τ [N m s]
-  Vec<double> given_at;    // where they acted
+  Vec<double> given_arm;   // from A's centre of mass to where they acted [m]
 
   std::pair<int32_t, int32_t> pair() const { return {a, b}; }
 
@@ -87,7 +87,7 @@ struct Patch {
                     is_amount(late) && is_amount(age);
     return is_asked && press >= 0.0 && press <= wrench_max && std::fabs(spin) <= wrench_max &&
            is_within(slip, wrench_max) && is_within(rock, wrench_max) &&
-           is_within(given_at, place_max);
+           is_within(given_arm, place_max);
   }
 };
 
@@ -284,7 +284,7 @@ class PatchForces {
         next.spin = old->spin;
         next.slip = old->slip;
         next.rock = old->rock;
-        next.given_at = old->given_at;
+        next.given_arm = old->given_arm;
       }
       *kept++ = next;
     }
@@ -386,7 +386,7 @@ class PatchForces {
   // The impulses of the last window, about the point of this step.
   void remember(const Patch& patch, const Block& block, Vec<double>& press, Vec<double>& rub) const {
     const Rectangle& shape = block.shape;
-    Vec<double> moved = patch.given_at - places_[size_t(patch.a)].position - block.arm_a;
+    Vec<double> moved = patch.given_arm - block.arm_a;
     Vec<double> rock = patch.rock + cross(moved, patch.press * patch.normal);
     double spin = patch.spin + dot(patch.normal, cross(moved, patch.slip));
     press = {patch.press, clamp(dot(rock, shape.axis_1), patch.press * shape.half_2),
@@ -418,7 +418,7 @@ class PatchForces {
     patch.rock = block.press[1] * shape.axis_1 + block.press[2] * shape.axis_2;
     patch.slip = block.rub[0] * shape.axis_1 + block.rub[1] * shape.axis_2;
     patch.spin = shape.radius * block.rub[2];
-    patch.given_at = places_[size_t(patch.a)].position + block.arm_a;
+    patch.given_arm = block.arm_a;
   }
 
   // Solve the blocks in turn, so many times. A block whose bodies have not changed since its last turn
