@@ -46,7 +46,7 @@ typedef struct bc_wrench {
   double torque[3]; /* about the centre of mass, up to 1e100 N m */
 } bc_wrench;
 
-/* An answer: rows of pairs, as bc_solve_rows gives them. Rows without volume are passed over. A row
+/* An answer: rows of pairs, as bc_collide_rows gives them. Rows without volume are passed over. A row
  * whose separation is NaN is stale: the patch that is held for its pair stays. */
 typedef struct bc_patches {
   size_t size; /* sizeof(bc_patches) */
