@@ -18,6 +18,7 @@ from functools import partial
 
 import numpy as np
 
+from box_contact_ros import make_model
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 
@@ -132,7 +133,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
     rows = []
     for model in MODELS:
-        solver = ContactSolver(model=model)
+        solver = ContactSolver(model=make_model(model))
         rows += [examine(model, family, cases[family], partial(Pairs.contacts, solver=solver))
                  for family in tqdm(families, desc=f'stability, {model}', unit='family')]
     about = output.machine(('numpy', 'python-fcl'))

@@ -323,8 +323,9 @@ def _check_pairs(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
             first = first_of.setdefault(value, number)
             if first != number:
                 a, b = pairs[first].a, pairs[first].b
-                raise SceneError(('pairs', number, *field),
-                            f'the same {what} as that of {short_repr(a)} and {short_repr(b)}')
+                raise SceneError(
+                    ('pairs', number, *field),
+                    f'the same {what} as that of {short_repr(a)} and {short_repr(b)}')
 
 
 def _check_pattern(scene: Scene, number: int, is_a: np.ndarray, is_b: np.ndarray) -> None:
@@ -335,7 +336,7 @@ def _check_pattern(scene: Scene, number: int, is_a: np.ndarray, is_b: np.ndarray
     for side, is_matched, pattern in zip('ab', (is_a, is_b), scene.patterns[number]):
         if not is_matched.any():
             raise SceneError(('patterns', number, side),
-                        f'{short_repr(pattern)} is the name of no box')
+                             f'{short_repr(pattern)} is the name of no box')
     # Ordered pairs of different boxes, less those of two fixed ones.
     every, fixed = (int(a.sum() * b.sum() - (a & b).sum()) for a, b in (
         (is_a, is_b), (is_a & scene.is_fixed, is_b & scene.is_fixed)))

@@ -263,7 +263,7 @@ def test_all_corners_are_in_view_whatever_its_shape(aspect, extents):
 def tick_of(stamp, pose_b, contacts):
     """Return a tick of two boxes with contacts by pair, box a at the origin."""
     return DrawnTick(ROWS, stamp, 'yard', np.array([ORIGIN, pose_b], dtype=float),
-                read_touching(contacts_at(stamp, contacts), BOTH), 2e-3)
+                     read_touching(contacts_at(stamp, contacts), BOTH), 2e-3)
 
 
 def shown(text):
