@@ -243,7 +243,7 @@ def test_a_needle_whose_covariance_clipping_had_wrong():
 
 
 def test_columns_whose_covariance_planes_had_wrong():
-    """A piece that is lost at the tip moves the covariance by more than the volume."""
+    """The origin of their sums was 6 to 12 radii from the centroid: second moments cancelled."""
     for column in poses.COLUMNS:
         check('column', 0, *(np.array([part]) for both in column for part in both))
 

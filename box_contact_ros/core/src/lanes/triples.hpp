@@ -57,7 +57,7 @@ template <class T>
 BC_INLINE Vec<T> components(const Triple<T>& a) {
   return {a[0], a[1], a[2]};
 }
-// One pair of several as a triple, and back.
+// One pair of several as a triple.
 template <class T>
 BC_INLINE Triple<Number<T>> triple_of_lane(const Triple<T>& a, int i) {
   if constexpr (is_scalar<T>) {
@@ -66,15 +66,6 @@ BC_INLINE Triple<Number<T>> triple_of_lane(const Triple<T>& a, int i) {
     return triple(lane(a, i));
   }
 }
-template <class T>
-BC_INLINE void set_triple_of_lane(Triple<T>& a, int i, const Vec<Number<T>>& value) {
-  if constexpr (is_scalar<T>) {
-    a = triple(value);
-  } else {
-    set_lane(a, i, value);
-  }
-}
-
 // A formula of single numbers, for each number of triples.
 template <class Formula, class T, class... More>
 BC_INLINE Vec<T> each(Formula formula, const Vec<T>& a, const More&... more) {

@@ -99,10 +99,6 @@ BC_INLINE T largest(const Vec<T>& a) {
   return max(max(a[0], a[1]), a[2]);
 }
 template <class T>
-BC_INLINE T smallest(const Vec<T>& a) {
-  return min(min(a[0], a[1]), a[2]);
-}
-template <class T>
 BC_INLINE Vec<T> select(Mask<T> mask, const Vec<T>& a, const Vec<T>& b) {
   return {select<T>(mask, a[0], b[0]), select<T>(mask, a[1], b[1]), select<T>(mask, a[2], b[2])};
 }

@@ -39,8 +39,8 @@ constexpr double safely_inside = 1e-6;
 constexpr double outside_by_rounding = 0x1p-48;
 
 // Shares of the accuracy that the twelve equations may be off by. The covariance may be wrong by some
-// times as much as the diagonal is, and by as much again for each time that the square of the centroid's
-// distance from the origin holds its trace.
+// times as much as the diagonal is. An origin of the sums that is far from the centroid adds to that: the
+// square of the distance, divided by the trace.
 constexpr double off_diagonal_share = 0.01, diagonal_share = 0.3, closure_share = 0.1;
 constexpr double covariance_diagonal_share = 0.25;
 
