@@ -80,9 +80,11 @@ def main(args: Sequence[str] | None = None) -> int:
     results = '\n\n'.join(filter(None, (void, compared, table(rows), *faults, stopped)))
     print(f'\n{results}', flush=True)
     if options.out:
-        draw(options.out / 'bench.png', logs, block=bench.block)
-        (options.out / 'bench.md').write_text(
-            f'# Bench\n\n![Latencies of each node](bench.png)\n\n{about}\n\n{results}\n', 'utf-8')
+        name = f'bench_{options.model}'
+        draw(options.out / f'{name}.png', logs, block=bench.block)
+        (options.out / f'{name}.md').write_text(
+            f'# Bench of `{options.model}`\n\n![Latencies of each node]({name}.png)\n\n'
+            f'{about}\n\n{results}\n', 'utf-8')
     faulty = any(row['wrong'] or row['lost'] and row['node'] != 'soup' for row in rows)
     return 128 + signals[0] if signals else int(faulty or bool(faults) or bool(void))
 
@@ -97,8 +99,8 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
     parser.add_argument('--model', type=model_name, default='exact', metavar='NAME',
                         help=f'of the contact node: {", ".join(MODELS)} (default: %(default)s)')
     parser.add_argument('--out', type=Path, metavar='DIR',
-                        help='folder for the report, bench.md, and its picture, bench.png, which '
-                             'needs the extra report (default: none)')
+                        help='folder for the report, bench_NAME.md, and its picture, which needs '
+                             'the extra report (default: none)')
     options = parser.parse_args(list(args))
     if options.out:
         try:

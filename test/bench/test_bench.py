@@ -46,10 +46,10 @@ def test_a_short_run(program, tmp_path):
     pytest.importorskip('matplotlib')
     running = bench(program, f'--rate 100 --duration 3 --model exact --out {tmp_path}')
     status = running.wait()
-    page = (tmp_path / 'bench.md').read_text()
+    page = (tmp_path / 'bench_exact.md').read_text()
     assert status == ('void' in page), running.output  # on a machine that is too busy
-    assert page.startswith('# Bench\n\n![Latencies of each node](bench.png)\n')
-    assert (tmp_path / 'bench.png').read_bytes().startswith(b'\x89PNG')
+    assert page.startswith('# Bench of `exact`\n\n![Latencies of each node](bench_exact.png)\n')
+    assert (tmp_path / 'bench_exact.png').read_bytes().startswith(b'\x89PNG')
     rows = rows_of(page)
     assert [row['node'] for row in rows] == ['echo', 'contact', 'soup']
     for row in rows:
