@@ -125,13 +125,13 @@ class BroadPhase {
     double low;  // where the box begins on the swept axis
     int32_t box;
   };
-  struct Body {
+  struct Reach {
     Bounds bounds;
     int32_t box;
     uint32_t first[2], last[2];  // tiles that it reaches
   };
   struct Entry {
-    uint32_t body, tile[2];
+    uint32_t reach, tile[2];
   };
   struct Tiling {
     int swept, tiled[2];
@@ -212,22 +212,22 @@ class BroadPhase {
     Tiling tiling = choose_tiling();
     for (Place& place : order_) place.low = bounds_[size_t(place.box)].low[tiling.swept];
     sort_order();
-    bodies_.clear();
+    reaches_.clear();
     size_t entries = 0;
     for (const Place& place : order_) {
       if (!known_[size_t(place.box)]) continue;
-      Body body{bounds_[size_t(place.box)], place.box, {}, {}};
+      Reach reach{bounds_[size_t(place.box)], place.box, {}, {}};
       int64_t tiles = 1;
       for (int t = 0; t < 2; ++t) {
-        body.first[t] = tiling.tile(t, body.bounds.low[tiling.tiled[t]]);
-        body.last[t] = tiling.tile(t, body.bounds.high[tiling.tiled[t]]);
-        tiles *= int64_t(body.last[t]) - body.first[t] + 1;
+        reach.first[t] = tiling.tile(t, reach.bounds.low[tiling.tiled[t]]);
+        reach.last[t] = tiling.tile(t, reach.bounds.high[tiling.tiled[t]]);
+        tiles *= int64_t(reach.last[t]) - reach.first[t] + 1;
       }
       if (tiles > most_tiles) {
         set_alone(place.box);
         continue;
       }
-      bodies_.push_back(body);
+      reaches_.push_back(reach);
       entries += size_t(tiles);
     }
     fill_table(entries);
@@ -277,26 +277,26 @@ class BroadPhase {
     }
   }
 
-  // Call `visit` with each tile of a body, and its place in the table.
+  // Call `visit` with each tile that a box reaches, and its place in the table.
   template <class Visit>
-  void each_tile(const Body& body, Visit visit) const {
+  void each_tile(const Reach& reach, Visit visit) const {
     size_t mask = starts_.size() - 2;
-    for (uint32_t u = body.first[0]; u <= body.last[0]; ++u)
-      for (uint32_t v = body.first[1]; v <= body.last[1]; ++v) visit(u, v, hash(u, v) & mask);
+    for (uint32_t u = reach.first[0]; u <= reach.last[0]; ++u)
+      for (uint32_t v = reach.first[1]; v <= reach.last[1]; ++v) visit(u, v, hash(u, v) & mask);
   }
 
-  // Counting sort of the entries by tile; within a tile they keep the order of the bodies.
+  // Counting sort of the entries by tile; within a tile they keep the order of the boxes.
   void fill_table(size_t entries) {
     size_t slots = 1;
     while (slots < entries) slots *= 2;
     starts_.assign(slots + 1, 0);
     entries_.resize(entries);
-    for (const Body& body : bodies_)
-      each_tile(body, [&](uint32_t, uint32_t, size_t slot) { ++starts_[slot]; });
+    for (const Reach& reach : reaches_)
+      each_tile(reach, [&](uint32_t, uint32_t, size_t slot) { ++starts_[slot]; });
     uint32_t end = 0;
     for (uint32_t& start : starts_) start = end += start;
-    for (size_t i = bodies_.size(); i-- > 0;)
-      each_tile(bodies_[i], [&](uint32_t u, uint32_t v, size_t slot) {
+    for (size_t i = reaches_.size(); i-- > 0;)
+      each_tile(reaches_[i], [&](uint32_t u, uint32_t v, size_t slot) {
         entries_[--starts_[slot]] = {uint32_t(i), {u, v}};
       });
   }
@@ -304,10 +304,10 @@ class BroadPhase {
   bool sweep_slot(uint32_t begin, uint32_t end, int swept) {
     for (uint32_t i = begin; i < end; ++i) {
       const Entry& entry = entries_[i];
-      const Body& a = bodies_[entry.body];
+      const Reach& a = reaches_[entry.reach];
       for (uint32_t j = i + 1; j < end; ++j) {
         const Entry& other = entries_[j];
-        const Body& b = bodies_[other.body];
+        const Reach& b = reaches_[other.reach];
         if (b.bounds.low[swept] > a.bounds.high[swept]) break;
         // Two boxes meet once: in the tile where their overlap begins.
         bool here = true;
@@ -352,7 +352,7 @@ class BroadPhase {
   std::vector<uint8_t> is_alone_;
   std::vector<int32_t> alone_;
   std::vector<double> sample_;
-  std::vector<Body> bodies_;
+  std::vector<Reach> reaches_;
   std::vector<Entry> entries_;
   std::vector<uint32_t> starts_, begins_;
   std::vector<Found> found_, sorted_;
