@@ -14,16 +14,18 @@ from .solver.contact_solver import ContactSolver
 
 if TYPE_CHECKING:
     from .models import make_model
+    from .scene.contacts_of import contacts_of
     from .scene.forces import Body, PatchForces
     from .scene.scene import Box, Pair, Scene
     from .scene.scene_file import read_scene
     from .scene.scene_solver import SceneSolver
 
 __all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Pair', 'PatchForces', 'Scene',
-           'SceneSolver', 'make_model', 'read_scene']
+           'SceneSolver', 'contacts_of', 'make_model', 'read_scene']
 
 _LOADED_WHEN_USED = {
     'models': ('make_model',),
+    'scene.contacts_of': ('contacts_of',),
     'scene.forces': ('Body', 'PatchForces'),
     'scene.scene_file': ('read_scene',),
     'scene.scene': ('Box', 'Pair', 'Scene'),

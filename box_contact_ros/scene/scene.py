@@ -26,7 +26,8 @@ ALL_BOXES = 'all boxes'
 """Source of these poses: no box of a scene file can have this name."""
 EVERY_PAIR = (('*', '*'),)
 """Patterns of a scene in which each two boxes are a pair, if one of them moves."""
-MOVES = ': leave `pose` out of a box that moves, and give its pose in the call'
+MOVES = (': leave `pose` out of a box that moves, and give its pose in the call; or, in Python, '
+         'ask contacts_of(sizes, poses)')
 """What to do about boxes that are all fixed."""
 ALONE = -1
 """Instead of box b, in rows of boxes: all pairs of box a that patterns ask for."""

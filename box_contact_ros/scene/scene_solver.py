@@ -17,20 +17,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import LENGTH_MAX, native
-from ..solver.checks import as_floats, as_number, as_whole, pose_fault, short_repr
+from ..solver.checks import as_floats, as_number, as_whole, short_repr
 from ..solver.contact import Contact, Contacts
 from ..solver.contact_solver import ContactSolver
 from ..solver.models import Model
+from .contacts_of import find_contacts, in_contact
 from .scene import Pair, Scene
 
 NOWHERE = np.full(7, np.nan)
 """Instead of the pose of a box that is not there."""
-
-
-class TooManyNear(ValueError):
-    """A tick with more pairs near each other than the solver was to answer."""
-
-    reason = 'too many pairs near'
 
 
 class Answer(NamedTuple):
@@ -126,22 +121,11 @@ class SceneSolver:
         Raises ValueError for numbers that are no pose, and for more or fewer poses than that.
         """
         self._set_poses(poses)
-        pairs, stale, refused = self._broad_phase.find(self._poses, self._most_near)
-        if refused >= 0:
-            raise ValueError(f'pose of {self.scene.names[refused]}: '
-                             f'{pose_fault(self._poses[refused])}')
-        near = len(pairs)
-        if near > self._most_near:
-            raise TooManyNear(f'more than {self._most_near} pairs are near each other, and so many '
-                              'are not answered')
-        contacts = self._solver.batch(self._poses, sizes=self._size, pairs=pairs)
-        if self.margin or False in contacts.colliding.tobytes():
-            listed = contacts.separation <= self.margin if self.margin else contacts.colliding
-            rows = np.flatnonzero(listed)
-            if self.margin:
-                rows = rows[np.argsort(~contacts.colliding[rows], kind='stable')]
-            pairs, contacts = pairs[rows], contacts[rows]
-        return Answer(pairs, contacts, near, stale, self.scene)
+        near, contacts, stale = find_contacts(
+            self._broad_phase, self._solver, self._size, self._poses,
+            lambda box: f'pose of {self.scene.names[box]}:', most_near=self._most_near)
+        pairs, contacts = in_contact(near, contacts, self.margin)
+        return Answer(pairs, contacts, len(near), stale, self.scene)
 
     def _set_poses(self, poses: Sequence[np.ndarray | None] | np.ndarray) -> None:
         """Take the poses of the moving boxes."""

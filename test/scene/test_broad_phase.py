@@ -15,8 +15,9 @@ import pytest
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import native
+from box_contact_ros.scene.contacts_of import TooManyNear
 from box_contact_ros.scene.scene import ALONE, EVERY_PAIR, Box, Pair, Scene
-from box_contact_ros.scene.scene_solver import SceneSolver, TooManyNear
+from box_contact_ros.scene.scene_solver import SceneSolver
 
 ALL = np.ones((1, 1), np.uint8)
 NONE = np.zeros((0, 2), np.int64)
@@ -254,8 +255,9 @@ def test_bad_poses_are_refused_in_a_sweep():
 CROWD = """
 import resource
 import numpy as np
+from box_contact_ros.scene.contacts_of import TooManyNear
 from box_contact_ros.scene.scene import EVERY_PAIR, Box, Scene
-from box_contact_ros.scene.scene_solver import SceneSolver, TooManyNear
+from box_contact_ros.scene.scene_solver import SceneSolver
 
 boxes = {f'b{n}': Box((1.0, 1.0, 1.0)) for n in range(8000)}
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -22,6 +22,7 @@ from box_contact_ros import (
     PatchForces,
     Scene,
     SceneSolver,
+    contacts_of,
     make_model,
     read_scene,
 )
@@ -34,6 +35,7 @@ BODY = Body.of_box(UNIT, 1.0)
 FORCES = PatchForces([BODY, BODY])
 CONTACTS = SOLVER.batch(POSES[:1], POSES[1:])
 BOXES = {name: Box(UNIT) for name in 'ab'}
+FIXED = {name: Box(UNIT, POSE) for name in 'ab'}
 PAIR = Pair.between('a', 'b')
 SCENE = SceneSolver(Scene(BOXES, (PAIR,)))
 NAN, INF = math.nan, math.inf
@@ -141,6 +143,8 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: scene(pairs=(('a', 'b'),)), 'pairs[0]', "('a', 'b')"),
     (lambda: scene(pairs=(Pair('p', 'a', 'c'),)), 'pairs[0].b', "'c'"),
     (lambda: scene(patterns=('*',)), 'patterns[0]', "'*'"),
+    (lambda: scene(FIXED), 'pairs[0]', 'ask contacts_of'),
+    (lambda: scene(FIXED, (), patterns=(('*', '*'),)), 'patterns[0]', 'ask contacts_of'),
     (lambda: scene(frame_id=5), 'frame_id', '5'),
     (lambda: scene(pose_array='no'), 'pose_array', "'no'"),
     (lambda: SceneSolver(None), 'scene', 'None'),
@@ -150,6 +154,16 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: SCENE([POSE]), 'poses', '1'),
     (lambda: SCENE([POSE, 'x']), 'pose of b', "'x'"),
     (lambda: SCENE(POSES * 0), 'pose of a', 'w=0'),
+    (lambda: contacts_of(UNIT, POSE), 'poses', '(7,)'),
+    (lambda: contacts_of(UNIT, POSES * 0), 'poses[0]', 'w=0'),
+    (lambda: contacts_of((1, 2, -1), POSES), 'sizes', '(1, 2, -1)'),
+    (lambda: contacts_of([UNIT, (1, 2, -1)], POSES), 'sizes[1]', '(1, 2, -1)'),
+    (lambda: contacts_of([UNIT], POSES), 'sizes', '(1, 3)'),
+    (lambda: contacts_of(UNIT, POSES, [(0, 2)]), 'pairs[0]', '(0, 2)'),
+    (lambda: contacts_of(UNIT, POSES, [(0, 1), (1, 1)]), 'pairs[1]', 'box 1'),
+    (lambda: contacts_of(UNIT, POSES, fixed=[0, 1]), 'fixed', '[0, 1]'),
+    (lambda: contacts_of(UNIT, POSES, fixed=[[True], []]), 'fixed', '[[True], []]'),
+    (lambda: contacts_of(UNIT, POSES, threads=0), 'threads', '0'),
     (lambda: read_scene(5), 'path', '5'),
     (lambda: read_scene('no.yaml'), 'scene', "'no.yaml'"),
     (lambda: read_scene('a\0b'), 'path', "'a\\x00b'"),

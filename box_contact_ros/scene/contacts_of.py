@@ -1,0 +1,93 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Which of many boxes touch: a broad phase in the core, then the solver.
+
+`contacts_of` asks once, about any boxes. A `SceneSolver` asks at each tick, about the same ones.
+"""
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..core import native
+from ..solver.checks import as_floats, as_places, as_size, pose_fault, short_repr
+from ..solver.contact import Contacts
+from ..solver.contact_solver import ContactSolver
+
+
+class TooManyNear(ValueError):
+    """More pairs near each other than were to be answered."""
+
+    reason = 'too many pairs near'
+
+
+def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = None, *,
+                fixed: ArrayLike | None = None, threads: int = 1) -> tuple[np.ndarray, Contacts]:
+    """Return which boxes touch, as rows (k, 2) of their indices a and b, and the k contacts.
+
+    sizes: full extents (n, 3), or (3,) of all boxes [m].
+    poses: (n, 7) in a common frame; seven NaN leave a box out.
+    pairs: (m, 2), the pairs that are asked for, in their order; None: each two boxes, a < b.
+    fixed: (n,) bool, boxes that never move. Without `pairs`, two of them are no pair.
+
+    Raises ValueError, with the field and the value, for what is not a size, a pose or a pair.
+    """
+    poses = as_floats(poses, 'poses', 'poses (n, 7) of rows x y z qx qy qz qw', (None, 7))
+    count = len(poses)
+    sizes = as_floats(sizes, 'sizes', f'full extents (3,) or ({count}, 3)', (3,), (count, 3))
+    sizes = np.tile(as_size(sizes, 'sizes'), (count, 1)) if sizes.ndim == 1 else sizes
+    listed = as_places([] if pairs is None else pairs, 'pairs', count)
+    if (alone := np.flatnonzero(listed[:, 0] == listed[:, 1])).size:
+        raise ValueError(f'pairs[{alone[0]}] is box {listed[alone[0], 0]} with itself')
+    groups_meet = np.ones((1, 1) if pairs is None and count else (0, 0), np.uint8)
+    broad_phase = native.BroadPhase(sizes, _as_flags(fixed, 'fixed', count), 0.0, listed,
+                                    np.zeros(count, np.int32), groups_meet)
+    near, contacts, _ = find_contacts(broad_phase, ContactSolver(), sizes, poses,
+                                      'poses[{}]'.format, threads=threads)
+    return in_contact(near, contacts)
+
+
+def _as_flags(value: ArrayLike | None, name: str, count: int) -> np.ndarray:
+    """Return an array (count,) of True and False; None: all False."""
+    if value is None:
+        return np.zeros(count, bool)
+    with suppress(ValueError):  # of rows of unequal lengths
+        flags = np.asarray(value)
+        if flags.dtype == bool and flags.shape == (count,):
+            return flags
+    raise ValueError(f'{name} must be True or False for each of {count} boxes, not '
+                     f'{short_repr(value)}')
+
+
+def find_contacts(broad_phase: native.BroadPhase, solver: ContactSolver, sizes: np.ndarray,
+                  poses: np.ndarray, name_of: Callable[[int], str], *,
+                  most_near: int = sys.maxsize, threads: int = 1,
+                  ) -> tuple[np.ndarray, Contacts, np.ndarray]:
+    """Return the pairs (k, 2) that are near, their contacts, and the stale rows (m, 2).
+
+    name_of: what a refusal calls the pose of a box.
+    Raises TooManyNear for more than `most_near` pairs, and ValueError for a bad pose.
+    """
+    pairs, stale, refused = broad_phase.find(poses, most_near)
+    if refused >= 0:
+        raise ValueError(f'{name_of(refused)} {pose_fault(poses[refused])}')
+    if len(pairs) > most_near:
+        raise TooManyNear(f'more than {most_near} pairs are near each other, and so many are not '
+                          'answered')
+    return pairs, solver.batch(poses, sizes=sizes, pairs=pairs, threads=threads), stale
+
+
+def in_contact(pairs: np.ndarray, contacts: Contacts, margin: float = 0.0,
+               ) -> tuple[np.ndarray, Contacts]:
+    """Return the pairs in contact, then those apart by `margin` [m] at most, and their contacts."""
+    if not margin and False not in contacts.colliding.tobytes():
+        return pairs, contacts
+    rows = np.flatnonzero(contacts.separation <= margin if margin else contacts.colliding)
+    if margin:
+        rows = rows[np.argsort(~contacts.colliding[rows], kind='stable')]
+    return pairs[rows], contacts[rows]

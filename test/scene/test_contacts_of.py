@@ -1,0 +1,61 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""contacts_of: what a test of every two boxes finds, bit for bit."""
+from __future__ import annotations
+
+import numpy as np
+import poses
+import pytest
+
+from box_contact_ros import Box, ContactSolver, Scene, SceneSolver, contacts_of
+
+
+def heap(rng, n):
+    """Return sizes and poses of boxes of which some touch."""
+    place = np.hstack((rng.uniform(-2, 2, (n, 3)), poses.unit_quaternions(rng, n)))
+    return np.exp(rng.uniform(-1, 0.5, (n, 3))), place
+
+
+def same(mine, theirs):
+    return all(np.array_equal(one, other, equal_nan=True)
+               for one, other in zip(*map(poses.fields, (mine, theirs))))
+
+
+@pytest.mark.parametrize('n', [0, 1, 2, 20, 90])
+def test_contacts_are_those_of_every_pair(n):
+    """Each two boxes but two fixed ones and those left out, by index; few boxes and many."""
+    rng = np.random.default_rng(n)
+    size, pose = heap(rng, n)
+    fixed, known = rng.random(n) < 0.3, rng.random(n) < 0.9
+    every = np.argwhere(np.triu(known & known[:, None] & ~(fixed & fixed[:, None]), 1))
+    wanted = ContactSolver().batch(pose, sizes=size, pairs=every)
+    pairs, contacts = contacts_of(size, np.where(known[:, None], pose, np.nan), fixed=fixed,
+                                  threads=2)
+    hit = np.flatnonzero(wanted.colliding)
+    assert np.array_equal(pairs, every[hit]) and (len(hit) > n or n < 20)
+    assert same(contacts, wanted[hit])
+
+
+def test_listed_pairs_keep_their_order_and_sides():
+    """A pair of two fixed boxes too; and one size may stand for all boxes."""
+    rng = np.random.default_rng(1)
+    _, pose = heap(rng, 30)
+    listed = rng.permutation(np.argwhere(~np.eye(30, dtype=bool)))[:300]
+    wanted = ContactSolver(poses.CUBE, poses.CUBE).batch(pose, pairs=listed)
+    pairs, contacts = contacts_of(poses.CUBE, pose.tolist(), listed, fixed=[True] * 30)
+    hit = np.flatnonzero(wanted.colliding)
+    assert np.array_equal(pairs, listed[hit]) and 30 < len(hit) < 300
+    assert same(contacts, wanted[hit])
+    assert len(contacts_of(poses.CUBE, pose, [])[0]) == 0
+
+
+def test_a_scene_finds_the_same():
+    rng = np.random.default_rng(2)
+    size, pose = heap(rng, 50)
+    scene = Scene({f'b{n}': Box(extents) for n, extents in enumerate(size)},
+                  patterns=(('*', '*'),), pose_array=True)
+    answer = SceneSolver(scene)(pose)
+    pairs, contacts = contacts_of(size, pose)
+    assert np.array_equal(answer.pairs, pairs) and len(pairs) > 50
+    assert same(answer.contacts, contacts)
