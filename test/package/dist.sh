@@ -48,7 +48,7 @@ assert contact.colliding and abs(contact.separation + 0.01) < 1e-12, contact
 environment = Path(sys.argv[1])
 for folder in ('weights', 'msg_schemas', 'config', 'launch'):
     assert resource_path(folder).is_relative_to(environment), folder
-assert read_scene('config/scenes/yard_bay.yaml').pairs
+assert len(read_scene('config/scenes/yard_bay.yaml').boxes) == 51
 assert (environment / 'bin' / 'box_contact_contact_node').is_file()
 for name in ('lib/libbox_contact.so', 'include/box_contact/box_contact.hpp'):
     assert (environment / name).is_file(), name
