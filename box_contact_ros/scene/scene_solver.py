@@ -86,7 +86,7 @@ class SceneSolver:
         self._poses = np.array([box.pose or [np.nan] * 7 for box in boxes], dtype=float)
         self._moving = np.array([scene.index_of[name] for name in scene.moving])
         self._broad_phase = native.BroadPhase(self._size, scene.is_fixed, margin, scene.rows,
-                                              *scene.groups)
+                                              *scene.groups, np.full(len(boxes), -1, np.int32))
         self._solver = ContactSolver(model=model, margin=margin)
         self._again = partial(SceneSolver, model=model, margin=margin, most_near=most_near)
         self._warm_up()

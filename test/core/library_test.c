@@ -117,7 +117,7 @@ static void check_broad_phase(void) {
     sizes[k] = box.size;
     poses[k] = box.pose;
   }
-  bc_boxes boxes = {sizeof boxes, count, sizes, NULL, 0.0, NULL, 0, NULL, 0, NULL};
+  bc_boxes boxes = {sizeof boxes, count, sizes, NULL, 0.0, NULL, 0, NULL, 0, NULL, NULL};
   bc_broad_phase* phase;
   bc_near near = {sizeof near, NULL, 0, NULL, 0, 0};
   check(bc_broad_phase_create(&boxes, &phase) == BC_OK, "create a broad phase");
@@ -138,6 +138,17 @@ static void check_broad_phase(void) {
   check(bc_broad_phase_find(phase, poses, INT64_MAX, &near) == BC_BAD_ABI, "another header");
   check(bc_broad_phase_find(phase, NULL, 1, NULL) == BC_BAD_ARGUMENT, "no room for an answer");
   bc_broad_phase_destroy(phase);
+
+  static int32_t bodies[count]; /* the whole tower is one body */
+  boxes.bodies = bodies;
+  near.size = sizeof near;
+  poses[7] = poses[6];
+  check(bc_broad_phase_create(&boxes, &phase) == BC_OK, "one body");
+  check(bc_broad_phase_find(phase, poses, INT64_MAX, &near) == BC_OK && near.count == 0,
+        "boxes of one body are no pair");
+  bc_broad_phase_destroy(phase);
+  boxes.bodies = NULL;
+
   int64_t outside[2] = {0, count};
   boxes.listed = outside;
   boxes.listed_count = 1;

@@ -63,9 +63,10 @@ def held(pairs: int = 1) -> list[Any]:
 
 
 def phase_arguments(n: int = 4) -> list[Any]:
-    """Return what BroadPhase takes: n boxes, a listed pair, and two groups that meet."""
+    """Return what BroadPhase takes: n boxes, a listed pair, two groups that meet, no body."""
     return [np.ones((n, 3)), np.zeros(n, bool), 0.0, np.array([[1, 0]]),
-            np.arange(n, dtype=np.int32) % 2, np.array([[0, 1], [2, 0]], np.uint8)]
+            np.arange(n, dtype=np.int32) % 2, np.array([[0, 1], [2, 0]], np.uint8),
+            np.full(n, -1, np.int32)]
 
 
 def refused(kind: type[Exception], call: Callable[..., Any], *args: Any) -> None:
@@ -107,8 +108,22 @@ def rows_of_no_array() -> None:
         refused(TypeError, native.write_poses, other, places, [POSE, POSE])
 
 
+def bodies_that_rows_lack() -> None:
+    """`place_boxes` reads at rows that it is given, and writes to the first ones."""
+    to = rows()
+    assert native.place_boxes(to, np.array([3, -1]), rows(2)) == -1 and (to[0] == to[3]).all()
+    for row in (4, 2**40):
+        refused(ValueError, native.place_boxes, to, np.array([0, row]), rows(2))
+    refused(ValueError, native.place_boxes, to, np.zeros(5, np.int64), rows(5))
+    refused(ValueError, native.place_boxes, to, np.zeros(2, np.int64), rows(3))
+    fixed = rows()
+    fixed.flags.writeable = False
+    refused(ValueError, native.place_boxes, fixed, np.array([3]), rows(1))
+    refused(TypeError, native.place_boxes, to[::2], np.array([1]), rows(1))  # would be copied
+
+
 def arrays_too_short() -> None:
-    for argument in (0, 1, 4, 5):
+    for argument in (0, 1, 4, 5, 6):
         given = phase_arguments()
         given[argument] = given[argument][:1]
         refused(ValueError, native.BroadPhase, *given)
@@ -119,7 +134,8 @@ def bounds_without_an_order() -> None:
     """Sorting NaN is undefined in C++: none gets there."""
     n = 4000
     phase = native.BroadPhase(np.ones((n, 3)), np.zeros(n, bool), 0.0, np.zeros((0, 2), np.int64),
-                              np.zeros(n, np.int32), np.ones((1, 1), np.uint8))
+                              np.zeros(n, np.int32), np.ones((1, 1), np.uint8),
+                              np.full(n, -1, np.int32))
     place = rows(n)
     for number in (np.nan, np.inf, -np.inf, 1e60):
         bad = place.copy()
@@ -261,6 +277,7 @@ def random_calls(seed: int, rounds: int) -> None:
         (solver.solve, [rows(), rows(), one, one, 2, True, places, 0.1], {}),
         (native.Contact, [True, -1.0, np.ones(3), np.ones(3), 1.0, np.eye(3), 2], {}),
         (native.write_poses, [rows(), np.array([3, 0]), [POSE, None]], {}),
+        (native.place_boxes, [rows(), np.array([3, -1]), rows(2)], {}),
         (native.mlp_inputs, [rows(), rows(), one, one], {}),
         (native.clipped, [rows(), rows(), one, one], {}),
         (native.BroadPhase, phase_arguments(), {}),
@@ -291,8 +308,8 @@ def random_calls(seed: int, rounds: int) -> None:
 
 
 if __name__ == '__main__':
-    for attack in (places_of_no_box, rows_of_no_array, arrays_too_short, bounds_without_an_order,
-                   networks_that_no_file_has, threads_that_are_none, extreme_numbers,
-                   pairs_changed_meanwhile):
+    for attack in (places_of_no_box, rows_of_no_array, bodies_that_rows_lack, arrays_too_short,
+                   bounds_without_an_order, networks_that_no_file_has, threads_that_are_none,
+                   extreme_numbers, pairs_changed_meanwhile):
         attack()
     random_calls(*map(int, sys.argv[1:]))

@@ -70,10 +70,12 @@ def made(rng, kind, n, upright=False):
     return size, np.hstack((place, turn))
 
 
-def broad_phase(size, fixed=None, *, margin=0.0, listed=NONE, groups=None, allowed=ALL):
+def broad_phase(size, fixed=None, *, margin=0.0, listed=NONE, groups=None, allowed=ALL,
+                bodies=None):
     n = len(size)
     return native.BroadPhase(size, np.zeros(n, bool) if fixed is None else fixed, margin, listed,
-                             np.zeros(n, np.int32) if groups is None else groups, allowed)
+                             np.zeros(n, np.int32) if groups is None else groups, allowed,
+                             np.full(n, -1, np.int32) if bodies is None else bodies)
 
 
 def gaps(size, pose):
@@ -127,6 +129,25 @@ def test_what_is_found_depends_on_the_poses_alone(kind):
         rows = np.where(rng.random((120, 1)) < 0.1, np.nan, pose) if tick % 2 else pose
         for one, other in zip(used.find(rows, PLENTY), broad_phase(size).find(rows, PLENTY)):
             assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize('kind', [scattered, one_place, grid])
+def test_boxes_of_one_body_are_never_a_pair(kind):
+    """What is found without bodies, less the pairs within a body; below 0, a box is alone."""
+    rng = np.random.default_rng(8)
+    for n in (31, 90, 200):
+        size, pose = made(rng, kind, n)
+        bodies = rng.integers(-1, 5, n).astype(np.int32)
+        every, *_ = broad_phase(size).find(pose, PLENTY)
+        kept = (bodies[every[:, 0]] != bodies[every[:, 1]]) | (bodies[every[:, 0]] < 0)
+        assert 0 < kept.sum() < len(every)
+        pairs, *_ = broad_phase(size, bodies=bodies).find(pose, PLENTY)
+        assert np.array_equal(pairs, every[kept])
+    size, pose = made(rng, one_place, 41)
+    pairs, *_ = broad_phase(size, bodies=np.zeros(41, np.int32)).find(pose, PLENTY)
+    assert pairs.shape == (0, 2)
+    with pytest.raises(ValueError, match=r'listed.0. is \(2, 1\), boxes of one body'):
+        broad_phase(size, listed=np.array([[2, 1]]), bodies=np.zeros(41, np.int32))
 
 
 def exact_touch(rng, n):

@@ -20,10 +20,10 @@ struct BroadPhase {
 };
 
 inline PyObject* broad_phase_new(PyTypeObject* type, PyObject* args, PyObject*) {
-  PyObject *sizes_given, *fixed_given, *listed_given, *groups_given, *allowed_given;
+  PyObject *sizes_given, *fixed_given, *listed_given, *groups_given, *allowed_given, *bodies_given;
   bc_boxes boxes{};
-  if (!PyArg_ParseTuple(args, "OOdOOO:BroadPhase", &sizes_given, &fixed_given, &boxes.margin,
-                        &listed_given, &groups_given, &allowed_given))
+  if (!PyArg_ParseTuple(args, "OOdOOOO:BroadPhase", &sizes_given, &fixed_given, &boxes.margin,
+                        &listed_given, &groups_given, &allowed_given, &bodies_given))
     return nullptr;
   auto sizes = read<double>(sizes_given, "sizes", {any_length, 3});
   npy_intp count = sizes.length(0);
@@ -31,6 +31,7 @@ inline PyObject* broad_phase_new(PyTypeObject* type, PyObject* args, PyObject*) 
   auto listed = read<int64_t>(listed_given, "listed", {any_length, 2});
   auto groups = read<int32_t>(groups_given, "groups", {count});
   auto allowed = read<uint8_t>(allowed_given, "allowed", {any_length, any_length});
+  auto bodies = read<int32_t>(bodies_given, "bodies", {count});
   npy_intp group_count = allowed.length(0);
   if (allowed.length(1) != group_count || group_count > count)
     fail(PyExc_ValueError, "allowed must be square, and of no more groups than boxes");
@@ -45,6 +46,7 @@ inline PyObject* broad_phase_new(PyTypeObject* type, PyObject* args, PyObject*) 
   boxes.groups = group_count ? groups.numbers : nullptr;
   boxes.group_count = int32_t(group_count);
   boxes.allowed = allowed.numbers;
+  boxes.bodies = bodies.numbers;
   bc_broad_phase* made;
   check(bc_broad_phase_create(&boxes, &made));
   return Holder<BroadPhase>::make(type, {decltype(BroadPhase::made)(made), count});
@@ -82,7 +84,7 @@ inline PyMethodDef broad_phase_methods[] = {
 
 inline PyType_Slot broad_phase_slots[] = {
     {Py_tp_doc,
-     const_cast<char*>("BroadPhase(sizes, fixed, margin, listed, groups, allowed)\n--\n\n"
+     const_cast<char*>("BroadPhase(sizes, fixed, margin, listed, groups, allowed, bodies)\n--\n\n"
                        "Find the pairs of boxes that may touch; see broad_phase.h.\n\n"
                        "allowed of no groups: listed pairs alone.")},
     {Py_tp_new, slot<broad_phase_new>()},

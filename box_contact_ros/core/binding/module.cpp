@@ -37,6 +37,11 @@ PyMethodDef module_methods[] = {
      "write_poses(to, rows, poses)\n--\n\n"
      "Write a list of poses (7,), or None for NaN, to rows (n,) of an array (m, 7).\n\n"
      "Return False where one is no plain array, tuple or list of numbers, or poses no list of n."},
+    {"place_boxes", method<place_boxes>(), METH_FASTCALL,
+     "place_boxes(rows, bodies, local)\n--\n\n"
+     "Write the poses of boxes of bodies to the first n rows of an array (m, 7).\n\n"
+     "bodies (n,): the row of each box's body, or -1. local (n, 7): poses in the bodies' frames.\n"
+     "Return the row of a body with a bad pose, or -1. Of one with seven NaN, boxes get NaN."},
     {"mlp_inputs", method<mlp_inputs>(), METH_FASTCALL,
      "mlp_inputs(poses_a, poses_b, sizes_a, sizes_b)\n--\n\n"
      "Return what model `mlp` reads of n pairs that touch.\n\n"

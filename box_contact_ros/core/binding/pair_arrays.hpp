@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "../src/kernel.hpp"
+#include "../src/library/refusals.hpp"
 #include "arrays.hpp"
 
 namespace box_contact::binding {
@@ -97,6 +98,35 @@ inline PyObject* write_poses(PyObject*, PyObject* const* args, Py_ssize_t count)
     std::memmove(place, numbers, sizeof copy);  // a pose may be a row of `to`
   }
   Py_RETURN_TRUE;
+}
+
+inline Pose<double> pose_at(const double* p) {
+  return {{p[0], p[1], p[2]}, {p[3], p[4], p[5], p[6]}};
+}
+
+// Write the poses of the boxes of bodies to the first n of rows (m, 7). `bodies` (n,): the row of
+// each box's body, or −1. `local` (n, 7): the boxes' poses in the bodies' frames. Returns the row of
+// a body whose pose is bad, or −1. Seven NaN: the body is not there, nor are its boxes.
+inline PyObject* place_boxes(PyObject*, PyObject* const* args, Py_ssize_t count) {
+  if (count != 3 || !is_plain<double>(args[0]))
+    fail(PyExc_TypeError, "place_boxes(rows, bodies, local)");
+  auto rows = read<double>(args[0], "rows", {any_length, 7});
+  auto bodies = read<int64_t>(args[1], "bodies", {any_length});
+  auto local = read<double>(args[2], "local", {bodies.length(0), 7});
+  if (!PyArray_ISWRITEABLE(rows.array())) fail(PyExc_ValueError, "rows is read-only");
+  if (bodies.length(0) > rows.length(0)) fail(PyExc_ValueError, "bodies has more than rows");
+  for (npy_intp box = 0; box < bodies.length(0); ++box) {
+    int64_t row = bodies.numbers[box];
+    if (row < 0) continue;
+    if (row >= rows.length(0)) fail(PyExc_ValueError, "bodies has a row that `rows` lacks");
+    const double* body = rows.numbers + 7 * row;
+    bool is_there = !std::all_of(body, body + 7, [](double number) { return std::isnan(number); });
+    if (is_there && !detail::pose_is_valid(body)) return PyLong_FromLongLong(row);
+    Pose<double> pose = pose_in_common_frame(pose_at(body), pose_at(local.numbers + 7 * box));
+    std::copy_n(pose.position.v, 3, rows.numbers + 7 * box);
+    std::copy_n(pose.quaternion, 4, rows.numbers + 7 * box + 3);
+  }
+  return PyLong_FromLong(-1);
 }
 
 // Rows of pairs, as arrays that stay alive.

@@ -66,9 +66,12 @@ struct Asked {
 class BroadPhase {
  public:
   // half: half extents of each box [m]. fixed: which boxes never move, and never meet each other.
-  BroadPhase(std::vector<Vec<double>> half, std::vector<uint8_t> fixed, Asked asked)
+  // body: of each box; boxes of one body never meet each other.
+  BroadPhase(std::vector<Vec<double>> half, std::vector<uint8_t> fixed, std::vector<int32_t> body,
+             Asked asked)
       : half_(std::move(half)),
         fixed_(std::move(fixed)),
+        body_(std::move(body)),
         asked_(std::move(asked)),
         bounds_(half_.size(), Bounds{}),
         known_(half_.size(), 0),
@@ -170,6 +173,7 @@ class BroadPhase {
   // Take two boxes whose bounds overlap, if they are asked for. Returns false with too many pairs.
   bool add(int32_t a, int32_t b) {
     if (fixed_[size_t(a)] && fixed_[size_t(b)]) return true;
+    if (body_[size_t(a)] == body_[size_t(b)]) return true;
     if (a > b) std::swap(a, b);
     uint8_t side = asked_.side(a, b);
     if (!side) return true;
@@ -339,6 +343,7 @@ class BroadPhase {
 
   std::vector<Vec<double>> half_;
   std::vector<uint8_t> fixed_;
+  std::vector<int32_t> body_;
   Asked asked_;
   std::vector<uint64_t> listed_keys_;
   std::vector<int32_t> members_;  // boxes that some group lets meet

@@ -85,6 +85,20 @@ BC_INLINE Columns<T> rotation_rows(const T (&q)[4], T norm2) {
   }
 }
 
+// Bring a pose from the frame of a body to the common frame. The pose of the frame itself has the
+// bits of the body's: a sum with zero would lose the sign of another zero.
+inline Pose<double> pose_in_common_frame(const Pose<double>& body, const Pose<double>& local) {
+  const double(&p)[4] = body.quaternion, (&q)[4] = local.quaternion;
+  bool is_frame = q[3] == 1.0;
+  for (int k = 0; k < 3; ++k) is_frame &= local.position[k] == 0.0 && q[k] == 0.0;
+  if (is_frame) return body;
+  return {body.position + rotation_matrix(p) * local.position,
+          {(p[3] * q[0] + p[0] * q[3]) + (p[1] * q[2] - p[2] * q[1]),
+           (p[3] * q[1] + p[1] * q[3]) + (p[2] * q[0] - p[0] * q[2]),
+           (p[3] * q[2] + p[2] * q[3]) + (p[0] * q[1] - p[1] * q[0]),
+           (p[3] * q[3] - p[0] * q[0]) - (p[1] * q[1] + p[2] * q[2])}};
+}
+
 // Comparisons are written so that NaN fails them. An overflown square is infinite and fails too.
 template <class T>
 BC_INLINE Mask<T> pose_valid(const Triple<T>& position, T norm2) {

@@ -38,6 +38,8 @@ typedef struct bc_boxes {
   const uint8_t* allowed; /* (group_count, group_count), by the groups of the box of lower and of
                              that of higher index: 0: their pairs are not asked for; 1: they are,
                              and box A is the lower; 2: box A is the higher */
+  const int32_t* bodies; /* the body of each box, or NULL; boxes of one body are never a pair. Below
+                             0: the box is a part of no body */
 } bc_boxes;
 
 typedef struct bc_near {

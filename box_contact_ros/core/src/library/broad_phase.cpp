@@ -12,13 +12,24 @@ namespace {
 
 bool is_box(int64_t box, int64_t count) { return box >= 0 && box < count; }
 
+// The body of each box: a number of its own, below 0, where it is a part of none.
+std::vector<int32_t> read_bodies(const bc_boxes& boxes) {
+  std::vector<int32_t> body;
+  for (int32_t box = 0; box < int32_t(boxes.count); ++box)
+    body.push_back(boxes.bodies && boxes.bodies[box] >= 0 ? boxes.bodies[box] : -1 - box);
+  return body;
+}
+
 // Which pairs `boxes` ask for, or the words of a refusal.
-bc_status read_asked(const bc_boxes& boxes, Asked& asked) {
+bc_status read_asked(const bc_boxes& boxes, const std::vector<int32_t>& body, Asked& asked) {
   for (int64_t k = 0; boxes.listed && k < boxes.listed_count; ++k) {
     int64_t a = boxes.listed[2 * k], b = boxes.listed[2 * k + 1];
     if (!is_box(a, boxes.count) || !is_box(b, boxes.count) || a == b)
       return fail(BC_BAD_ROWS, "listed[%lld] is (%lld, %lld), but there are %lld boxes",
                   (long long)k, (long long)a, (long long)b, (long long)boxes.count);
+    if (body[size_t(a)] == body[size_t(b)])
+      return fail(BC_BAD_ROWS, "listed[%lld] is (%lld, %lld), boxes of one body", (long long)k,
+                  (long long)a, (long long)b);
     asked.listed.insert(asked.listed.end(), {a, b});
   }
   if (!boxes.groups) {
@@ -59,11 +70,12 @@ bc_status make(const bc_boxes& boxes, bc_broad_phase** made) {
   }
   std::vector<uint8_t> fixed(size_t(boxes.count), 0);
   if (boxes.fixed) fixed.assign(boxes.fixed, boxes.fixed + boxes.count);
+  std::vector<int32_t> body = read_bodies(boxes);
   Asked asked;
-  bc_status status = read_asked(boxes, asked);
+  bc_status status = read_asked(boxes, body, asked);
   if (status == BC_OK)
     *made = reinterpret_cast<bc_broad_phase*>(
-        new BroadPhase(std::move(half), std::move(fixed), std::move(asked)));
+        new BroadPhase(std::move(half), std::move(fixed), std::move(body), std::move(asked)));
   return status;
 }
 
