@@ -46,7 +46,8 @@ def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = No
         raise ValueError(f'pairs[{alone[0]}] is box {listed[alone[0], 0]} with itself')
     groups_meet = np.ones((1, 1) if pairs is None and count else (0, 0), np.uint8)
     broad_phase = native.BroadPhase(sizes, _as_flags(fixed, 'fixed', count), 0.0, listed,
-                                    np.zeros(count, np.int32), groups_meet)
+                                    np.zeros(count, np.int32), groups_meet,
+                                    np.full(count, -1, np.int32))
     near, contacts, _ = find_contacts(broad_phase, ContactSolver(), sizes, poses,
                                       'poses[{}]'.format, threads=threads)
     return in_contact(near, contacts)
