@@ -9,7 +9,7 @@ they are first used, so `import box_contact_ros` stays cheap.
 from importlib import import_module as _import_module
 from typing import TYPE_CHECKING, Any
 
-from .solver.contact import Contact, Contacts
+from .solver.contact import Contact, Contacts, patch_area, patch_areas
 from .solver.contact_solver import ContactSolver
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .scene.scene_solver import SceneSolver
 
 __all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Pair', 'PatchForces', 'Scene',
-           'SceneSolver', 'contacts_of', 'make_model', 'read_scene']
+           'SceneSolver', 'contacts_of', 'make_model', 'patch_area', 'patch_areas', 'read_scene']
 
 _LOADED_WHEN_USED = {
     'models': ('make_model',),

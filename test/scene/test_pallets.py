@@ -8,8 +8,7 @@ import numpy as np
 import poses
 import pytest
 
-from box_contact_ros import ContactSolver, SceneSolver
-from box_contact_ros.solver.contact import patch_areas
+from box_contact_ros import ContactSolver, SceneSolver, patch_areas
 
 scenes = pytest.importorskip('benchmarks.scenes')
 COPIES = 27

@@ -24,6 +24,8 @@ from box_contact_ros import (
     SceneSolver,
     contacts_of,
     make_model,
+    patch_area,
+    patch_areas,
     read_scene,
 )
 
@@ -75,6 +77,8 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: Contact(True, 'deep', UNIT, UNIT, 1.0, np.eye(3)), 'separation', "'deep'"),
     (lambda: Contact(True, -1.0, ('x', 0, 0), UNIT, 1.0, np.eye(3)), 'normal', "('x', 0, 0)"),
     (lambda: Contacts.of([None]), 'contacts[0]', 'None'),
+    (lambda: patch_areas([None]), 'contacts', '[None]'),
+    (lambda: patch_area(CONTACTS), 'contact', 'Contacts('),
 
     (lambda: body(mass='1'), 'mass', "'1'"),
     (lambda: body(mass=1e-300), 'mass', '1e-300'),

@@ -14,8 +14,7 @@ import numpy as np
 import poses
 import pytest
 
-from box_contact_ros import Contact, Contacts, ContactSolver, make_model
-from box_contact_ros.solver.contact import patch_area
+from box_contact_ros import Contact, Contacts, ContactSolver, make_model, patch_area
 
 SOLVER = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
 ABOVE = [0.5, 0.25, 1.875, 0, 0, 0, 1]

@@ -5,22 +5,11 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 
+#include "../include/box_contact/box_contact.h"
 #include "arrays.hpp"
 
 namespace box_contact::binding {
-
-// 12·√(n·adj(C)·n): e₁·e₂ of the covariance C across the normal n is n·adj(C)·n.
-inline double patch_area(const double* n, const double* c) {
-  double xx = c[0], xy = c[1], xz = c[2], yy = c[4], yz = c[5], zz = c[8];
-  double product = n[0] * n[0] * (yy * zz - yz * yz) + n[1] * n[1] * (xx * zz - xz * xz) +
-                   n[2] * n[2] * (xx * yy - xy * xy) +
-                   2.0 * (n[0] * n[1] * (xz * yz - xy * zz) + n[0] * n[2] * (xy * yz - xz * yy) +
-                          n[1] * n[2] * (xy * xz - xx * yz));
-  // Rounding may leave a line's product below zero. NaN stays NaN.
-  return 12.0 * std::sqrt(product < 0.0 ? 0.0 : product);
-}
 
 inline PyObject* patch_areas(PyObject*, PyObject* const* args, Py_ssize_t count) {
   if (count != 2) fail(PyExc_TypeError, "patch_areas(normal, covariance)");
@@ -29,7 +18,7 @@ inline PyObject* patch_areas(PyObject*, PyObject* const* args, Py_ssize_t count)
   auto covariance = read<double>(args[1], "covariance", {rows, 3, 3});
   auto area = make<double>({rows});
   for (npy_intp row = 0; row < rows; ++row)
-    area.numbers[row] = patch_area(normal.numbers + 3 * row, covariance.numbers + 9 * row);
+    area.numbers[row] = bc_patch_area(normal.numbers + 3 * row, covariance.numbers + 9 * row);
   return area.object.release();
 }
 
@@ -50,7 +39,7 @@ inline PyObject* message_numbers(PyObject*, PyObject* const* args, Py_ssize_t co
   for (npy_intp row = 0; row < rows; ++row) {
     const double *n = normal.numbers + 3 * row, *c = covariance.numbers + 9 * row;
     to = std::copy_n(n, 3, std::copy_n(point.numbers + 3 * row, 3, to));
-    for (double number : {-separation.numbers[row], volume.numbers[row], patch_area(n, c), c[0],
+    for (double number : {-separation.numbers[row], volume.numbers[row], bc_patch_area(n, c), c[0],
                           c[1], c[2], c[4], c[5], c[8]})
       *to++ = number;
   }

@@ -145,6 +145,11 @@ BC_API bc_status bc_collide(const bc_box* a, const bc_box* b, const bc_query* qu
 BC_API bc_status bc_collide_rows(const bc_rows* rows, const bc_query* query,
                                  const bc_results* results, int threads, int64_t* refused);
 
+/* The area [m²] of the patch of a contact with this normal (3) and covariance (3, 3): 12·√(e₁·e₂) by
+ * the eigenvalues of the covariance across the normal; NaN where the covariance is. It is that of a
+ * rectangle of the same moments: exact where the overlap is a cuboid along the normal. */
+BC_API double bc_patch_area(const double* normal, const double* covariance);
+
 #ifdef __cplusplus
 }
 #endif

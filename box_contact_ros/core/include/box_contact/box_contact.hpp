@@ -176,6 +176,11 @@ inline std::int64_t collide(const Rows& rows, const Results& results, const Quer
   return refused;
 }
 
+// The area [m²] of a contact's patch; NaN without a covariance. See bc_patch_area.
+inline double patch_area(const Contact& contact) {
+  return bc_patch_area(contact.normal, contact.covariance[0]);
+}
+
 // The instruction set of this process: "baseline", "avx2" or "avx512".
 inline std::string instruction_set() {
   const char* name = bc_instruction_set();

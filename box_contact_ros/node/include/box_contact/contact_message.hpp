@@ -30,18 +30,6 @@ inline Contact from_message(const box_contact_msgs::msg::Contact& message) {
   return contact;
 }
 
-// Return the area of a contact's patch [m²]: 12 √(n · adj(C) · n), NaN where C is.
-inline double patch_area(const Contact& contact) {
-  const auto& c = contact.covariance;
-  double product = 0;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) {
-      int k = (i + 1) % 3, l = (i + 2) % 3, m = (j + 1) % 3, n = (j + 2) % 3;
-      product += contact.normal[i] * contact.normal[j] * (c[k][m] * c[l][n] - c[k][n] * c[l][m]);
-    }
-  return 12 * std::sqrt(product < 0 ? 0 : product);  // rounding may leave a line's below zero
-}
-
 // Return the message of the contact of a pair, by its name and the names of its boxes.
 inline box_contact_msgs::msg::Contact to_message(const Contact& contact, const std::string& pair,
                                                  const std::string& box_a,
