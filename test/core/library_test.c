@@ -133,6 +133,14 @@ static void check_broad_phase(void) {
   check(bc_collide_rows(&rows, NULL, &results, 1, NULL) == BC_OK, "solve what is near");
   for (int64_t k = 0; k < near.count; ++k) check(colliding[k], "a contact");
 
+  bc_size slim = {{0.1, 0.1, 0.1}}, flat = {{1.0, 0.0, 1.0}};
+  check(bc_broad_phase_resize(phase, 50, &slim) == BC_OK, "another size");
+  check(bc_broad_phase_find(phase, poses, INT64_MAX, &near) == BC_OK, "find with it");
+  check(near.count == count - 3, "no neighbour of a slim cube");
+  check(bc_broad_phase_resize(phase, 50, &flat) == BC_BAD_SIZE, "a bad size");
+  check(bc_broad_phase_resize(phase, count, &slim) == BC_BAD_ROWS, "a size of no box");
+  check(bc_broad_phase_resize(phase, 0, NULL) == BC_BAD_ARGUMENT, "no size");
+
   poses[7].quaternion[3] = 0.0;
   check(bc_broad_phase_find(phase, poses, INT64_MAX, &near) == BC_BAD_POSE, "a bad pose");
   check(near.refused == 7 && strstr(bc_error_text(), "pose of box 7"), "which box");

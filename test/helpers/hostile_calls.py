@@ -89,6 +89,9 @@ def places_of_no_box() -> None:
             given = phase_arguments()
             given[argument].flat[1] = place
             refused(ValueError, native.BroadPhase, *given)
+    for place in (-1, 4, 2**40, -2**62):
+        refused(ValueError, native.BroadPhase(*phase_arguments()).resize, np.array([place]),
+                np.ones((1, 3)))
 
 
 def rows_of_no_array() -> None:
@@ -282,6 +285,7 @@ def random_calls(seed: int, rounds: int) -> None:
         (native.clipped, [rows(), rows(), one, one], {}),
         (native.BroadPhase, phase_arguments(), {}),
         (native.BroadPhase(*phase_arguments()).find, [rows(), 10], {}),
+        (native.BroadPhase(*phase_arguments()).resize, [np.arange(4), np.ones((4, 3))], {}),
         (native.message_numbers, [np.ones((4, 3)), np.ones((4, 3)), np.ones(4), np.ones(4),
                                   np.ones((4, 3, 3))], {}),
         (native.patch_areas, [np.ones((4, 3)), np.ones((4, 3, 3))], {}),

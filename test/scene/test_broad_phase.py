@@ -184,6 +184,21 @@ def test_no_touching_pair_is_left_out():
     assert touching > 1500 and barely > 300
 
 
+def test_boxes_of_other_sizes_are_found_as_if_made_with_them():
+    """Fixed boxes keep their sizes: their bounds are read once."""
+    rng = np.random.default_rng(8)
+    size, pose = made(rng, scattered, 90)
+    fixed, boxes = np.arange(90) < 30, np.arange(30, 90)
+    used = broad_phase(np.where(fixed[:, None], size, 0.01), fixed, margin=0.1)
+    few = len(used.find(pose, PLENTY)[0])
+    used.resize(boxes, size[30:])
+    pairs = used.find(pose, PLENTY)[0]
+    assert few < len(pairs)
+    assert np.array_equal(pairs, broad_phase(size, fixed, margin=0.1).find(pose, PLENTY)[0])
+    with pytest.raises(ValueError, match='box 0 is fixed, or none of the 90 boxes'):
+        used.resize(boxes - 30, size[30:])
+
+
 def test_a_margin_loses_no_pair_within_it():
     rng = np.random.default_rng(6)
     count = 0

@@ -75,7 +75,21 @@ inline PyObject* broad_phase_find(PyObject* self, PyObject* const* args, Py_ssiz
                        (long long)near.refused);
 }
 
+inline PyObject* broad_phase_resize(PyObject* self, PyObject* const* args, Py_ssize_t count) {
+  if (count != 2) fail(PyExc_TypeError, "resize(boxes, sizes)");
+  auto boxes = read<int64_t>(args[0], "boxes", {any_length});
+  auto sizes = read<double>(args[1], "sizes", {boxes.length(0), 3});
+  const BroadPhase& phase = Holder<BroadPhase>::of(self);
+  for (npy_intp k = 0; k < boxes.length(0); ++k)
+    check(bc_broad_phase_resize(phase.made.get(), boxes.numbers[k],
+                                reinterpret_cast<const bc_size*>(sizes.numbers) + k));
+  Py_RETURN_NONE;
+}
+
 inline PyMethodDef broad_phase_methods[] = {
+    {"resize", method<broad_phase_resize>(), METH_FASTCALL,
+     "resize(boxes, sizes)\n--\n\n"
+     "Give boxes (n,) that move other sizes (n, 3) [m], from the next call on."},
     {"find", method<broad_phase_find>(), METH_FASTCALL,
      "find(poses, most)\n--\n\n"
      "Return the pairs (n, 2) that may touch, stale rows (m, 2), and a box of a bad pose or -1.\n\n"

@@ -65,11 +65,12 @@ struct Asked {
 
 class BroadPhase {
  public:
-  // half: half extents of each box [m]. fixed: which boxes never move, and never meet each other.
-  // body: of each box; boxes of one body never meet each other.
-  BroadPhase(std::vector<Vec<double>> half, std::vector<uint8_t> fixed, std::vector<int32_t> body,
-             Asked asked)
-      : half_(std::move(half)),
+  // half: half extents of each box, larger by half the margin [m]. fixed: which boxes never move,
+  // and never meet each other. body: of each box; boxes of one body never meet each other.
+  BroadPhase(std::vector<Vec<double>> half, double margin, std::vector<uint8_t> fixed,
+             std::vector<int32_t> body, Asked asked)
+      : margin(margin),
+        half_(std::move(half)),
         fixed_(std::move(fixed)),
         body_(std::move(body)),
         asked_(std::move(asked)),
@@ -87,7 +88,10 @@ class BroadPhase {
       if (meets[size_t(asked_.group[box])]) members_.push_back(box), order_.push_back({0.0, box});
   }
 
+  const double margin;  // [m]
   size_t count() const { return half_.size(); }
+  bool is_fixed(int64_t box) const { return fixed_[size_t(box)]; }
+  void resize(int64_t box, const Vec<double>& half) { half_[size_t(box)] = half; }
 
   // Find the pairs that may touch at `poses` (boxes, 7); seven NaN: the box is not there. The poses
   // of fixed boxes are read once. Stops with more than `most` pairs. Returns −1, or a box without a

@@ -57,6 +57,10 @@ typedef struct bc_broad_phase bc_broad_phase;
 BC_API bc_status bc_broad_phase_create(const bc_boxes* boxes, bc_broad_phase** broad_phase);
 BC_API void bc_broad_phase_destroy(bc_broad_phase* broad_phase);
 
+/* Give a box that moves another size [m], from the next call on. */
+BC_API bc_status bc_broad_phase_resize(bc_broad_phase* broad_phase, int64_t box,
+                                       const bc_size* size);
+
 /* Find the pairs that may touch with the boxes at `poses`. Seven NaN: the box is not there. Poses
  * of fixed boxes are read once. The search ends with more than `most` pairs. The arrays of *near
  * belong to the broad phase, and are valid until its next call. */

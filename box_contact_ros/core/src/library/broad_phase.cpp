@@ -20,6 +20,17 @@ std::vector<int32_t> read_bodies(const bc_boxes& boxes) {
   return body;
 }
 
+// Read half extents that are larger by half the margin: boxes overlap then, if they are apart by the
+// margin at most.
+bc_status read_half(const bc_size& size, double margin, int64_t box, Vec<double>& half) {
+  const double* e = size.extent;
+  if (!size_valid<double>(triple(Vec<double>{e[0], e[1], e[2]})))
+    return fail(BC_BAD_SIZE, "sizes[%lld] (%g, %g, %g) is not within 1e-50 to 1e50 m",
+                (long long)box, e[0], e[1], e[2]);
+  for (int k = 0; k < 3; ++k) half[k] = 0.5 * e[k] + 0.5 * margin;
+  return BC_OK;
+}
+
 // Which pairs `boxes` ask for, or the words of a refusal.
 bc_status read_asked(const bc_boxes& boxes, const std::vector<int32_t>& body, Asked& asked) {
   for (int64_t k = 0; boxes.listed && k < boxes.listed_count; ++k) {
@@ -57,25 +68,28 @@ bc_status make(const bc_boxes& boxes, bc_broad_phase** made) {
   if (boxes.count && !boxes.sizes) return refuse_null("sizes");
   if (!(boxes.margin >= 0.0 && boxes.margin <= length_max))
     return fail(BC_BAD_ARGUMENT, "margin must lie within 0 and 1e50 m, not %g", boxes.margin);
-  std::vector<Vec<double>> half;
-  for (int64_t box = 0; box < boxes.count; ++box) {
-    const double* size = boxes.sizes[box].extent;
-    Vec<double> extents{0.5 * size[0], 0.5 * size[1], 0.5 * size[2]};
-    if (!size_valid<double>(triple(Vec<double>{size[0], size[1], size[2]})))
-      return fail(BC_BAD_SIZE, "sizes[%lld] (%g, %g, %g) is not within 1e-50 to 1e50 m",
-                  (long long)box, size[0], size[1], size[2]);
-    // Boxes that are larger by the margin overlap, if the boxes are apart by the margin at most.
-    for (int k = 0; k < 3; ++k) extents[k] += 0.5 * boxes.margin;
-    half.push_back(extents);
-  }
+  std::vector<Vec<double>> half(size_t(boxes.count));
+  for (int64_t box = 0; box < boxes.count; ++box)
+    if (bc_status status = read_half(boxes.sizes[box], boxes.margin, box, half[size_t(box)]))
+      return status;
   std::vector<uint8_t> fixed(size_t(boxes.count), 0);
   if (boxes.fixed) fixed.assign(boxes.fixed, boxes.fixed + boxes.count);
   std::vector<int32_t> body = read_bodies(boxes);
   Asked asked;
   bc_status status = read_asked(boxes, body, asked);
   if (status == BC_OK)
-    *made = reinterpret_cast<bc_broad_phase*>(
-        new BroadPhase(std::move(half), std::move(fixed), std::move(body), std::move(asked)));
+    *made = reinterpret_cast<bc_broad_phase*>(new BroadPhase(
+        std::move(half), boxes.margin, std::move(fixed), std::move(body), std::move(asked)));
+  return status;
+}
+
+bc_status resize(BroadPhase& self, int64_t box, const bc_size& size) {
+  if (!is_box(box, int64_t(self.count())) || self.is_fixed(box))
+    return fail(BC_BAD_ROWS, "box %lld is fixed, or none of the %zu boxes", (long long)box,
+                self.count());
+  Vec<double> half{};
+  bc_status status = read_half(size, self.margin, box, half);
+  if (status == BC_OK) self.resize(box, half);
   return status;
 }
 
@@ -100,6 +114,13 @@ void bc_broad_phase_destroy(bc_broad_phase* broad_phase) {
   delete reinterpret_cast<BroadPhase*>(broad_phase);
 }
 
+bc_status bc_broad_phase_resize(bc_broad_phase* broad_phase, int64_t box, const bc_size* size) {
+  return guarded([&] {
+    if (!broad_phase || !size) return refuse_null(size ? "broad_phase" : "size");
+    return resize(*reinterpret_cast<BroadPhase*>(broad_phase), box, *size);
+  });
+}
+
 bc_status bc_broad_phase_find(bc_broad_phase* broad_phase, const bc_pose* poses, int64_t most,
                               bc_near* near) {
   return guarded([&] {
@@ -110,9 +131,12 @@ bc_status bc_broad_phase_find(bc_broad_phase* broad_phase, const bc_pose* poses,
     if (most < 0) return fail(BC_BAD_ARGUMENT, "most must be 0 or more, not %lld", (long long)most);
     const auto* numbers = reinterpret_cast<const double*>(poses);
     int64_t refused = self.find(numbers, most);
-    *near = {sizeof(bc_near),       self.pairs().data(),
-             int64_t(self.pairs().size() / 2), self.stale().data(),
-             int64_t(self.stale().size() / 2), refused};
+    *near = {sizeof(bc_near),
+             self.pairs().data(),
+             int64_t(self.pairs().size() / 2),
+             self.stale().data(),
+             int64_t(self.stale().size() / 2),
+             refused};
     if (refused < 0) return BC_OK;
     char field[32];
     std::snprintf(field, sizeof field, "pose of box %lld", (long long)refused);
