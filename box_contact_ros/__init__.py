@@ -16,19 +16,20 @@ if TYPE_CHECKING:
     from .models import make_model
     from .scene.contacts_of import contacts_of
     from .scene.forces import Body, PatchForces
-    from .scene.scene import Box, Pair, Scene
+    from .scene.scene import Box, Frame, Pair, Scene
     from .scene.scene_file import read_scene
     from .scene.scene_solver import SceneSolver
 
-__all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Pair', 'PatchForces', 'Scene',
-           'SceneSolver', 'contacts_of', 'make_model', 'patch_area', 'patch_areas', 'read_scene']
+__all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Frame', 'Pair', 'PatchForces',
+           'Scene', 'SceneSolver', 'contacts_of', 'make_model', 'patch_area', 'patch_areas',
+           'read_scene']
 
 _LOADED_WHEN_USED = {
     'models': ('make_model',),
     'scene.contacts_of': ('contacts_of',),
     'scene.forces': ('Body', 'PatchForces'),
     'scene.scene_file': ('read_scene',),
-    'scene.scene': ('Box', 'Pair', 'Scene'),
+    'scene.scene': ('Box', 'Frame', 'Pair', 'Scene'),
     'scene.scene_solver': ('SceneSolver',),
 }
 

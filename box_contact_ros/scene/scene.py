@@ -4,24 +4,32 @@
 """A scene: boxes, fixed or moving, and the pairs of them that matter.
 
 Pairs are listed by name, or asked for by patterns of names. In arrays, a box is its index in the
-scene.
+scene. A body is several boxes that are fixed to each other: it has one pose, and its boxes have
+theirs in its frame.
 """
 from __future__ import annotations
 
 import fnmatch
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ..solver.checks import as_floats, name_fault, pose_fault, short_repr, size_fault
+from ..core import native
+from ..solver.checks import (
+    as_floats,
+    name_fault,
+    nearest_name,
+    pose_fault,
+    short_repr,
+    size_fault,
+)
 
 POSE_ARRAY = 'poses'
-"""Topic of the poses of all moving boxes, where they come as one message."""
+"""Topic of the poses of all boxes and bodies that move, where they come as one message."""
 ALL_BOXES = 'all boxes'
 """Source of these poses: no box of a scene file can have this name."""
 EVERY_PAIR = (('*', '*'),)
@@ -32,6 +40,10 @@ MOVES = (': leave `pose` out of a box that moves, and give its pose in the call;
 ALONE = -1
 """Instead of box b, in rows of boxes: all pairs of box a that patterns ask for."""
 
+NOWHERE = (np.nan,) * 7
+"""Instead of the pose of a box that is not there."""
+AT_FRAME = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+"""Pose of a frame in itself."""
 CONTAINER = (12.192, 2.438, 2.591)
 """Full extents of an ISO 40 ft container [m]."""
 
@@ -56,34 +68,68 @@ class SceneError(ValueError):
         return SceneError((*path, *self.path), self.reason, self.file)
 
 
+def _keep(part: object, key: str, shape: str, count: int,
+          fault_of: Callable[[np.ndarray], str | None]) -> None:
+    """Turn a field of a box or body into a tuple of numbers; raise SceneError for others."""
+    try:
+        numbers = as_floats(getattr(part, key), key, shape, (count,))
+    except ValueError as error:
+        raise SceneError((key,), str(error).removeprefix(f'{key} ')) from error
+    if fault := fault_of(numbers):
+        raise SceneError((key,), fault)
+    object.__setattr__(part, key, tuple(numbers.tolist()))
+
+
+def _keep_pose(part: Box | Frame) -> None:
+    """Check the fields that boxes and bodies share."""
+    if not isinstance(part.pose_topic, str):
+        raise SceneError(('pose_topic',), f'must be text, not {short_repr(part.pose_topic)}')
+    if part.pose is not None:
+        _keep(part, 'pose', 'a pose (x y z qx qy qz qw)', 7, pose_fault)
+
+
 @dataclass(frozen=True)
 class Box:
-    """A box of the scene: fixed if it has a pose, else moving. Raises SceneError."""
+    """A box of the scene: a part of a body, else fixed if it has a pose, else moving.
+
+    Raises SceneError.
+    """
 
     size: Sequence[float] | np.ndarray  # three full extents [m]
     pose: Sequence[float] | np.ndarray | None = None
-    """`x y z qx qy qz qw` in the common frame, of a fixed box."""
+    """`x y z qx qy qz qw` in the common frame, of a fixed box; in the body's, of a part of one."""
     pose_topic: str = ''  # where a moving box's poses come from
+    body: str = ''  # the body that the box is a part of
 
     def __post_init__(self) -> None:
-        def keep(key: str, given: ArrayLike, shape: str, count: int,
-                 fault_of: Callable[[np.ndarray], str | None]) -> None:
-            try:
-                numbers = as_floats(given, key, shape, (count,))
-            except ValueError as error:
-                raise SceneError((key,), str(error).removeprefix(f'{key} ')) from error
-            if fault := fault_of(numbers):
-                raise SceneError((key,), fault)
-            object.__setattr__(self, key, tuple(numbers.tolist()))
+        if not isinstance(self.body, str):
+            raise SceneError(('body',), f'must be text, not {short_repr(self.body)}')
+        _keep(self, 'size', 'full extents (3,)', 3, size_fault)
+        _keep_pose(self)
+        if self.body and self.pose is None:
+            object.__setattr__(self, 'pose', AT_FRAME)
+        if self.pose_topic and self.pose is not None:
+            raise SceneError(('pose_topic',), f'{short_repr(self.pose_topic)}: ' + (
+                f'the box moves with {short_repr(self.body)}' if self.body else
+                'a box with a pose never moves'))
 
-        if not isinstance(self.pose_topic, str):
-            raise SceneError(('pose_topic',), f'must be text, not {short_repr(self.pose_topic)}')
-        keep('size', self.size, 'full extents (3,)', 3, size_fault)
-        if self.pose is not None:
-            keep('pose', self.pose, 'a pose (x y z qx qy qz qw)', 7, pose_fault)
-            if self.pose_topic:
-                raise SceneError(('pose_topic',), f'{short_repr(self.pose_topic)}: a box with a '
-                                                  'pose never moves')
+
+@dataclass(frozen=True)
+class Frame:
+    """The frame of a body, which its boxes name: fixed if it has a pose, else moving.
+
+    Raises SceneError.
+    """
+
+    pose: Sequence[float] | np.ndarray | None = None
+    """`x y z qx qy qz qw` in the common frame, of a fixed body."""
+    pose_topic: str = ''  # where a moving body's poses come from
+
+    def __post_init__(self) -> None:
+        _keep_pose(self)
+        if self.pose_topic and self.pose is not None:
+            raise SceneError(('pose_topic',), f'{short_repr(self.pose_topic)}: a body with a pose '
+                                              'never moves')
 
 
 class Pair(NamedTuple):
@@ -105,15 +151,16 @@ class Pair(NamedTuple):
 
 
 Pattern = tuple[str, str]
-"""Names of the boxes a and b of some pairs, with `*`, `?` and `[..]`."""
+"""Names of the boxes or bodies a and b of some pairs, with `*`, `?` and `[..]`."""
 
 
 @dataclass(frozen=True)
 class Scene:
     """Boxes by name, and which pairs matter. Raises SceneError for what cannot be computed.
 
-    A pattern asks for all pairs of two boxes that it matches and of which one moves. If both sides
-    match both boxes, a is the one that comes first in the scene.
+    A pattern asks for all pairs of two boxes that it matches and that move against each other. The
+    name of a body stands for all its boxes. If both sides match both boxes, a is the one that comes
+    first in the scene.
     """
 
     boxes: Mapping[str, Box]
@@ -122,21 +169,26 @@ class Scene:
     frame_id: str = ''
     """The common frame that all poses must be in; empty: any, as long as it is the same."""
     pose_array: bool = False
-    """Whether one message has the poses of all moving boxes; else each box has a topic."""
+    """Whether one message has the poses of all that moves; else each box or body has a topic."""
     patterns: tuple[Pattern, ...] = ()
+    bodies: Mapping[str, Frame] = field(default_factory=dict)
+    """Bodies by name; each box names the one that it is a part of."""
 
     def __post_init__(self) -> None:
         _check_kinds(self)
-        _check_pairs(self.boxes, self.pairs)
+        _check_bodies(self)
+        _check_pairs(self)
         for number, (a, b) in enumerate(self.patterns):
             _check_pattern(self, number, self.matching(a), self.matching(b))
         if not self.pairs and not self.patterns:
             raise SceneError(('pairs',), 'a scene needs at least one pair')
 
     def matching(self, pattern: str) -> np.ndarray:
-        """Return which boxes (n,) have names that a pattern matches."""
+        """Return which boxes (n,) a pattern matches by their names, or by those of their bodies."""
         is_alike = re.compile(fnmatch.translate(pattern)).match
-        return np.array([is_alike(name) is not None for name in self.boxes])
+        bodies = {name for name in self.bodies if is_alike(name)}
+        return np.array([is_alike(name) is not None or box.body in bodies
+                         for name, box in self.boxes.items()])
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -149,9 +201,64 @@ class Scene:
         return {name: index for index, name in enumerate(self.boxes)}
 
     @cached_property
+    def _parts(self) -> Mapping[str, Box | Frame]:
+        """Boxes and, behind them, bodies by name."""
+        return {**self.boxes, **self.bodies}
+
+    @cached_property
+    def row_of(self) -> Mapping[str, int]:
+        """Return by name the rows of poses (n + m, 7): those of boxes, then those of bodies."""
+        return {name: row for row, name in enumerate(self._parts)}
+
+    def mover(self, box: str) -> str:
+        """Return whose pose moves a box: the name of its body, else its own."""
+        return self.boxes[box].body or box
+
+    @cached_property
+    def body_of(self) -> np.ndarray:
+        """Return the index of the body (n,) that each box is a part of, or -1."""
+        index = {name: number for number, name in enumerate(self.bodies)}
+        return np.array([index.get(box.body, -1) for box in self.boxes.values()], np.int32)
+
+    @cached_property
     def is_fixed(self) -> np.ndarray:
         """Return which boxes (n,) never move."""
-        return np.array([box.pose is not None for box in self.boxes.values()])
+        return np.array([(self.bodies[box.body] if box.body else box).pose is not None
+                         for box in self.boxes.values()])
+
+    @cached_property
+    def rigid(self) -> np.ndarray:
+        """Return a number (n,) that boxes share which do not move against each other.
+
+        Those of one body do not, and those that are fixed: they are never a pair.
+        """
+        alone = 1 + len(self.bodies) + np.arange(len(self.boxes))
+        return np.where(self.is_fixed, 0, np.where(self.body_of < 0, alone, 1 + self.body_of))
+
+    @cached_property
+    def _placement(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the row of each box's body (n,) or -1, and its pose (n, 7) in the body's frame."""
+        of_body = self.body_of >= 0
+        local = np.array([box.pose if box.body else AT_FRAME for box in self.boxes.values()])
+        local[:, 3:] /= np.linalg.norm(local[:, 3:], axis=1, keepdims=True)
+        return np.where(of_body, len(self.boxes) + self.body_of, -1).astype(np.int64), local
+
+    def fixed_poses(self) -> np.ndarray:
+        """Return new poses (n + m, 7) of boxes and bodies, by `row_of`: NaN for what moves."""
+        poses = np.array([NOWHERE if part.pose is None else part.pose
+                          for part in self._parts.values()])
+        self.place_boxes(poses)
+        return poses
+
+    def place_boxes(self, poses: np.ndarray) -> None:
+        """Write the poses of the boxes of bodies, by those of bodies, into poses (n + m, 7).
+
+        Raises ValueError for a body whose numbers are no pose. One with seven NaN is not there, nor
+        are its boxes.
+        """
+        row = native.place_boxes(poses, *self._placement)
+        if row >= 0:
+            raise ValueError(f'pose of {list(self._parts)[row]}: {pose_fault(poses[row])}')
 
     @cached_property
     def rows(self) -> np.ndarray:
@@ -192,7 +299,7 @@ class Scene:
     def has_pair(self, a: int, b: int) -> bool:
         """Return whether boxes a and b, by index, are a pair in this order."""
         group, allowed = self.groups
-        return (a, b) in self._listed or bool(self.patterns and a != b and (
+        return (a, b) in self._listed or bool(self.patterns and self.rigid[a] != self.rigid[b] and (
             allowed[group[min(a, b)], group[max(a, b)]] == (1 if a < b else 2)))
 
     @cached_property
@@ -213,9 +320,7 @@ class Scene:
         if not self.patterns:
             return np.zeros(len(self.boxes), bool)
         met: np.ndarray = np.greater(allowed[group[index]][group], 0)
-        met[index] = False
-        if self.is_fixed[index]:
-            met[self.is_fixed] = False
+        met[self.rigid == self.rigid[index]] = False
         met[self.rows[(self.rows == index).any(axis=1)]] = False
         return met
 
@@ -237,27 +342,31 @@ class Scene:
         indices = range(len(self.boxes) if self.patterns else 0)
         return len(self.pairs) + sum(len(self._later_partners(index)) for index in indices)
 
-    def partners(self, name: str) -> set[str]:
-        """Return the moving boxes that a moving box has a pair with; itself if one is fixed."""
-        index = self.index_of[name]
-        met = self._partners(index)
-        met[self.rows[(self.rows == index).any(axis=1)]] = True
-        met[index] = False
+    def partners(self, mover: str) -> set[str]:
+        """Return what of `moving` one of them has a pair with; itself if a partner is fixed."""
+        met = np.zeros(len(self.boxes), bool)
+        boxes = [self.row_of[mover]]
+        if mover in self.bodies:
+            boxes = np.flatnonzero(self.body_of == boxes[0] - len(self.boxes)).tolist()
+        for index in boxes:
+            met |= self._partners(index)
+            met[self.rows[(self.rows == index).any(axis=1)]] = True
+        met[boxes] = False
         if met[self.is_fixed].any():
-            return {name}
-        return {self.names[other] for other in np.flatnonzero(met)}
+            return {mover}
+        return {self.mover(self.names[other]) for other in np.flatnonzero(met)}
 
     @cached_property
     def moving(self) -> tuple[str, ...]:
-        """Names of the moving boxes in their order; without an array, only of those in a pair."""
-        asked = self._is_asked.copy()
+        """Names of boxes, then of bodies that move; without an array, only of those in a pair."""
+        asked = self._is_asked | self.pose_array
         asked[self.rows.ravel()] = True
-        return tuple(name for name, is_asked, is_fixed in zip(self.boxes, asked, self.is_fixed)
-                     if not is_fixed and (self.pose_array or is_asked))
+        movers = {self.mover(self.names[box]) for box in np.flatnonzero(asked & ~self.is_fixed)}
+        return tuple(name for name in self._parts if name in movers)
 
     @cached_property
     def streams(self) -> tuple[str, ...]:
-        """Names of the streams of poses: each box of `moving`, or ALL_BOXES in their place."""
+        """Names of the streams of poses: each of `moving`, or ALL_BOXES in their place."""
         return (ALL_BOXES,) if self.pose_array else self.moving
 
     @cached_property
@@ -265,7 +374,7 @@ class Scene:
         """Topics of poses, by stream."""
         if self.pose_array:
             return {ALL_BOXES: POSE_ARRAY}
-        return {name: self.boxes[name].pose_topic or f'{name}/pose' for name in self.moving}
+        return {name: self._parts[name].pose_topic or f'{name}/pose' for name in self.moving}
 
 
 def two_boxes(size_a: Sequence[float], size_b: Sequence[float]) -> Scene:
@@ -285,6 +394,10 @@ def _check_kinds(scene: Scene) -> None:
     for name, box in scene.boxes.items():
         check(isinstance(name, str), ('boxes',), 'boxes by name', scene.boxes)
         check(isinstance(box, Box), ('boxes', name), 'a Box', box)
+    check(isinstance(scene.bodies, Mapping), ('bodies',), 'Frames by name', scene.bodies)
+    for name, frame in scene.bodies.items():
+        check(isinstance(name, str), ('bodies',), 'Frames by name', scene.bodies)
+        check(isinstance(frame, Frame), ('bodies', name), 'a Frame', frame)
     for part in ('pairs', 'patterns'):
         rows = getattr(scene, part)
         check(isinstance(rows, tuple | list), (part,), f'a tuple of {part}', rows)
@@ -295,14 +408,31 @@ def _check_kinds(scene: Scene) -> None:
                 check(isinstance(value, str), (part, number), 'of text', row)
     check(isinstance(scene.frame_id, str), ('frame_id',), 'text', scene.frame_id)
     check(isinstance(scene.pose_array, bool), ('pose_array',), 'True or False', scene.pose_array)
-    for path, names in ((('frame_id',), (scene.frame_id,)), (('boxes',), scene.boxes)):
+    for path, names in ((('frame_id',), (scene.frame_id,)), (('boxes',), scene.boxes),
+                        (('bodies',), scene.bodies)):
         for name in names:
             if fault := name_fault(name):
                 raise SceneError(path, fault)
 
 
-def _check_pairs(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
+def _check_bodies(scene: Scene) -> None:
+    """Raise SceneError for the first body that is not that of some boxes."""
+    for name, box in scene.boxes.items():
+        if box.body and box.body not in scene.bodies:
+            raise SceneError(
+                ('boxes', name, 'body'), f'{short_repr(box.body)} is none of the bodies'
+                                         f'{nearest_name(box.body, scene.bodies)}')
+    used = {box.body for box in scene.boxes.values()}
+    for name in scene.bodies:
+        if name in scene.boxes:
+            raise SceneError(('bodies', name), f'{short_repr(name)} is the name of a box, too')
+        if name not in used:
+            raise SceneError(('bodies', name), f'no box is a part of {short_repr(name)}')
+
+
+def _check_pairs(scene: Scene) -> None:
     """Raise SceneError for the first thing that is wrong with listed pairs."""
+    boxes, pairs = scene.boxes, scene.pairs
     for number, pair in enumerate(pairs):
         path = ('pairs', number)
         fault = name_fault(pair.name)
@@ -310,13 +440,16 @@ def _check_pairs(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
             raise SceneError((*path, 'name'), fault)
         for side, name in (('a', pair.a), ('b', pair.b)):
             if name not in boxes:
-                raise SceneError((*path, side), f'{short_repr(name)} is none of the boxes')
+                raise SceneError((*path, side), f'{short_repr(name)} is ' + (
+                    'a body: name it in patterns' if name in scene.bodies else
+                    'none of the boxes'))
         if pair.a == pair.b:
             raise SceneError((*path, 'b'), f'{short_repr(pair.b)} is the same box as a')
-        if boxes[pair.a].pose and boxes[pair.b].pose:
-            raise SceneError(path, f'{short_repr(pair.a)} and {short_repr(pair.b)} are both fixed'
-                                   f'{MOVES}')
-    for what, field, values in (
+        index, other = scene.index_of[pair.a], scene.index_of[pair.b]
+        if scene.rigid[index] == scene.rigid[other]:
+            raise SceneError(path, f'{short_repr(pair.a)} and {short_repr(pair.b)} are ' + (
+                f'both fixed{MOVES}' if scene.is_fixed[index] else 'parts of one body'))
+    for what, key, values in (
             ('name', ('name',), [pair.label for pair in pairs]),
             ('pair of boxes', (), [tuple(sorted((pair.a, pair.b))) for pair in pairs])):
         first_of: dict[object, int] = {}
@@ -325,7 +458,7 @@ def _check_pairs(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
             if first != number:
                 a, b = pairs[first].a, pairs[first].b
                 raise SceneError(
-                    ('pairs', number, *field),
+                    ('pairs', number, *key),
                     f'the same {what} as that of {short_repr(a)} and {short_repr(b)}')
 
 
@@ -338,9 +471,9 @@ def _check_pattern(scene: Scene, number: int, is_a: np.ndarray, is_b: np.ndarray
         if not is_matched.any():
             raise SceneError(('patterns', number, side),
                              f'{short_repr(pattern)} is the name of no box')
-    # Ordered pairs of different boxes, less those of two fixed ones.
-    every, fixed = (int(a.sum() * b.sum() - (a & b).sum()) for a, b in (
-        (is_a, is_b), (is_a & scene.is_fixed, is_b & scene.is_fixed)))
-    if every == fixed:
-        raise SceneError(('patterns', number), 'no two boxes of this pattern are a pair of which '
-                                               f'one moves{MOVES}')
+    # Of all ordered pairs, those within no rigid group.
+    in_a, in_b = (np.bincount(scene.rigid[side], minlength=scene.rigid.max() + 1)
+                  for side in (is_a, is_b))
+    if in_a.sum() * in_b.sum() == in_a @ in_b:
+        raise SceneError(('patterns', number), 'no two boxes of this pattern move against each '
+                                               f'other{MOVES}')

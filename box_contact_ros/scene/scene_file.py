@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import KeysView, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ import yaml
 
 from ..resources import find_file, resource_path
 from ..solver.checks import SHOWN, short_repr
-from .scene import Box, Pair, Scene, SceneError
+from .scene import Box, Frame, KeyPath, Pair, Scene, SceneError
 
 MOST_STREAMS = 1000
 """Boxes with a topic of their own. Each subscription takes a millisecond and 100 kB; an array has
@@ -149,35 +149,51 @@ def _is_name(path: str | bytes) -> bool:
 def _scene_of(data: Any) -> Scene:
     """Return the scene that data means, or raise SceneError."""
     _check_schema(data)
-    boxes = {name: _box(name, entry) for name, entry in data['boxes'].items()}
+    boxes = {name: _box(entry, ('boxes', name)) for name, entry in data.get('boxes', {}).items()}
+    bodies = data.get('bodies', {})
+    for body, parts in bodies.items():
+        for part, entry in parts['boxes'].items():
+            name, place = f'{body}_{part}', ('bodies', body, 'boxes', part)
+            if name in boxes:
+                raise SceneError(place, f'{short_repr(name)} is the name of another box')
+            boxes[name] = _box(entry, place, body)
     entries = _ALL if data['pairs'] == 'all' else data['pairs']
-    listed = {number: entry for number, entry in enumerate(entries) if not _is_pattern(entry)}
-    patterns = {number: entry for number, entry in enumerate(entries) if _is_pattern(entry)}
+    listed = {number: entry for number, entry in enumerate(entries)
+              if not _is_pattern(entry, bodies.keys())}
+    patterns = {number: entry for number, entry in enumerate(entries) if number not in listed}
     for number, entry in patterns.items():
         if 'name' in entry:
-            raise SceneError(('pairs', number, 'name'), 'a pattern of pairs has no name')
+            raise SceneError(('pairs', number, 'name'), 'pairs by a pattern or a body have no name')
     try:
         scene = Scene(
             boxes, tuple(Pair(entry.get('name', f'{entry["a"]}_{entry["b"]}'), entry['a'],
                               entry['b']) for entry in listed.values()),
             data.get('frame_id', ''), data.get('poses') == 'array',
-            tuple((entry['a'], entry['b']) for entry in patterns.values()))
+            tuple((entry['a'], entry['b']) for entry in patterns.values()),
+            {name: _frame(name, entry) for name, entry in bodies.items()})
     except SceneError as fault:  # the file has both in one list
         part, *path = fault.path
         if part in ('pairs', 'patterns') and path:
             path[0] = list(listed if part == 'pairs' else patterns)[int(path[0])]
         raise SceneError(('pairs' if part == 'patterns' else part, *path), fault.reason) from None
     if len(scene.sources) > MOST_STREAMS:
-        raise SceneError(('boxes',), f'{len(scene.sources)} boxes have a topic of their own, and '
-                                     f'at most {MOST_STREAMS} may: set poses: array')
+        raise SceneError(('boxes',), f'{len(scene.sources)} boxes and bodies have a topic of their '
+                                     f'own, and at most {MOST_STREAMS} may: set poses: array')
     return scene
 
 
-def _box(name: str, entry: Mapping[str, Any]) -> Box:
+def _box(entry: Mapping[str, Any], path: KeyPath, body: str = '') -> Box:
     try:
-        return Box(entry['size'], entry.get('pose'), entry.get('pose_topic', ''))
+        return Box(entry['size'], entry.get('pose'), entry.get('pose_topic', ''), body)
     except SceneError as fault:
-        raise fault.within('boxes', name) from None
+        raise fault.within(*path) from None
+
+
+def _frame(name: str, entry: Mapping[str, Any]) -> Frame:
+    try:
+        return Frame(entry.get('pose'), entry.get('pose_topic', ''))
+    except SceneError as fault:
+        raise fault.within('bodies', name) from None
 
 
 def _check_schema(data: Any) -> None:
@@ -191,5 +207,7 @@ def _check_schema(data: Any) -> None:
         raise SceneError(tuple(error.absolute_path), error.message)
 
 
-def _is_pattern(entry: Mapping[str, str]) -> bool:
-    return bool(_WILDCARDS.search(entry['a'] + entry['b']))
+def _is_pattern(entry: Mapping[str, str], bodies: KeysView[str]) -> bool:
+    """Return whether an entry of pairs may stand for several: by wildcards, or by a body."""
+    sides = entry['a'], entry['b']
+    return bool(_WILDCARDS.search(''.join(sides))) or not bodies.isdisjoint(sides)

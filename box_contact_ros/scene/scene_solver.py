@@ -22,10 +22,7 @@ from ..solver.contact import Contact, Contacts
 from ..solver.contact_solver import ContactSolver
 from ..solver.models import Model
 from .contacts_of import find_contacts, in_contact
-from .scene import Pair, Scene
-
-NOWHERE = np.full(7, np.nan)
-"""Instead of the pose of a box that is not there."""
+from .scene import NOWHERE, Pair, Scene
 
 
 class Answer(NamedTuple):
@@ -83,10 +80,12 @@ class SceneSolver:
         self._most_near = most_near
         boxes = list(scene.boxes.values())
         self._size = np.array([box.size for box in boxes], dtype=float)
-        self._poses = np.array([box.pose or [np.nan] * 7 for box in boxes], dtype=float)
-        self._moving = np.array([scene.index_of[name] for name in scene.moving])
+        self._rows = scene.fixed_poses()
+        """Poses of boxes and, behind them, of bodies."""
+        self._poses = self._rows[:len(boxes)]
+        self._moving = np.array([scene.row_of[name] for name in scene.moving])
         self._broad_phase = native.BroadPhase(self._size, scene.is_fixed, margin, scene.rows,
-                                              *scene.groups, np.full(len(boxes), -1, np.int32))
+                                              *scene.groups, scene.body_of)
         self._solver = ContactSolver(model=model, margin=margin)
         self._again = partial(SceneSolver, model=model, margin=margin, most_near=most_near)
         self._warm_up()
@@ -115,12 +114,14 @@ class SceneSolver:
         self([None] * len(self.scene.moving))
 
     def __call__(self, poses: Sequence[np.ndarray | None] | np.ndarray) -> Answer:
-        """Return the answer to one tick: a pose (7,) or None for each box of `scene.moving`.
+        """Return the answer to one tick: a pose (7,) or None for each of `scene.moving`.
 
         Or an array (n, 7) with a row for each, all NaN for None.
         Raises ValueError for numbers that are no pose, and for more or fewer poses than that.
         """
         self._set_poses(poses)
+        if self.scene.bodies:
+            self.scene.place_boxes(self._rows)
         near, contacts, stale = find_contacts(
             self._broad_phase, self._solver, self._size, self._poses,
             lambda box: f'pose of {self.scene.names[box]}:', most_near=self._most_near)
@@ -128,8 +129,8 @@ class SceneSolver:
         return Answer(pairs, contacts, len(near), stale, self.scene)
 
     def _set_poses(self, poses: Sequence[np.ndarray | None] | np.ndarray) -> None:
-        """Take the poses of the moving boxes."""
-        if native.write_poses(self._poses, self._moving, poses):  # those of every node
+        """Take the poses of the boxes and bodies that move."""
+        if native.write_poses(self._rows, self._moving, poses):  # those of every node
             return
         is_array = isinstance(poses, np.ndarray) and poses.ndim > 0
         if not is_array and (not isinstance(poses, Sequence) or isinstance(poses, str)):
@@ -140,8 +141,8 @@ class SceneSolver:
                              f'{short_repr(list(self.scene.moving))}; give a list of a pose or '
                              'None for each')
         if isinstance(poses, np.ndarray):
-            self._poses[self._moving] = as_floats(poses, 'poses', 'rows (n, 7)', (None, 7))
+            self._rows[self._moving] = as_floats(poses, 'poses', 'rows (n, 7)', (None, 7))
             return
         for name, index, pose in zip(self.scene.moving, self._moving, poses):
-            self._poses[index] = NOWHERE if pose is None else as_floats(
+            self._rows[index] = NOWHERE if pose is None else as_floats(
                 pose, f'pose of {name}', 'a pose (x y z qx qy qz qw)', (7,))

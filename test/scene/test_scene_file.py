@@ -103,7 +103,7 @@ def test_patterns_stand_for_pairs_of_which_one_box_moves(scene_of):
     ('name: grip', 'name: load_s1', "pairs[1].name: the same name as that of 'load'"),
     ('name: grip', 'name: load/s1', "pairs[1].name: 'load/s1' does not match"),
     ('name: grip, a: spreader, b: load', "a: 'x*', b: load", "pairs[1].a: 'x*' is the name of no"),
-    ('a: spreader, b: load', "a: 's*', b: load", 'pairs[1].name: a pattern of pairs has no name'),
+    ('a: spreader, b: load', "a: 's*', b: load", 'pairs[1].name: pairs by a pattern or a body'),
     ('name: grip, a: spreader, b: load', "a: 's1', b: 's?'", 'pairs[1]: no two boxes of this'),
     ('a: spreader, b: load', 'a: s1, b: load', 'pairs[1]: the same pair of boxes as that'),
     ('  load: {size: [12.192, 2.438, 2.591]}', '  load: {size: [1, 1, 1], pose: '
@@ -155,7 +155,7 @@ def test_files_that_cannot_be_read(tmp_path):
 
 def test_more_topics_than_a_scene_may_have(scene_of, monkeypatch):
     monkeypatch.setattr(scene_file, 'MOST_STREAMS', 1)
-    with pytest.raises(SceneError, match='2 boxes have a topic of their own.*set poses: array'):
+    with pytest.raises(SceneError, match='2 boxes and bodies have a topic of.*set poses: array'):
         scene_of(GOOD)
     assert scene_of('poses: array\n' + GOOD).pose_array
 
