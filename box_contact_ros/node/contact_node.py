@@ -41,7 +41,7 @@ from ..scene.scene_file import read_scene
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import short_repr
 from ..solver.models import NATIVE
-from .check import Checker, Throttle, pair_count
+from .check import Checker, Throttle, size_of
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
 from .parameters import (
     Setting,
@@ -265,13 +265,13 @@ class ContactNode(GuardedNode, LifecycleNode):
         solver = self._answerer.solver
         if self._checker is None or self._checker.solver is not solver:
             self._checker = Checker(solver, self.model_of(self._values))
-        began, used, pairs = time.monotonic(), time.thread_time(), pair_count(request)
-        if refusal := self._throttle.refusal(pairs, began):
+        began, used, count = time.monotonic(), time.thread_time(), size_of(request)
+        if refusal := self._throttle.refusal(count, began):
             response.message = refusal
             return response
         self._checker.answer(request, response)
         ended = time.monotonic()
-        self._throttle.answered(pairs, time.thread_time() - used, ended - began, ended)
+        self._throttle.answered(count, time.thread_time() - used, ended - began, ended)
         return response
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

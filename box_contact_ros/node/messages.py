@@ -7,6 +7,7 @@ What the node sends on topics it writes as bytes: `message_bytes`.
 """
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,10 +16,11 @@ from std_msgs.msg import Header
 
 from box_contact_msgs.msg import Contact as ContactMessage
 
+from ..core import native
 from ..scene.scene import ALONE, Scene
 from ..scene.scene_solver import Answer
 from ..solver.checks import short_repr
-from ..solver.contact import Contact, Contacts, patch_area
+from ..solver.contact import Contact, Contacts
 
 NANOSECONDS = 1_000_000_000
 UPPER = np.triu_indices(3)
@@ -39,16 +41,30 @@ def make_header(stamp: int, frame_id: str) -> Header:
                   frame_id=frame_id)
 
 
-def contact_message(label: str, box_a: str, box_b: str, contact: Contact) -> ContactMessage:
-    """Return the message of the contact of a pair, by its label and the names of its boxes."""
-    message = ContactMessage()  # arguments would cost a second object for each field
-    message.pair, message.box_a, message.box_b = label, box_a, box_b
-    point, normal = message.point, message.normal
-    point.x, point.y, point.z = contact.point.tolist()
-    normal.x, normal.y, normal.z = contact.normal.tolist()
-    message.depth, message.volume = -contact.separation, contact.volume
-    message.area, message.covariance = patch_area(contact), contact.covariance[UPPER]
-    return message
+class KeptMessages:
+    """Messages of contacts, which are kept and filled anew: to make them takes most of the time."""
+
+    def __init__(self, most: int) -> None:
+        """Begin without a message; `most` may be filled at once."""
+        self._messages: list[ContactMessage] = []
+        self._covariance = np.zeros((most, 6))  # a row for each message, which refers to it
+
+    def fill(self, names: Sequence[tuple[str, str, str]], contacts: Contacts,
+             ) -> list[ContactMessage]:
+        """Return the messages of contacts, by the names of their pair and its boxes.
+
+        They are overwritten by the next call.
+        """
+        for row in self._covariance[len(self._messages):len(names)]:
+            self._messages.append(ContactMessage(covariance=row))
+        numbers = native.message_numbers(contacts.point, contacts.normal, contacts.separation,
+                                         contacts.volume, contacts.covariance)
+        self._covariance[:len(names)] = numbers[:, 9:]
+        for message, name, row in zip(self._messages, names, numbers[:, :9].tolist()):
+            message.pair, message.box_a, message.box_b = name
+            p, n = message.point, message.normal
+            p.x, p.y, p.z, n.x, n.y, n.z, message.depth, message.volume, message.area = row
+        return self._messages[:len(names)]
 
 
 def contacts_by_pair(message: Any) -> dict[str, Contact]:

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,10 +19,11 @@ from typed_messages import a_box, a_pair
 
 from box_contact_msgs.srv import Check
 from box_contact_ros import ContactSolver, SceneSolver, make_model
-from box_contact_ros.node.check import MOST_BOXES, MOST_PAIRS, Checker, Throttle
+from box_contact_ros.node.check import MOST_CONTACTS, Checker, Throttle
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import contacts_by_pair
-from box_contact_ros.scene.scene import EVERY_PAIR, Box, Pair, Scene
+from box_contact_ros.scene.scene import Box, Pair, Scene
+from box_contact_ros.scene.scene_check import MOST_BOXES, MOST_PAIRS
 
 CUBE = tuple(poses.CUBE)
 SCENE = Scene({name: Box(CUBE) for name in ('load', 'stack', 'lorry')},
@@ -53,50 +53,142 @@ def test_boxes_of_own_sizes_are_answered_as_the_solver_does(checker: Checker) ->
         assert np.array_equal(getattr(contact, name), getattr(wanted, name))
 
 
+def labels(response: Check.Response) -> list[str]:
+    """Return the names of the pairs in contact, in their order."""
+    assert response.success, response.message
+    return [entry.pair for entry in response.contacts.contacts]
+
+
 def test_boxes_of_the_scene_need_no_size(checker: Checker) -> None:
-    """A pair of the scene has its label there, and another one the names of its boxes."""
+    """They meet by the scene's pairs, and a guest meets all; a listed pair is any of the boxes."""
     response = asked(checker, a_box('load', TOUCHING), a_box('stack', ORIGIN),
                      a_box('lorry', TOUCHING), a_box('mine', ORIGIN, CUBE))
-    assert list(contacts_by_pair(response.contacts)) == [
-        'landing', 'load_lorry', 'load_mine', 'stack_lorry', 'stack_mine', 'lorry_mine']
+    assert labels(response) == ['landing', 'load_lorry', 'mine_load', 'mine_stack', 'mine_lorry']
     response = asked(checker, a_box('load', TOUCHING), a_box('stack', ORIGIN),
                      a_box('lorry', TOUCHING), pairs=[a_pair('stack', 'load')])
     entry, = response.contacts.contacts
     assert (entry.pair, entry.box_a, entry.normal.z) == ('stack_load', 'stack', 1.0)
 
 
+def test_a_size_of_its_own_lasts_for_one_question(checker: Checker) -> None:
+    """A box that moves may have another size than in the scene."""
+    for size, found in (((2, 2, 1), []), ((0, 0, 0), ['landing']), ((2, 2, 1), [])):
+        assert labels(asked(checker, a_box('load', TOUCHING, size), a_box('stack', ORIGIN))
+                      ) == found
+
+
 FIXED = (10, 0, 1, 0, 0, 0, 1)
-YARD = Scene({'load': Box(CUBE), 's1': Box(CUBE, FIXED)}, patterns=EVERY_PAIR,
-             frame_id='yard')
+ABOVE_FIXED = (10, 0, 2.9, 0, 0, 0, 1)
+YARD = Scene({'load': Box(CUBE), 'crane': Box(CUBE), 's1': Box(CUBE, FIXED),
+              's2': Box(CUBE, (0, 0, 0, 0, 0, 0, 1))}, (Pair('landing', 'load', 's1'),),
+             frame_id='yard', patterns=(('crane', '*'),))
 
 
-@pytest.mark.parametrize('place, depths', [((10, 0, 2.9, 0, 0, 0, 1), [0.1]),
-                                           ((0, 0, 1.9, 0, 0, 0, 1), [])])
+@pytest.fixture(scope='module')
+def yard() -> Checker:
+    return Checker(SceneSolver(YARD))
+
+
+def asked_yard(yard: Checker, *boxes: Any, **fields: Any) -> Check.Response:
+    return asked(yard, *boxes, **{'header': Header(frame_id='yard'), **fields})
+
+
+def test_one_box_is_a_question(yard: Checker) -> None:
+    """Fixed boxes take part by the scene's pairs; of a guest, all. Nobody else is there."""
+    def found(*boxes: Any, **fields: Any) -> list[str]:
+        return labels(asked_yard(yard, *boxes, **fields))
+
+    at_s2 = (0, 0, 1.9, 0, 0, 0, 1)
+    assert found(a_box('load', ABOVE_FIXED)) == ['landing']
+    assert found(a_box('load', at_s2)) == []  # no pair of the scene
+    assert found(a_box('crane', at_s2)) == ['crane_s2']
+    assert found(a_box('mine', at_s2, CUBE)) == ['mine_s2']
+    assert found(a_box('mine', ABOVE_FIXED, CUBE)) == ['mine_s1']
+    assert found(a_box('s1', ORIGIN)) == []  # it never moves
+    assert found(a_box('mine', at_s2, CUBE), a_box('load', at_s2)) == ['mine_load', 'mine_s2']
+    assert found(a_box('load', at_s2), pairs=[a_pair('s2', 'load')]) == ['s2_load']
+    assert found(a_box('load', ABOVE_FIXED), pairs=[a_pair('s2', 'load')]) == []
+    assert found(a_box('load', ABOVE_FIXED), pairs=[a_pair('load', 's1')]) == ['landing']
+    assert found(a_box('load', ABOVE_FIXED)) == ['landing']
+
+
+@pytest.mark.parametrize('margin', [0.0, 0.3])
+def test_a_question_is_answered_as_a_tick_of_the_scene_that_it_makes(margin: float) -> None:
+    """Guests are boxes of that scene, before its own; whoever is not named has no pose."""
+    rng = np.random.default_rng(4)
+
+    def pose(spread: float) -> np.ndarray:
+        quaternion = rng.normal(size=4)
+        return np.hstack((rng.uniform(-spread, spread, 3), quaternion / np.linalg.norm(quaternion)))
+
+    boxes = {f'fixed{n}': Box(rng.uniform(0.5, 2, 3), pose(5)) for n in range(60)}
+    boxes |= {f'moving{n}': Box(rng.uniform(0.5, 2, 3)) for n in range(50)}
+    patterns = (('moving1*', 'fixed*'), ('fixed2*', 'moving*'), ('moving2*', 'moving3*'))
+    scene = Scene(boxes, (Pair('own', 'moving4', 'moving5'),), patterns=patterns)
+    checker, count = Checker(SceneSolver(scene)), 0
+    for _ in range(6):
+        guests = {f'guest{n}': (pose(4), tuple(rng.uniform(0.5, 2, 3))) for n in range(40)}
+        named = {f'moving{n}': pose(4) for n in rng.permutation(50)[:40]}
+        response = asked(checker, *(a_box(name, *guest) for name, guest in guests.items()),
+                         *(a_box(name, place) for name, place in named.items()), margin=margin)
+        whole = Scene({**{name: Box(size) for name, (_, size) in guests.items()}, **boxes},
+                      scene.pairs, patterns=(('guest*', '*'), *patterns), pose_array=True)
+        poses_of = {name: place for name, (place, _) in guests.items()} | named
+        answer = SceneSolver(whole, margin=margin)([poses_of.get(name) for name in whole.moving])
+        listed = [*response.contacts.contacts, *response.contacts.near]
+        assert [entry.pair for entry in listed] == [pair.label for pair, _ in answer.named()]
+        assert [entry.depth for entry in listed] == (-answer.contacts.separation).tolist()
+        assert len(response.contacts.contacts) == answer.touching
+        count += len(listed)
+    assert count > 500
+
+
+def test_messages_of_an_answer_are_filled_anew(checker: Checker) -> None:
+    """Those of a long answer serve the next, and a longer one gets more."""
+    for count in (3, 1, 5):
+        boxes = [a_box(f'p{n}', (0, 0, 0.25 * n, 0, 0, 0, 1), CUBE) for n in range(count)]
+        entries = asked(checker, *boxes).contacts.contacts
+        wanted = ContactSolver(CUBE, CUBE)
+        assert len(entries) == count * (count - 1) // 2
+        for entry in entries:
+            contact = wanted(*(np.array([0, 0, 0.25 * int(name[1:]), 0, 0, 0, 1])
+                               for name in (entry.box_a, entry.box_b)))
+            assert entry.volume == contact.volume and entry.point.z == contact.point[2]
+            assert entry.covariance[5] == contact.covariance[2, 2]
+
+
+@pytest.mark.parametrize('place, depths', [(ABOVE_FIXED, [0.1]), ((0, 5, 1.9, 0, 0, 0, 1), [])])
 @pytest.mark.parametrize('s1', [ORIGIN, FIXED])
-def test_a_fixed_box_is_where_the_scene_says(place: Any, depths: list[float], s1: Any) -> None:
+def test_a_fixed_box_is_where_the_scene_says(yard: Checker, place: Any, depths: list[float],
+                                             s1: Any) -> None:
     """Without a pose of its own, as a new message is, or with the scene's."""
-    response = asked(Checker(SceneSolver(YARD)), a_box('load', place), a_box('s1', s1),
-                     header=Header(frame_id='yard'))
+    response = asked_yard(yard, a_box('load', place), a_box('s1', s1))
     assert response.success
     assert [entry.depth for entry in response.contacts.contacts] == pytest.approx(depths)
 
 
-@pytest.mark.parametrize('s1, frame, words', [
-    ((10, 0, 1.5, 0, 0, 0, 1), 'yard', "boxes[1] 's1' is fixed in the scene at (10.0, 0.0, 1.0, "),
-    ((0, 0, 0, 0, 0, 1, 0), 'yard', 'not at (0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0): leave its pose'),
-    (ORIGIN, 'map', "header.frame_id: the scene is in frame 'yard', the request in 'map': send"),
-    (ORIGIN, '/yard', 'the leading slash is the difference'),
-    (ORIGIN, '', "the request in ''")])
-def test_what_contradicts_the_scene_is_refused(s1: Any, frame: str, words: str) -> None:
-    response = asked(Checker(SceneSolver(YARD)), a_box('load', ORIGIN), a_box('s1', s1),
+@pytest.mark.parametrize('s1, size, frame, words', [
+    ((10, 0, 1.5, 0, 0, 0, 1), (0, 0, 0), 'yard',
+     "boxes[1] 's1' is fixed in the scene with pose (10.0, 0.0, 1.0, "),
+    ((0, 0, 0, 0, 0, 1, 0), (0, 0, 0), 'yard',
+     'not (0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0): leave its pose'),
+    (ORIGIN, (2, 2, 3), 'yard', 'with size (2.0, 2.0, 2.0), not (2.0, 2.0, 3.0): leave its size'),
+    (ORIGIN, CUBE, 'map',
+     "header.frame_id: the scene is in frame 'yard', the request in 'map': send"),
+    (ORIGIN, CUBE, '/yard', 'the leading slash is the difference'),
+    (ORIGIN, CUBE, '', "the request in ''")])
+def test_what_contradicts_the_scene_is_refused(yard: Checker, s1: Any, size: Any, frame: str,
+                                               words: str) -> None:
+    response = asked(yard, a_box('load', ORIGIN), a_box('s1', s1, size),
                      header=Header(frame_id=frame))
     assert not response.success and words in response.message
+    assert labels(asked_yard(yard, a_box('load', ABOVE_FIXED))) == ['landing']
 
 
 def test_near_is_what_is_apart_within_the_margin(checker: Checker) -> None:
     """`contacts` holds what touches and nothing else."""
     boxes = (a_box('load', APART), a_box('stack', ORIGIN), a_box('lorry', APART))
-    for margin, near in ((0.0, []), (0.4, []), (0.5, ['landing', 'stack_lorry'])):
+    for margin, near in ((0.0, []), (0.4, []), (0.5, ['landing'])):
         answer = asked(checker, *boxes, margin=margin).contacts
         assert [entry.pair for entry in answer.contacts] == ['load_lorry']
         assert [entry.pair for entry in answer.near] == near and not answer.stale
@@ -109,8 +201,8 @@ GOOD = a_box('p', ORIGIN, CUBE)
 
 
 @pytest.mark.parametrize('boxes, fields, words', [
-    ([], {}, 'boxes: a request has 2 to 256 boxes, not 0'),
-    ([GOOD], {}, 'boxes: a request has 2 to 256 boxes, not 1'),
+    ([], {}, 'boxes: a request has 1 to 256 boxes, not 0'),
+    ([a_box(f'{n}', ORIGIN, CUBE) for n in range(257)], {}, 'not 257'),
     ([a_box('p' * 256, ORIGIN, CUBE), GOOD], {}, "boxes[0].name: 'ppp"),
     ([a_box('ö' * 128, ORIGIN, CUBE), GOOD], {}, 'has 256 bytes, more than 255'),
     ([GOOD, a_box('load', ORIGIN)], {'header': Header(frame_id='f' * 256)},
@@ -122,14 +214,21 @@ GOOD = a_box('p', ORIGIN, CUBE)
     ([GOOD, a_box('q', ORIGIN, (1, NAN, 1))], {}, "boxes[1] 'q': (1, nan, 1) is not finite"),
     ([GOOD, a_box('q', [0] * 7, CUBE)], {}, "boxes[1] 'q': quaternion (x=0, y=0, z=0, w=0) has ze"),
     ([GOOD, a_box('q', [NAN] * 7, CUBE)], {}, "boxes[1] 'q': position (nan, nan, nan) is not fini"),
-    ([GOOD, a_box('load', ORIGIN)], {'margin': -1.0}, 'margin must be 0 or more, not -1'),
-    ([GOOD, a_box('load', ORIGIN)], {'margin': NAN}, 'margin must be 0 or more, not nan'),
+    ([GOOD, a_box('load', ORIGIN)], {'margin': -1.0},
+     'margin must lie within 0 and 1e+50 m, not -1'),
+    ([GOOD, a_box('load', ORIGIN)], {'margin': NAN},
+     'margin must lie within 0 and 1e+50 m, not nan'),
     ([GOOD, a_box('load', ORIGIN)], {'pairs': [a_pair('p', 'laod')]},
-     "pairs[0].box_b: 'laod' is none of the boxes of the request (did you mean load?)"),
+     "pairs[0].box_b: 'laod' is neither a box of the request nor a fixed box of the scene (did you "
+     'mean load?)'),
+    ([GOOD], {'pairs': [a_pair('p', 'load')]}, "pairs[0].box_b: 'load' is neither"),
     ([GOOD, a_box('load', ORIGIN)], {'pairs': [a_pair('p', 'p')]}, "'p' is both box_a and box_b"),
     ([GOOD, a_box('load', ORIGIN)], {'pairs': [a_pair('p', 'load')] * (MOST_PAIRS + 1)},
-     "pairs: 4097 are asked for, and model 'exact' answers at most 4096 per request"),
-    ([a_box(f'{i}', ORIGIN, CUBE) for i in range(92)], {}, 'pairs: 4186 are asked for'),
+     'pairs: a request has at most 4096, not 4097'),
+    ([a_box(f'{i}', ORIGIN, CUBE) for i in range(92)], {},
+     'contacts: 4186 pairs touch or are near, and a response has at most 4096'),
+    ([a_box(f'{i}', (3 * i, 0, 0, 0, 0, 0, 1), CUBE) for i in range(99)], {'margin': 1e6},
+     'contacts: 4851 pairs touch or are near'),
 ])
 def test_what_is_wrong_comes_back_as_text(checker: Checker, boxes: list[Any],
                                           fields: dict[str, Any], words: str) -> None:
@@ -138,10 +237,11 @@ def test_what_is_wrong_comes_back_as_text(checker: Checker, boxes: list[Any],
     assert response.contacts == Check.Response().contacts
 
 
-def test_a_large_request_is_refused_at_its_size(checker: Checker) -> None:
-    """No box of it is looked at."""
-    request = SimpleNamespace(boxes=[None] * (MOST_BOXES + 1), pairs=[], margin=0.0)
-    assert 'not 257' in checker.answer(request, Check.Response()).message
+def test_boxes_that_are_apart_cost_no_pairs(checker: Checker) -> None:
+    """As many as a request takes: the broad phase leaves out their pairs."""
+    boxes = [a_box(f'{n}', (3 * n, 0, 0, 0, 0, 0, 1), CUBE) for n in range(MOST_BOXES)]
+    assert MOST_BOXES * (MOST_BOXES - 1) // 2 > MOST_CONTACTS
+    assert labels(asked(checker, *boxes)) == []
 
 
 def test_costly_requests_pause_for_ticks() -> None:
@@ -152,7 +252,7 @@ def test_costly_requests_pause_for_ticks() -> None:
     throttle.answered(4095, 0.05, 0.1, 10.0)
     assert throttle.refusal(410, 10.0) == (
         'busy: ticks come first after a costly request; ask again in 0.4 s, or for at most 409 '
-        'pairs')
+        'boxes and pairs')
     assert throttle.refusal(410, 10.39) and throttle.refusal(410, 10.4) is None
     assert throttle.refusal(409, 10.0) is None
     throttle.answered(409, 0.001, 0.001, 10.1)
@@ -164,10 +264,10 @@ def test_a_soup_answers_few_pairs() -> None:
     pytest.importorskip('fcl')
     checker = Checker(SceneSolver(SCENE, model=make_model('soup-2')), 'soup-2')
     boxes = [a_box(f'{i}', ORIGIN, CUBE) for i in range(13)]
-    assert 'at most 64' in asked(checker, *boxes).message
+    assert 'more than 64 are' in asked(checker, *boxes).message
     apart = (a_box('load', APART), a_box('stack', ORIGIN))
     assert asked(checker, *apart).success
-    assert 'margin inf has no effect' in asked(checker, *apart, margin=1.0).message
+    assert 'margin 1 has no effect' in asked(checker, *apart, margin=1.0).message
 
 
 # --- over ROS -------------------------------------------------------------------------------------

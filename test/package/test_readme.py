@@ -44,8 +44,9 @@ from box_contact_ros.node import check, diagnostics, topics
 from box_contact_ros.node.check import Checker
 from box_contact_ros.node.contact_node import PARAMETERS
 from box_contact_ros.resources import resource_path
-from box_contact_ros.scene import pairing, scene_file
+from box_contact_ros.scene import pairing, scene_check, scene_file
 from box_contact_ros.scene.scene import two_boxes
+from box_contact_ros.scene.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import SceneSolver
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -167,11 +168,12 @@ def published(words: list[str], **_) -> None:
 
 
 def called(words: list[str], **_) -> None:
-    """Ask what a node of two cubes would: the request is one, and its boxes touch."""
+    """Ask a node of two cubes, or one of the yard: the request is one, and its boxes touch."""
     assert words[3:5] == ['/contact_node/check', 'box_contact_msgs/srv/Check']
     request = filled(Check.Request(), yaml.safe_load(words[5]))
-    solver = SceneSolver(two_boxes((2.0, 2.0, 2.0), (2.0, 2.0, 2.0)))
-    response = Checker(solver).answer(request, Check.Response())
+    scene = (read_scene(ROOT / 'config/scenes/yard_bay.yaml') if request.header.frame_id else
+             two_boxes((2.0, 2.0, 2.0), (2.0, 2.0, 2.0)))
+    response = Checker(SceneSolver(scene)).answer(request, Check.Response())
     assert response.contacts.contacts, response.message
 
 
@@ -439,7 +441,8 @@ LIMITS = {
     'explanation/separating_axis.md': (
         f'shorter than {PARALLEL} are skipped', f'within {judge.TOLERANCE:g} of the size'),
     'how-to/security.md': (
-        f'at most {check.MOST_BOXES} boxes and {check.MOST_PAIRS:,} pairs',),
+        f'at most {scene_check.MOST_BOXES} boxes and {scene_check.MOST_PAIRS:,} pairs, and a '
+        f'response {check.MOST_CONTACTS:,} contacts',),
     'reference/conventions.md': (
         f'more than {most_near("exact"):,} pairs near each other, of a soup {most_near("soup-8")}',
         f'δ = 1e{math.log10(DEPTH_FLOOR):.0f} · size',
