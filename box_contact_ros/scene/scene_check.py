@@ -58,7 +58,8 @@ class SceneCheck:
         meets[1:1 + len(allowed), 1:1 + len(allowed)] = allowed
         groups = np.concatenate((np.zeros(MOST_BOXES, np.int32), group + 1)).astype(np.int32)
         return (native.BroadPhase(self._sizes, self._is_fixed, margin,
-                                  self._scene.rows + MOST_BOXES, groups, meets),
+                                  self._scene.rows + MOST_BOXES, groups, meets,
+                                  np.full(len(groups), -1, np.int32)),
                 ContactSolver(model=self.solver.model, margin=margin))
 
     def __call__(self, names: Sequence[str], poses: Sequence[Row], sizes: Sequence[Row],
