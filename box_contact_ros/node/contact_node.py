@@ -7,7 +7,8 @@ Subscribes box_a/pose and box_b/pose (geometry_msgs/PoseStamped). Publishes cont
 (PointStamped) and contact/normal (Vector3Stamped, from A to B) while the boxes touch. On every
 evaluation it publishes contacts (box_contact_msgs/Contacts), and once a second /diagnostics.
 
-With a scene file: <box>/pose of every moving box, and <pair>/contact/point, <pair>/contact/normal.
+With a scene file: <name>/pose of every box and body that moves, and of every pair
+<pair>/contact/point, <pair>/contact/normal.
 The service ~/check (box_contact_msgs/Check) answers about the boxes of a request, without stamps.
 The service ~/reset (std_srvs/Trigger) forgets all poses and stamps.
 It is a lifecycle node that configures and activates itself, unless autostart is false. Its

@@ -31,23 +31,23 @@ class PoseTopic(NamedTuple):
     name: str
     kind: type  # of its messages
     qos: QoSProfile
-    boxes: Sequence[str]
+    names: Sequence[str]  # of boxes or bodies
     read: Callable[[bytes], StampedPose]
-    """Return the poses (n, 7) of these boxes, NaN for one that is not there.
+    """Return the poses (n, 7) of these names, NaN for one that is not there.
 
     Raises MessageError.
     """
 
 
 def pose_topics(scene: Scene) -> list[PoseTopic]:
-    """Return how the poses of all moving boxes come, in the scene's order."""
+    """Return how the poses of all that moves come, in the scene's order."""
     topics = []
     for source, topic in scene.sources.items():
         is_array = source == ALL_BOXES
-        boxes, read = (scene.moving, _read_array) if is_array else ((source,), _read_one)
+        names, read = (scene.moving, _read_array) if is_array else ((source,), _read_one)
         # Each topic has a reader of its own, which knows the topic's frame.
         topics.append(PoseTopic(topic, PoseArray if is_array else PoseStamped, pose_qos(source),
-                                boxes, partial(read, PoseReader(), len(boxes))))
+                                names, partial(read, PoseReader(), len(names))))
     return topics
 
 
@@ -57,11 +57,12 @@ def _read_one(reader: PoseReader, _: int, data: bytes) -> StampedPose:
 
 
 def _read_array(reader: PoseReader, count: int, data: bytes) -> StampedPose:
-    """Return the poses of so many boxes. A bad pose becomes NaN: the contact node reports it."""
+    """Return so many poses. A bad pose becomes NaN: the contact node reports it."""
     poses = reader.read_poses(data)
     if len(poses.numbers) != count:
         raise MessageError('wrong number of poses',
-                           f'{len(poses.numbers)} poses, but {count} boxes of the scene move')
+                           f'{len(poses.numbers)} poses, but {count} boxes and bodies of the scene '
+                           'move')
     poses.numbers[~are_poses(poses.numbers)] = np.nan
     return poses
 

@@ -77,11 +77,11 @@ class TickAnswerer:
         self._queues: dict[str, PoseQueue] = {}  # by box
         scene = solver.scene
         self._reader, self._writer = PoseReader(), ContactWriter(scene)
-        place = {scene.index_of[box]: number for number, box in enumerate(scene.streams)
-                 if box != ALL_BOXES}
-        self._sides = {pair: [place[box] for box in pair if box in place]
+        place = {name: number for number, name in enumerate(scene.streams)}
+        movers = [scene.mover(box) for box in scene.names]
+        self._sides = {pair: [place[movers[box]] for box in pair if movers[box] in place]
                        for pair in topics.of_pair}
-        """Places in a tick of the moving boxes of a pair that has topics."""
+        """Places in a tick of what moves the boxes of a pair that has topics."""
         self.active = False
 
     def set_times(self, settings: Mapping[str, Any]) -> None:
@@ -125,17 +125,18 @@ class TickAnswerer:
                    if self._topics.publisher_count(box) == 1)
 
     def _read_all(self, data: bytes) -> StampedPose:
-        """Return the poses of all moving boxes; a bad one is counted, and its box absent."""
+        """Return the poses of all that moves; a bad one is counted, and its name absent."""
         poses, moving = self._reader.read_poses(data), self.solver.scene.moving
         if len(poses.numbers) != len(moving):
             raise MessageError('wrong number of poses',
-                               f'{len(poses.numbers)} poses, but {len(moving)} boxes move')
+                               f'{len(poses.numbers)} poses, but {len(moving)} boxes and '
+                               'bodies move')
         bad = ~are_poses(poses.numbers) & ~absent_poses(poses.numbers)
         for row in np.flatnonzero(bad):
             self._refuse(MessageError('bad pose', f'{pose_fault(poses.numbers[row])}'), moving[row])
         poses.numbers[bad] = np.nan
         self._monitor.absent = [
-            box for box, absent in zip(moving, absent_poses(poses.numbers)) if absent]
+            name for name, absent in zip(moving, absent_poses(poses.numbers)) if absent]
         return poses
 
     def _answer(self, tick: Tick, arrived: int) -> None:

@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Topics of a scene: pose subscriptions of its moving boxes, contact publishers of its pairs."""
+"""Topics of a scene: subscriptions of the poses that move, contact publishers of its pairs."""
 from __future__ import annotations
 
 from collections import Counter
@@ -36,7 +36,7 @@ PoseCallback = Callable[[bytes, Mapping[str, Any]], None]
 
 
 def pose_qos(source: str) -> QoSProfile:
-    """Return the quality of service of a source of poses: a box, or ALL_BOXES.
+    """Return the quality of service of a source of poses: a box, a body, or ALL_BOXES.
 
     Best effort matches every publisher.
     """
@@ -87,7 +87,7 @@ class SceneTopics:
                                    self._publisher(Vector3Stamped, normal))
 
     def subscribe(self, scene: Scene, callback_of: Callable[[str, str], PoseCallback]) -> None:
-        """Subscribe to all poses, with the callback for the bytes of a box and its topic."""
+        """Subscribe to all poses, with the callback for the bytes of a name and its topic."""
         for box, topic in scene.sources.items():
             self._subscriptions[box] = self._node.create_subscription(
                 PoseArray if box == ALL_BOXES else PoseStamped, topic,

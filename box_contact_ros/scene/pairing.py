@@ -3,6 +3,8 @@
 
 """Pairing: joins the streams of stamped poses of several boxes to ticks.
 
+A body is one box here: it has one pose.
+
 Time is what the stamps say. No clock is asked. A recording, a paused simulation and a simulation at
 ten times real time are treated alike.
 
@@ -154,7 +156,7 @@ def _remembered() -> deque[int]:
 
 @dataclass(slots=True)
 class BoxState:
-    """What is known of one moving box; all stamps in ns."""
+    """What is known of one box or body that moves; all stamps in ns."""
 
     newest: int = NEVER  # its latest stamp
     taken: deque[int] = field(default_factory=_remembered)  # stamps of its poses that were taken
@@ -231,8 +233,9 @@ class Pairing(ABC):
         return 0
 
     def stamps(self, box: str) -> np.ndarray:
-        """Return an array (n,) of the stamps [ns] of a box, as far as they are remembered."""
-        return np.array(self._boxes[box].taken if box in self._boxes else (), dtype=np.int64)
+        """Return the stamps (n,) [ns] of a box, or of its body, as far as they are remembered."""
+        state = self._boxes.get(self._scene.mover(box))
+        return np.array(state.taken if state else (), dtype=np.int64)
 
     def _state_at(self, box: str, stamp: int) -> BoxState:
         """Return the state of a box, after a reset if its stamp shows that time was set back."""

@@ -43,9 +43,10 @@ class SceneCheck:
         self._names = ['' for _ in range(MOST_BOXES)] + list(scene.names)
         self._size_of = [tuple(box.size) for box in scene.boxes.values()]
         self._sizes = np.concatenate((np.ones((MOST_BOXES, 3)), self._size_of))
-        absent = [np.nan] * 7
-        self._poses = np.array([*[absent] * MOST_BOXES, *(
-            box.pose or absent for box in scene.boxes.values())])
+        fixed_poses = scene.fixed_poses()[:len(scene.boxes)]
+        self._fixed = {name: tuple(pose) for name, is_fixed, pose in zip(
+            scene.names, scene.is_fixed, fixed_poses.tolist()) if is_fixed}
+        self._poses = np.concatenate((np.full((MOST_BOXES, 7), np.nan), fixed_poses))
         self._is_fixed = np.concatenate((np.zeros(MOST_BOXES, bool), scene.is_fixed))
         self._made_for = lru_cache(KEPT_MARGINS)(self._make)
 
@@ -59,7 +60,7 @@ class SceneCheck:
         groups = np.concatenate((np.zeros(MOST_BOXES, np.int32), group + 1)).astype(np.int32)
         return (native.BroadPhase(self._sizes, self._is_fixed, margin,
                                   self._scene.rows + MOST_BOXES, groups, meets,
-                                  np.full(len(groups), -1, np.int32)),
+                                  np.concatenate((np.full(MOST_BOXES, -1), self._scene.body_of)).astype(np.int32)),
                 ContactSolver(model=self.solver.model, margin=margin))
 
     def __call__(self, names: Sequence[str], poses: Sequence[Row], sizes: Sequence[Row],
@@ -125,18 +126,18 @@ class SceneCheck:
                                      f'the scene{nearest_name(name, self._scene.boxes)}')
                 continue
             rows.append(MOST_BOXES + index)
-            known, fixed = self._size_of[index], self._scene.boxes[name].pose
+            known, fixed = self._size_of[index], self._fixed.get(name)
             if not any(all_sizes[number]):
                 all_sizes[number] = known
             if fixed is not None:
                 for what, value, unset, own in (
-                        ('pose', poses[number], NO_POSE, tuple(fixed)),
+                        ('pose', poses[number], NO_POSE, fixed),
                         ('size', sizes[number], (0.0, 0.0, 0.0), known)):
                     if value not in (unset, own):
                         raise ValueError(f'{where} {short_repr(name)} is fixed in the scene with '
                                          f'{what} {short_repr(own)}, not {short_repr(value)}: '
                                          f'leave its {what} as a new message has it')
-                all_poses[number] = tuple(fixed)
+                all_poses[number] = fixed
         pose_rows, size_rows = np.array(all_poses), np.array(all_sizes)
         if not (are_poses(pose_rows).all() and np.all(
                 (size_rows >= LENGTH_MIN) & (size_rows <= LENGTH_MAX))):

@@ -134,10 +134,11 @@ class SceneSolver:
             return
         is_array = isinstance(poses, np.ndarray) and poses.ndim > 0
         if not is_array and (not isinstance(poses, Sequence) or isinstance(poses, str)):
-            raise ValueError('poses must be a list of a pose or None for each box that moves, not '
+            raise ValueError('poses must be a list of a pose or None for each box and body that '
+                             'moves, not '
                              f'{short_repr(poses)}')
         if len(poses) != len(self._moving):
-            raise ValueError(f'{len(poses)} poses, but {len(self._moving)} boxes move: '
+            raise ValueError(f'{len(poses)} poses, but {len(self._moving)} boxes and bodies move: '
                              f'{short_repr(list(self.scene.moving))}; give a list of a pose or '
                              'None for each')
         if isinstance(poses, np.ndarray):

@@ -44,8 +44,8 @@ class SceneRows:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.sizes = np.array([box.size for box in scene.boxes.values()], dtype=float)
-        self.poses = np.array([box.pose or [np.nan] * 7 for box in scene.boxes.values()])
-        """Poses (n, 7) of the fixed boxes, NaN for boxes that move."""
+        self.poses = scene.fixed_poses()
+        """Poses (n + m, 7) of boxes and, behind them, of bodies: NaN for what moves."""
         self.is_a = np.any([scene.matching(a) for a, _ in scene.patterns], axis=0) | np.isin(
             np.arange(len(self.sizes)), scene.rows[:, 0])
         """Which boxes (n,) may be box a of a pair: normals point away from them."""
@@ -75,14 +75,14 @@ def read_touching(message: Any, scene: Scene) -> Answer:
 
 
 class Track:
-    """The last poses of the boxes of one topic, by stamp."""
+    """The last poses of one topic, by stamp."""
 
-    def __init__(self, boxes: list[int]) -> None:
-        self.boxes = boxes  # their rows in the scene
+    def __init__(self, rows: list[int]) -> None:
+        self.rows = rows  # those that the topic gives of SceneRows.poses
         self.kept: deque[tuple[int, np.ndarray]] = deque(maxlen=KEPT)
 
     def append(self, stamp: int, poses: np.ndarray) -> None:
-        """Take poses (m, 7); a box without one, NaN, stays where it was."""
+        """Take poses (m, 7); what has none, NaN, stays where it was."""
         last = self.kept[-1][1] if self.kept else poses
         self.kept.append((stamp, np.where(np.isnan(poses[:, :1]), last, poses)))
 
@@ -113,7 +113,7 @@ class Listener(GuardedNode):
         self._unanswered = math.inf  # since when poses come without contacts [s]
         self.topics = pose_topics(scene)
         for topic in self.topics:
-            self._tracks.append(Track([scene.index_of[box] for box in topic.boxes]))
+            self._tracks.append(Track([scene.row_of[name] for name in topic.names]))
             self.create_subscription(topic.kind, topic.name,
                                      partial(self._on_poses, topic, self._tracks[-1]), topic.qos,
                                      raw=True)
@@ -149,5 +149,7 @@ class Listener(GuardedNode):
             stamp, answer, latency = self._answer
         poses = self.rows.poses.copy()
         for track in tracks:
-            poses[track.boxes] = track.at(stamp)
-        return DrawnTick(self.rows, stamp, self._frame_id, poses, answer, latency)
+            poses[track.rows] = track.at(stamp)
+        self.rows.scene.place_boxes(poses)
+        return DrawnTick(self.rows, stamp, self._frame_id, poses[:len(self.rows.sizes)], answer,
+                         latency)

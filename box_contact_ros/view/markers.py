@@ -3,7 +3,7 @@
 
 """Markers for RViz and Foxglove: all boxes of a scene; point, normal, patch, depth of contacts.
 
-Subscribes to the poses of all moving boxes and to the contact node's contacts. Publishes markers
+Subscribes to the poses of all that moves and to the contact node's contacts. Publishes markers
 (visualization_msgs/MarkerArray) 30 times a second while poses come. RViz with config/contact.rviz
 shows them, Foxglove with config/contact.foxglove.json. A patch is an ellipse that touches the edges
 of a rectangle.

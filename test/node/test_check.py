@@ -22,7 +22,7 @@ from box_contact_ros import ContactSolver, SceneSolver, make_model
 from box_contact_ros.node.check import MOST_CONTACTS, Checker, Throttle
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import contacts_by_pair
-from box_contact_ros.scene.scene import Box, Pair, Scene
+from box_contact_ros.scene.scene import EVERY_PAIR, Box, Frame, Pair, Scene
 from box_contact_ros.scene.scene_check import MOST_BOXES, MOST_PAIRS
 
 CUBE = tuple(poses.CUBE)
@@ -165,6 +165,17 @@ def test_a_fixed_box_is_where_the_scene_says(yard: Checker, place: Any, depths: 
     response = asked_yard(yard, a_box('load', place), a_box('s1', s1))
     assert response.success
     assert [entry.depth for entry in response.contacts.contacts] == pytest.approx(depths)
+
+
+def test_boxes_of_bodies() -> None:
+    """Of a fixed one, where it puts them; of one that moves, where the request says."""
+    scene = Scene({'load': Box(CUBE), 's1': Box(CUBE, (0, 0, 1, 0, 0, 0, 1), body='stack'),
+                   'hook': Box(CUBE, (9, 0, 0, 0, 0, 0, 1), body='crane')}, patterns=EVERY_PAIR,
+                  bodies={'stack': Frame((10, 0, 0, 0, 0, 0, 1)), 'crane': Frame()})
+    response = asked(Checker(SceneSolver(scene)), a_box('load', (10, 0, 2.9, 0, 0, 0, 1)),
+                     a_box('s1', ORIGIN), a_box('hook', (10, 0, 4.8, 0, 0, 0, 1)))
+    assert {entry.pair: entry.depth for entry in response.contacts.contacts} == pytest.approx(
+        {'load_s1': 0.1, 'load_hook': 0.1})
 
 
 @pytest.mark.parametrize('s1, size, frame, words', [

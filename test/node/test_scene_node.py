@@ -318,6 +318,78 @@ def test_arrays_are_answered_by_their_stamps(array_node, array_client):
     assert counts['evaluations'] - evaluations == (not by_stamp)
 
 
+# --- bodies ---------------------------------------------------------------------------------------
+
+
+BODIES = """\
+boxes:
+  floor: {size: [20, 20, 1], pose: [0, 0, -0.5, 0, 0, 0, 1]}
+  crate: {size: [1, 1, 1]}
+bodies:
+  load:
+    boxes:
+      hull: {size: [4, 2, 2]}
+      foot: {size: [1, 1, 0.5], pose: [1.5, 0, -1.25, 0, 0, 0, 1]}
+pairs:
+  - {a: floor, b: load}
+  - {a: crate, b: load}
+"""
+TURNED = (0, 0, 1.4, 0, 0, 1, 0)  # half about z: the foot is at x = -1.5 m, 0.1 m deep in the floor
+CRATE = (-1.5, 0, 2.8, 0, 0, 0, 1)  # 0.1 m deep in the hull
+
+
+FOOT, HULL = 'floor_load_foot', 'crate_load_hull'
+
+
+@pytest.fixture
+def body_client():
+    client = Client(topics={'crate': 'crate/pose', 'load': 'load/pose'}, pairs=(FOOT, HULL))
+    yield client
+    client.close()
+
+
+def test_a_body_has_one_pose(body_client, scene_node):
+    """On one topic. Its boxes are in pairs, and stale together; diagnostics name the body."""
+    with scene_node(BODIES, max_age=0.2) as node:
+        assert {entity.topic_name for entity in node.subscriptions
+                if entity.topic_name.endswith('pose')} == {'/crate/pose', '/load/pose'}
+        body_client.offer_until_answered(CRATE, TURNED)
+        contacts = body_client.answer(CRATE, TURNED)
+        assert {pair: contact.separation for pair, contact in contacts.items()} == pytest.approx(
+            {FOOT: -0.1, HULL: -0.1})
+        assert contacts[FOOT].point == pytest.approx([-1.5, 0, -0.05])
+        stamps = [body_client.send(None, TURNED) for _ in range(30)]
+        assert body_client.is_answered(stamps[0])
+        assert body_client.contacts[stamps[0]].stale == ['crate']
+        for _ in range(10):
+            body_client.send(CRATE)
+            body_client.spin(lambda: False, 0.03)
+        assert body_client.diagnostic('stale boxes') == 'load'
+
+
+def test_the_stamp_of_a_body_is_that_of_its_boxes(body_client, scene_node):
+    """With `latest`: a later crate does not make the body's contact with the floor newer."""
+    with scene_node(BODIES, pairing='latest'):
+        body_client.offer_until_answered(CRATE, TURNED)
+        load = body_client.ask(None, TURNED)
+        crate = body_client.ask(CRATE)
+        assert list(contacts_by_pair(body_client.contacts[crate])) == [FOOT, HULL]
+        assert crate in body_client.points_of[HULL] and load in body_client.points_of[FOOT]
+        assert crate not in body_client.points_of[FOOT]
+
+
+def test_an_array_has_boxes_then_bodies(array_client, scene_node):
+    """A pose too few is refused, and a body that is not there is stale by its boxes."""
+    with scene_node('poses: array\n' + BODIES) as node:
+        array_client.offer_until_answered(CRATE, TURNED)
+        assert list(array_client.answer(CRATE, TURNED)) == ['floor_load_foot', 'crate_load_hull']
+        array_client.send(CRATE)
+        stamp = array_client.ask(CRATE, GONE)
+        assert array_client.contacts[stamp].stale == ['load_hull', 'load_foot']
+        assert array_client.diagnostic('stale boxes') == 'load'
+        assert node.counts['refused: wrong number of poses'] == 1
+
+
 # --- time -----------------------------------------------------------------------------------------
 
 

@@ -190,7 +190,8 @@ def test_as_many_poses_as_boxes_that_move(pairs):
     solver = SceneSolver(scene, model='exact')
     assert len(solver([None] * (pairs + 1)).stale) == pairs
     for count in (pairs, pairs + 2):
-        with pytest.raises(ValueError, match=f"{count} poses, but {pairs + 1} boxes move: .'a'"):
+        with pytest.raises(ValueError, match=f'{count} poses, but {pairs + 1} boxes and bodies '
+                                             "move: .'a'"):
             solver([poses.IDENTITY] * count)
 
 

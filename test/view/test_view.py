@@ -158,6 +158,19 @@ def test_boxes_that_an_array_lacks_stay_where_they_were(make_node, tmp_path):
     assert np.array_equal(node.tick().poses, [ORIGIN, TOUCHING, ORIGIN, ORIGIN])
 
 
+def test_a_body_carries_its_boxes(make_node, tmp_path):
+    """Half a turn about z, and the box beside the body's middle is on the other side."""
+    (tmp_path / 'scene.yaml').write_text(
+        'pairs: [{a: a, b: b}]\nboxes: {a: {size: [2, 2, 2]}}\n'
+        'bodies: {b: {boxes: {left: {size: [1, 1, 1]}, right: {size: [1, 1, 1], pose: '
+        '[3, 0, 0, 0, 0, 0, 1]}}}}\n')
+    node = make_node(Parameter('scene', value=str(tmp_path / 'scene.yaml')))
+    send(node, START, ORIGIN, np.array([10.0, 0, 0, 0, 0, 1, 0]))
+    poses_of = node.tick().poses
+    assert poses_of.shape == (3, 7)
+    assert np.allclose(poses_of[:, :3], [[0, 0, 0], [10, 0, 0], [7, 0, 0]])
+
+
 def test_contacts_of_another_scene_are_refused():
     for message in (contacts_at(1, {Pair.between('a', 'c'): EXACT}), contacts_at(1, {}, ['a_c'])):
         with pytest.raises(MessageError, match="'a_c' is no pair of the scene"):
