@@ -19,10 +19,11 @@ if TYPE_CHECKING:
     from .scene.scene import Box, Frame, Pair, Scene
     from .scene.scene_file import read_scene
     from .scene.scene_solver import SceneSolver
+    from .scene.support import support
 
 __all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Frame', 'Pair', 'PatchForces',
            'Scene', 'SceneSolver', 'contacts_of', 'make_model', 'patch_area', 'patch_areas',
-           'read_scene']
+           'read_scene', 'support']
 
 _LOADED_WHEN_USED = {
     'models': ('make_model',),
@@ -31,6 +32,7 @@ _LOADED_WHEN_USED = {
     'scene.scene_file': ('read_scene',),
     'scene.scene': ('Box', 'Frame', 'Pair', 'Scene'),
     'scene.scene_solver': ('SceneSolver',),
+    'scene.support': ('support',),
 }
 
 

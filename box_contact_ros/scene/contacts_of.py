@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import native
-from ..solver.checks import as_floats, as_places, as_size, pose_fault, short_repr
+from ..solver.checks import as_boxes, as_places, pose_fault, short_repr
 from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver
 
@@ -37,10 +37,8 @@ def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = No
 
     Raises ValueError, with the field and the value, for what is not a size, a pose or a pair.
     """
-    poses = as_floats(poses, 'poses', 'poses (n, 7) of rows x y z qx qy qz qw', (None, 7))
+    sizes, poses = as_boxes(sizes, poses)
     count = len(poses)
-    sizes = as_floats(sizes, 'sizes', f'full extents (3,) or ({count}, 3)', (3,), (count, 3))
-    sizes = np.tile(as_size(sizes, 'sizes'), (count, 1)) if sizes.ndim == 1 else sizes
     listed = as_places([] if pairs is None else pairs, 'pairs', count)
     if (alone := np.flatnonzero(listed[:, 0] == listed[:, 1])).size:
         raise ValueError(f'pairs[{alone[0]}] is box {listed[alone[0], 0]} with itself')

@@ -1,0 +1,118 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Support: closed forms, an oracle of many directions, and frames in which up is another way."""
+from __future__ import annotations
+
+import numpy as np
+import poses
+import pytest
+
+from box_contact_ros import contacts_of, support
+
+
+def upright(*places):
+    return np.hstack((np.array(places, float), np.tile([0.0, 0, 0, 1], (len(places), 1))))
+
+
+def supported(size, pose, **options):
+    return support(size, pose, *contacts_of(size, pose), **options)
+
+
+@pytest.mark.parametrize('overhang', [-0.3, 0.0, 0.4, 0.5, 0.6, 1.2])
+def test_a_box_that_overhangs(overhang):
+    """A cube of 1 m on a table: half a metre is the most that it may overhang."""
+    found = supported([(4, 3, 1), (1, 1, 1)], upright((0, 0, 0), (1.5 + overhang, 0, 1)), ground=0)
+    if overhang > 1.0:
+        assert len(found.carried_by) == found.share[1] == 0 and found.margin[1] == -np.inf
+        assert found.stands.tolist() == [True, False]
+        return
+    assert found.carried_by.tolist() == [[0, 1]]
+    assert found.share == pytest.approx([1.0, 1.0 - max(overhang, 0.0)], abs=1e-8)
+    assert found.margin[0] == np.inf
+    assert found.margin[1] == pytest.approx(0.5 - max(overhang, 0.0), abs=1e-8)
+    assert found.stands.tolist() == [True, overhang < 0.5]
+
+
+def test_a_bridge_stands_while_its_pillars_do():
+    """Its centre is above none of them; and one pillar that hangs in the air takes it down."""
+    size = [(9, 9, 1), (1, 1, 1), (1, 1, 1), (5, 1, 1)]
+    pose = upright((0, 0, -0.5), (-2, 0, 0.5), (2, 0, 0.5), (0, 0, 1.5))
+    bridge = supported(size, pose, ground=[0])
+    assert bridge.share[3] == pytest.approx(0.4, abs=1e-8)
+    assert bridge.margin[3] == pytest.approx(0.5, abs=1e-8) and bridge.stands.all()
+    pose[0, 0] = -3.5  # no longer below the second pillar
+    fallen = supported(size, pose, ground=[0])
+    assert fallen.stands.tolist() == [True, True, False, False]
+    assert fallen.margin[3] == bridge.margin[3]
+
+
+def test_without_ground_nothing_stands():
+    """A pile in the air, and four boxes of which each carries the next, in a ring."""
+    pile = supported((1, 1, 1), upright((0, 0, 0), (0, 0, 1)))
+    assert not pile.stands.any() and pile.margin[1] == pytest.approx(0.5, abs=1e-8)
+    contacts = contacts_of((1, 1, 1), upright((0, 0, 0), (0, 0, 1)))[1][[0, 0, 0, 0]]
+    ring = support((1, 1, 1), upright(*[(0, 0, 0)] * 4), [(0, 1), (1, 2), (2, 3), (3, 0)], contacts)
+    assert (ring.margin > -np.inf).all() and not ring.stands.any()
+
+
+def many_directions(size, pose, contacts, carried_by):
+    """Return the least reach (n,) of the corners of shared rectangles, in 7,200 directions."""
+    lower, upper = carried_by.T
+    low = np.maximum(*((pose[box, :2] - size[box, :2] / 2) for box in (lower, upper)))
+    high = np.minimum(*((pose[box, :2] + size[box, :2] / 2) for box in (lower, upper)))
+    angle = np.linspace(0.0, 2.0 * np.pi, 7200, endpoint=False)
+    directions = np.stack((np.cos(angle), np.sin(angle)))
+    reach = np.full((len(size), 7200), -np.inf)
+    for x, y in ((low, low), (low, high), (high, low), (high, high)):
+        corner = np.stack((x[:, 0], y[:, 1]), axis=1) - pose[upper, :2]
+        np.maximum.at(reach, upper, corner @ directions)
+    return reach.min(axis=1)
+
+
+def layers(rng):
+    """Return sizes and poses of layers of boxes, each beside and above others."""
+    size = np.column_stack((rng.uniform(0.3, 1.5, (300, 2)), np.ones(300)))
+    place = np.column_stack((rng.uniform(-4, 4, (300, 2)), np.arange(300) % 6))
+    return size, upright(*place)
+
+
+def test_margins_are_those_of_all_directions():
+    """Within what 0.05° of a hull's edge can hide; of boxes with any number of carriers."""
+    rng = np.random.default_rng(3)
+    size, pose = layers(rng)
+    pairs, contacts = contacts_of(size, pose)
+    found = support(size, pose, pairs, contacts)
+    wanted = many_directions(size, pose, contacts, found.carried_by)
+    carried = np.isfinite(wanted)
+    assert np.array_equal(carried, found.margin > -np.inf) and (wanted[carried] < 0).sum() > 20
+    assert (found.margin <= wanted + 1e-8)[carried].all()
+    assert found.margin[carried] == pytest.approx(wanted[carried], abs=4e-4)
+    assert np.bincount(found.carried_by[:, 1]).max() > 5
+
+
+def test_up_is_any_direction():
+    """In another frame, with `up` of another length: the same support."""
+    rng = np.random.default_rng(4)
+    size, pose = layers(rng)
+    wanted = supported(size, pose, ground=np.arange(0, 300, 6))
+    turn = poses.unit_quaternions(rng, 1)
+    moved = poses.moved(pose, rng.uniform(-5, 5, 3), turn)
+    up = poses.moved(upright((0, 0, 3)), np.zeros(3), turn)[0, :3]
+    found = supported(size, moved, ground=np.arange(0, 300, 6), up=up)
+    assert set(map(tuple, found.carried_by)) == set(map(tuple, wanted.carried_by))
+    assert found.share == pytest.approx(wanted.share, abs=1e-7)
+    assert found.margin == pytest.approx(wanted.margin, abs=1e-7)
+    assert np.array_equal(found.stands, wanted.stands) and 50 < found.stands.sum() < 250
+
+
+def test_a_steep_slope_carries_nothing():
+    """Of two boxes in one frame, tilted: up to 25.8° the lower carries the upper."""
+    for degrees, carries in ((25.0, True), (26.0, False)):
+        tilt = np.radians(degrees)
+        up = (np.sin(tilt), 0.0, np.cos(tilt))
+        found = supported((1, 1, 1), upright((0, 0, 0), (0, 0, 1)), up=up)
+        assert len(found.carried_by) == carries
+        if carries:  # the centre is half a metre above the patch
+            assert found.margin[1] == pytest.approx(0.5 * np.cos(tilt) - 0.5 * np.sin(tilt),
+                                                    abs=1e-8)
