@@ -58,9 +58,9 @@ class SceneCheck:
         meets[0] = 1  # guests come first, and meet everything
         meets[1:1 + len(allowed), 1:1 + len(allowed)] = allowed
         groups = np.concatenate((np.zeros(MOST_BOXES, np.int32), group + 1)).astype(np.int32)
+        bodies = np.concatenate((np.full(MOST_BOXES, -1, np.int32), self._scene.body_of))
         return (native.BroadPhase(self._sizes, self._is_fixed, margin,
-                                  self._scene.rows + MOST_BOXES, groups, meets,
-                                  np.concatenate((np.full(MOST_BOXES, -1), self._scene.body_of)).astype(np.int32)),
+                                  self._scene.rows + MOST_BOXES, groups, meets, bodies),
                 ContactSolver(model=self.solver.model, margin=margin))
 
     def __call__(self, names: Sequence[str], poses: Sequence[Row], sizes: Sequence[Row],
