@@ -457,7 +457,7 @@ LIMITS = {
         f'{0.5 * diagnostics.MARGIN:g} times the period of the faster box'),
     'reference/messages.md': (f'at most {most_near("soup-8")} pairs',),
     'reference/scenes.md': (
-        f'At most {scene_file.MOST_STREAMS:,} boxes may have a topic',
+        f'At most {scene_file.MOST_STREAMS:,} boxes and bodies may have a topic',
         f'More than {topics.MOST_PAIRS_WITH_TOPICS:,} pairs need `pair_topics:=false`',
         f'for {pairing.PATIENCE} later ticks'),
 }
