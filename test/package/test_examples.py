@@ -19,7 +19,7 @@ from patience import PATIENCE
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / 'docs' / 'examples'
 CLIENTS = ('check_client.py', 'lockstep_client.py', 'forces_client.py')  # of a contact node
-NEEDS = {'mujoco_loop.py': 'mujoco', 'container_stack.py': 'mujoco',
+NEEDS = {'mujoco_loop.py': 'mujoco', 'container_stack.py': 'mujoco', 'from_mjcf.py': 'mujoco',
          'dask_pairs.py': 'distributed',
          'tf_to_pose.py': 'tf2_ros'} | dict.fromkeys(CLIENTS, 'box_contact_msgs.msg')
 QUICK = {'vectorised_env.py': 'main(100)', 'dask_pairs.py': 'main(40_000, 10_000)'}

@@ -1,0 +1,74 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Does every container of a stowage plan stand? `python docs/examples/from_baplie.py [PLAN]`.
+
+A plan in SMDG BAPLIE has a slot (bay, row, tier) and an ISO 6346 size type for each container. The
+slots say nothing of metres: adapt the grid below to your ship. A container is on what is below it,
+or on the ship. It prints:
+
+    8 containers, 5 contacts, deepest 0.0 mm
+    0100304 42G1 does not stand: its centre is 38 mm outside, 0.50 of its base is on others
+    0100306 42G1 does not stand: its centre is 1219 mm inside, 1.00 of its base is on others
+"""
+import re
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+
+from box_contact_ros import contacts_of, support
+
+PLAN = Path(__file__).with_name('files') / 'ship.edi'
+Slot = tuple[int, int, int, str]  # bay, row, tier, size type
+CONTAINER = re.compile(r'LOC\+147\+(\d{3})(\d\d)(\d\d)(?:(?!LOC\+147).)*?EQD\+\w+\+[^+]*\+(\w{4})',
+                       re.DOTALL)
+LENGTHS, HIGH, WIDE = {'2': 6.058, '4': 12.192, 'L': 13.716}, '5E', 'E'  # [m]; 9 ft 6 in; 2.5 m
+BAY, ROW, TIER, DECK = 14.6, 2.5, 2.591, 30.0  # pitches, and height of tier 80 [m]
+
+
+def read_slots(text: str) -> list[Slot]:
+    """Return the slots and size types of the containers of a plan, from below to above."""
+    return sorted(((int(bay), int(row), int(tier), kind)
+                   for bay, row, tier, kind in CONTAINER.findall(text)), key=lambda slot: slot[2])
+
+
+def stow(slots: list[Slot]) -> tuple[np.ndarray, np.ndarray, list[int]]:
+    """Return full extents (n, 3), poses (n, 7), and the containers that have none below them."""
+    size, pose = np.zeros((len(slots), 3)), np.zeros((len(slots), 7))
+    stacks, lowest = defaultdict(list), []
+    for n, (bay, row, tier, kind) in enumerate(slots):
+        size[n] = (LENGTHS[kind[0]], 2.5 if kind[1] in WIDE else 2.438,
+                   2.896 if kind[1] in HIGH else 2.591)
+        x = BAY * (bay // 4) + (bay % 4 - 2) * 3.067  # odd bays hold 20 ft at an end of the 40 ft
+        y = ROW * ((row + 1) // 2 - 0.5) * (1 if row % 2 else -1) if row else 0.0
+        stack = stacks[row, tier < 80]
+        below = [pose[m, 2] + size[m, 2] / 2 for m in stack
+                 if abs(pose[m, 0] - x) < (size[m, 0] + size[n, 0]) / 2]
+        stack.append(n)
+        if not below:
+            lowest.append(n)
+            below = [TIER * (tier - 2) / 2 if tier < 80 else DECK + TIER * (tier - 80) / 2]
+        pose[n] = x, y, max(below) + size[n, 2] / 2, 0.0, 0.0, 0.0, 1.0
+    return size, pose, lowest
+
+
+def main() -> None:
+    """Read a plan, and tell what does not stand."""
+    slots = read_slots(Path(sys.argv[1] if len(sys.argv) > 1 else PLAN).read_text('latin-1'))
+    size, pose, lowest = stow(slots)
+    pairs, contacts = contacts_of(size, pose)
+    found = support(size, pose, pairs, contacts, ground=lowest)
+    deepest = 1e3 * max(0.0, -contacts.separation.min(initial=0.0))
+    print(f'{len(slots)} containers, {len(pairs)} contacts, deepest {deepest:.1f} mm')
+    for n in np.flatnonzero(~found.stands):
+        bay, row, tier, kind = slots[n]
+        side = 'inside' if found.margin[n] > 0.0 else 'outside'
+        print(f'{bay:03}{row:02}{tier:02} {kind} does not stand: its centre is '
+              f'{1e3 * abs(found.margin[n]):.0f} mm {side}, {found.share[n]:.2f} of its base is on '
+              'others')
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,67 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""What touches in a world of boxes? `python docs/examples/from_sdf.py [WORLD]`.
+
+The world is an SDF file, as Gazebo reads it. Each model is a body, whose boxes are no pairs. Those
+that are static never move. Poses that are relative to another frame are not read. It prints:
+
+    truck/chassis/bed and load/container/box: 1.0 mm deep
+    load/container/box and spreader/frame/beam: 1.0 mm deep
+    load/container/box and spreader/frame/front: 1.0 mm deep
+    load/container/box and spreader/frame/rear: 1.0 mm deep
+"""
+import sys
+from math import cos, sin
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from box_contact_ros import Box, Frame, Scene, SceneSolver
+
+WORLD = Path(__file__).with_name('files') / 'yard.sdf'
+
+
+def pose_of(part: ElementTree.Element) -> np.ndarray:
+    """Return a part's <pose> as x y z qx qy qz qw; the file has x y z roll pitch yaw."""
+    x, y, z, *turn = map(float, (part.findtext('pose') or '0 0 0 0 0 0').split())
+    (sr, sp, sy), (cr, cp, cy) = ([f(angle / 2) for angle in turn] for f in (sin, cos))
+    return np.array([x, y, z, sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy,
+                     cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy])
+
+
+def within(frame: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    """Return a pose in a frame as one in the frame around it."""
+    v, w, position, turn = frame[3:6], frame[6], pose[:3], pose[3:]
+    moved = position + 2.0 * np.cross(v, np.cross(v, position) + w * position)
+    return np.r_[frame[:3] + moved, w * turn[:3] + turn[3] * v + np.cross(v, turn[:3]),
+                 w * turn[3] - v @ turn[:3]]
+
+
+def read_world(path: str | Path) -> tuple[Scene, np.ndarray]:
+    """Return the scene of a world, and the poses (n, 7) of the models that move."""
+    boxes, bodies, moving = {}, {}, []
+    for model in ElementTree.parse(path).iterfind('world/model'):
+        name, pose = model.get('name'), pose_of(model)
+        is_static = model.findtext('static') in ('true', '1')
+        bodies[name] = Frame(pose) if is_static else Frame()
+        moving += [] if is_static else [pose]
+        for link in model.iterfind('link'):
+            for part in link.iterfind('collision'):
+                if size := part.findtext('geometry/box/size'):
+                    boxes[f'{name}/{link.get("name")}/{part.get("name")}'] = Box(
+                        np.array(size.split(), float), within(pose_of(link), pose_of(part)),
+                        body=name)
+    return Scene(boxes, bodies=bodies, patterns=(('*', '*'),), pose_array=True), np.array(moving)
+
+
+def main() -> None:
+    """Read a world, and tell what touches in it."""
+    scene, moving = read_world(sys.argv[1] if len(sys.argv) > 1 else WORLD)
+    for pair, contact in SceneSolver(scene)(moving).named():
+        print(f'{pair.a} and {pair.b}: {-1e3 * contact.separation:.1f} mm deep')
+
+
+if __name__ == '__main__':
+    main()
