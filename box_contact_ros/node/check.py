@@ -4,7 +4,13 @@
 """The service ~/check: what the boxes of one request touch, without stamps and topics."""
 from __future__ import annotations
 
+import time
+from collections import Counter, deque
+from collections.abc import Callable
 from typing import Any
+
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 
 from box_contact_msgs.srv import Check
 
@@ -14,6 +20,8 @@ from ..scene.scene_check import Row, SceneCheck
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import name_fault
 from .messages import KeptMessages
+from .rclpy_workarounds import Send, answer_later
+from .runtime import LONG, GuardedNode
 
 MOST_CONTACTS = 4096
 """Of a response: all pairs of 91 boxes, 0.8 MB."""
@@ -21,36 +29,10 @@ COSTLY = 5e-3
 """Processor time [s] beyond which a request is costly: half a tick at 100 Hz."""
 PAUSE = 4.0
 """Pause after a costly request, divided by its time: ticks have four fifths of the node's time."""
-
-
-class Throttle:
-    """Keeps clients that ask costly requests without pause from stopping all ticks.
-
-    After a costly request that took T, costly requests are refused for PAUSE · T. Whether a request
-    is costly is judged by the time per box and pair of the last costly one.
-    """
-
-    def __init__(self) -> None:
-        """Begin without a pause."""
-        self._until = 0.0  # end of the pause [s]
-        self._cheap = 0  # number of boxes and pairs that are not costly
-
-    def refusal(self, size: int, now: float) -> str | None:
-        """Return why a request of so many boxes and pairs is refused now [s], or None."""
-        if now >= self._until or size <= self._cheap:
-            return None
-        return (f'busy: ticks come first after a costly request; ask again in '
-                f'{self._until - now:.2g} s, or for at most {self._cheap} boxes and pairs')
-
-    def answered(self, size: int, cost: float, took: float, now: float) -> None:
-        """Note a request: its processor time, the time that it took, and when it ended [s]."""
-        if cost > COSTLY:
-            self._until, self._cheap = now + PAUSE * took, int(size * COSTLY / cost)
-
-
-def size_of(request: Check.Request) -> int:
-    """Return how many boxes and pairs a request has."""
-    return len(request.boxes) + len(request.pairs)
+MOST_WAITING = 16
+"""Costly requests that wait for the end of a pause."""
+KEPT_TIMES = 4096  # of requests, for a report
+NOT_CONFIGURED = 'the node is not configured'
 
 
 class Checker:
@@ -97,6 +79,81 @@ class Checker:
         listed = response.contacts
         listed.header = request.header
         listed.contacts, listed.near = messages[:touching], messages[touching:]
+
+
+class CheckService:
+    """Serves ~/check, and keeps clients that ask costly requests without pause from stopping ticks.
+
+    After a costly request that took T, costly requests wait for PAUSE · T. A client that waits asks
+    nothing: a refusal would bring its request again, and ROS takes a millisecond to read it.
+    Whether a request is costly is judged by the time per box and pair of the last costly one.
+    """
+
+    def __init__(self, node: GuardedNode, counts: Counter[str],
+                 checker: Callable[[], Checker | None]) -> None:
+        """Serve ~/check of a node; `checker` returns what answers, None before configure."""
+        self._counts, self._checker = counts, checker
+        self._until = 0.0  # end of the pause, by the steady clock [s]
+        self._cheap = 0  # number of boxes and pairs that are not costly
+        self._waiting: deque[tuple[float, Check.Request, Send]] = deque()  # when each came [s]
+        self._times: deque[float] = deque(maxlen=KEPT_TIMES)  # from taking to answering [s]
+        self._filled = node.answered(self._fill, '~/check')
+        self._timer = node.create_timer(LONG, self._answer_next, clock=Clock(
+            clock_type=ClockType.STEADY_TIME))
+        self._timer.cancel()
+        answer_later(node.create_service(Check, '~/check', self._fill), self._take)
+
+    def take_times(self) -> list[float]:
+        """Return the times [s] from taking to answering of the requests since the last call."""
+        times = list(self._times)
+        self._times.clear()
+        return times
+
+    def _take(self, request: Check.Request, send: Send) -> None:
+        """Answer a request now or, if it is costly in a pause, later."""
+        now = time.monotonic()
+        is_costly = len(request.boxes) + len(request.pairs) > self._cheap
+        if not is_costly or not (self._waiting or now < self._until):
+            self._answer(now, request, send)
+        elif len(self._waiting) < MOST_WAITING:
+            self._waiting.append((now, request, send))
+            self._wait()
+        else:
+            self._counts['checks refused'] += 1
+            send(Check.Response(message=f'busy: {MOST_WAITING} costly requests wait, as ticks come '
+                                        'first; ask again later'))
+
+    def _answer_next(self) -> None:
+        """Answer the first that waits, as its pause is over."""
+        self._timer.cancel()
+        if self._waiting:
+            self._answer(*self._waiting.popleft())
+        if self._waiting:
+            self._wait()
+
+    def _wait(self) -> None:
+        """Let the timer end with the pause."""
+        self._timer.timer_period_ns = max(1, round(1e9 * (self._until - time.monotonic())))
+        self._timer.reset()
+
+    def _answer(self, came: float, request: Check.Request, send: Send) -> None:
+        """Answer a request that came at a time [s]."""
+        began, used = time.monotonic(), time.thread_time()
+        response = self._filled(request, Check.Response())
+        send(response)
+        ended, cost = time.monotonic(), time.thread_time() - used
+        self._counts['checks answered' if response.success else 'checks refused'] += 1
+        self._times.append(ended - came)
+        if cost > COSTLY:
+            self._until = ended + PAUSE * (ended - began)
+            self._cheap = int((len(request.boxes) + len(request.pairs)) * COSTLY / cost)
+
+    def _fill(self, request: Check.Request, response: Check.Response) -> Check.Response:
+        checker = self._checker()
+        if checker is None:
+            response.message = NOT_CONFIGURED
+            return response
+        return checker.answer(request, response)
 
 
 def _pose(box: Any) -> Row:

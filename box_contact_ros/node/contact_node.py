@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import gc
 import sys
-import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -32,8 +31,6 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
-from box_contact_msgs.srv import Check
-
 from ..core import LENGTH_MAX
 from ..models import MODELS, check_model, make_model, most_near
 from ..scene.pairing import PAIRINGS, RESETS
@@ -42,7 +39,7 @@ from ..scene.scene_file import read_scene
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import short_repr
 from ..solver.models import NATIVE
-from .check import Checker, Throttle, size_of
+from .check import NOT_CONFIGURED, Checker, CheckService
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
 from .parameters import (
     Setting,
@@ -62,7 +59,6 @@ from .tick import TickAnswerer
 from .topics import SceneTopics
 
 LONGEST = 1e6  # s, about twelve days
-NOT_CONFIGURED = 'the node is not configured'
 NAMED_TOPICS = 3  # how many pose topics the node names when it is ready
 
 
@@ -129,9 +125,8 @@ class ContactNode(GuardedNode, LifecycleNode):
         self._topics: SceneTopics | None = None  # from configure to cleanup
         self._answerer: TickAnswerer | None = None  # likewise
         self._checker: Checker | None = None  # of the solver's scene and model
-        self._throttle = Throttle()
         self.add_on_set_parameters_callback(self._set_live)
-        self.create_service(Check, '~/check', self.answered(self._check, '~/check'))
+        self._checks = CheckService(self, self.counts, self._checker_now)
         self.create_service(Trigger, '~/reset', self.answered(self._reset, '~/reset'))
         # On a clock of its own: simulated time may stand still.
         self.create_timer(DIAGNOSTICS_SECONDS, self._report, clock=Clock(
@@ -258,22 +253,13 @@ class ContactNode(GuardedNode, LifecycleNode):
             f'poses{frame} from {", ".join(topics[:NAMED_TOPICS])}'
             f'{f" and {more} more" if more > 0 else ""}')
 
-    def _check(self, request: Check.Request, response: Check.Response) -> Check.Response:
-        """Answer about the boxes of a request, on the node's model; ticks know nothing of it."""
+    def _checker_now(self) -> Checker | None:
+        """Return what answers ~/check on the node's scene and model; None before configure."""
         if self._answerer is None:
-            response.message = NOT_CONFIGURED
-            return response
-        solver = self._answerer.solver
-        if self._checker is None or self._checker.solver is not solver:
-            self._checker = Checker(solver, self.model_of(self._values))
-        began, used, count = time.monotonic(), time.thread_time(), size_of(request)
-        if refusal := self._throttle.refusal(count, began):
-            response.message = refusal
-            return response
-        self._checker.answer(request, response)
-        ended = time.monotonic()
-        self._throttle.answered(count, time.thread_time() - used, ended - began, ended)
-        return response
+            self._checker = None
+        elif self._checker is None or self._checker.solver is not self._answerer.solver:
+            self._checker = Checker(self._answerer.solver, self.model_of(self._values))
+        return self._checker
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Forget all poses and stamps: a simulation begins anew."""
@@ -301,7 +287,8 @@ class ContactNode(GuardedNode, LifecycleNode):
         else:
             self._diagnostics.report(
                 state, self._answerer.solver.scene, self.model_of(self._values),
-                self._answerer.pairing, self._topics, self._answerer.take_lost())
+                self._answerer.pairing, self._topics, self._answerer.take_lost(),
+                self._checks.take_times())
 
 
 def run(node_type: type[ContactNode], doc: str | None, args: Sequence[str] | None) -> int:

@@ -44,6 +44,9 @@ MARGIN = 1.2
 FEWEST_STAMPS = 5  # of a box, before its period is known, even if there is a gap among them
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 ACTIVE = 'active'
+SILENCE = 'silence'
+"""Cause of a node that nobody sends poses. It is logged once: the node may only serve requests."""
+CHECK_TIME = 'check p99 [ms]'  # a key
 REMEDIES = {
     'has zero length': 'set orientation.w to 1.0',
     'is not finite': 'send finite numbers',
@@ -172,10 +175,11 @@ class Diagnostics:
         self._logged: dict[str, float] = {}  # when a cause was logged [s]
 
     def report(self, state: str, scene: Scene, model: str, pairing: Pairing, topics: SceneTopics,
-               lost: int) -> None:
+               lost: int, checks: Sequence[float]) -> None:
         """Report on a node that is configured.
 
-        state: that of the lifecycle. lost: poses that never came since the last report.
+        state: that of the lifecycle. Since the last report: lost: poses that never came; checks:
+        times of requests [s].
         """
         logger = self._node.get_logger()
         rejections, pairing.rejections = pairing.rejections, {}
@@ -188,7 +192,9 @@ class Diagnostics:
         summary = self._monitor.summary(
             came=new['poses'] > 0, was_busy=load.seconds > BUSY_SECONDS,
             max_age=1e-9 * pairing.max_age)
-        unseen = [box for box in pairing.unseen() if box not in self._monitor.refused_boxes]
+        only_serves = not summary.has_heard and self._counts['checks answered'] > 0
+        unseen = [] if only_serves else [
+            box for box in pairing.unseen() if box not in self._monitor.refused_boxes]
         stale = self._monitor.absent if scene.pose_array else pairing.stale()
         findings = [] if state != ACTIVE else list(_findings(
             summary, [name.partition(': ')[2] for name in new if name.startswith('refused')],
@@ -197,7 +203,8 @@ class Diagnostics:
         if state == ACTIVE:
             findings += _lateness(load, sent, new[OVERTAKEN])
         self._log(findings)
-        self.publish(findings, state=state, load=load, came=new['poses'] > 0, values={
+        times = {CHECK_TIME: f'{1e3 * np.percentile(checks, 99):.1f}'} if len(checks) else {}
+        self.publish(findings, state=state, load=load, came=new['poses'] > 0, values=times | {
             'model': model, 'pairs': scene.pair_count, 'stale boxes': ' '.join(stale),
             'boxes that never came': ' '.join(unseen),
             'unanswered pairs': len(summary.unanswered), 'waiting ticks': pairing.waiting_ticks,
@@ -222,7 +229,8 @@ class Diagnostics:
             findings = [Finding('state', f'{state}: no pose is answered')]
         level = max((finding.level for finding in findings), default=OK)
         message = '; '.join(finding.message for finding in findings) or (
-            'answering' if load and load.evaluations else 'no answers' if came else 'no poses')
+            'answering' if load and load.evaluations else 'no answers' if came else
+            'answering requests' if values and CHECK_TIME in values else 'no poses')
         status = DiagnosticStatus(
             level=level, name=f'{self._node.get_fully_qualified_name()}: contacts',
             message=message, hardware_id='none',
@@ -235,7 +243,7 @@ class Diagnostics:
         now = time.monotonic()
         stay = {finding.cause for finding in findings}
         self._logged = {cause: at for cause, at in self._logged.items()
-                        if cause in stay and now < at + REMINDER_SECONDS}
+                        if cause in stay and (now < at + REMINDER_SECONDS or cause == SILENCE)}
         for finding in findings:
             if finding.remedy and finding.cause not in self._logged:
                 self._logged[finding.cause] = now
@@ -271,7 +279,8 @@ def _findings(summary: Summary, refused: Sequence[str], unseen: Sequence[str],
         yield Finding('refused', f'poses refused: {", ".join(refused)}')
     if unseen and (summary.unmatched or (
             not summary.has_heard and summary.quiet >= UNANSWERED_SECONDS)):
-        yield Finding('unseen', f'no pose ever came: {_some(unseen)}',
+        yield Finding('unseen' if summary.has_heard else SILENCE,
+                      f'no pose ever came: {_some(unseen)}',
                       '; '.join(map(topics.why_silent, unseen[:NAMED])))
     if stale:
         yield Finding('stale', f'stale boxes: {_some(stale)}', '' if (

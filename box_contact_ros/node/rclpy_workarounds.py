@@ -19,8 +19,11 @@ from rclpy.context import Context
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
+from rclpy.service import Service
 
 CallbackWithInfo = Callable[[Any, Mapping[str, Any]], None]
+Send = Callable[[Any], None]
+"""Sends the response to a request."""
 RCLError = rclpy_implementation.RCLError
 """Symptom: what the middleware refuses raises a type without a public name. Not reported.
 Test: test_contact_node.py::test_a_bad_start_is_one_clear_line."""
@@ -63,6 +66,26 @@ def with_info(callback: CallbackWithInfo) -> Callable[..., None]:
             message, info = message
         callback(message, info)
     return call
+
+
+def answer_later(service: Service, take: Callable[[Any, Send], None]) -> None:
+    """Let `take` have the requests of a service, and for each one a function that sends its answer.
+
+    Symptom: the callback of a service has to return its answer at once, and nobody can measure how
+    long sending it takes. Not reported.
+    Test: test_check.py::test_costly_requests_wait_for_ticks.
+    """
+    send = service.send_response
+    requests: list[Any] = []
+
+    def keep(request: Any, response: Any) -> Any:
+        requests.append(request)
+        return response
+
+    def answer(_: Any, header: Any) -> None:  # rclpy calls it right after the callback
+        take(requests.pop(), lambda response: send(response, header))
+    service.callback = keep
+    service.send_response = answer  # type: ignore[assignment, method-assign]
 
 
 @contextmanager

@@ -45,6 +45,7 @@ SPIN_SECONDS = 10.0
 Each leaves some 32 bytes behind in rclpy (7.1): of slices this long, 0.3 MB a day."""
 END_SECONDS = 8.0  # for a clean end; launch kills after ten
 NodeKind = TypeVar('NodeKind', bound=Node)
+LONG = 86_400.0  # period of a timer that stands still [s]
 LOG_SECONDS = 1.0  # the same complaint is logged at most this often
 
 

@@ -5,12 +5,17 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import poses
 import pytest
 from raw_client import APART, ORIGIN, TOUCHING
+from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.parameter import Parameter
 from ros_client import Client, serving
 from std_msgs.msg import Header
@@ -19,7 +24,8 @@ from typed_messages import a_box, a_pair
 
 from box_contact_msgs.srv import Check
 from box_contact_ros import ContactSolver, SceneSolver, make_model
-from box_contact_ros.node.check import MOST_CONTACTS, Checker, Throttle
+from box_contact_ros.node import check as check_module
+from box_contact_ros.node.check import MOST_CONTACTS, Checker, CheckService
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import contacts_by_pair
 from box_contact_ros.scene.scene import EVERY_PAIR, Box, Frame, Pair, Scene
@@ -28,6 +34,7 @@ from box_contact_ros.scene.scene_check import MOST_BOXES, MOST_PAIRS
 CUBE = tuple(poses.CUBE)
 SCENE = Scene({name: Box(CUBE) for name in ('load', 'stack', 'lorry')},
               (Pair('landing', 'load', 'stack'), Pair.between('load', 'lorry')))
+EXECUTORS = (SingleThreadedExecutor, MultiThreadedExecutor, EventsExecutor)
 EPISODES = 1  # of each length; 50 were tried
 
 
@@ -255,21 +262,6 @@ def test_boxes_that_are_apart_cost_no_pairs(checker: Checker) -> None:
     assert labels(asked(checker, *boxes)) == []
 
 
-def test_costly_requests_pause_for_ticks() -> None:
-    """For four times as long as one took; those of fewer pairs, that are not costly, do not."""
-    throttle = Throttle()
-    throttle.answered(4095, 0.005, 1.0, 10.0)
-    assert throttle.refusal(4095, 10.0) is None
-    throttle.answered(4095, 0.05, 0.1, 10.0)
-    assert throttle.refusal(410, 10.0) == (
-        'busy: ticks come first after a costly request; ask again in 0.4 s, or for at most 409 '
-        'boxes and pairs')
-    assert throttle.refusal(410, 10.39) and throttle.refusal(410, 10.4) is None
-    assert throttle.refusal(409, 10.0) is None
-    throttle.answered(409, 0.001, 0.001, 10.1)
-    assert throttle.refusal(410, 10.2)
-
-
 def test_a_soup_answers_few_pairs() -> None:
     """Its pairs take up to a third of a second; and it knows no axis of those apart."""
     pytest.importorskip('fcl')
@@ -308,7 +300,7 @@ def test_a_check_leaves_the_ticks_alone(client: Client) -> None:
         assert check(client, ORIGIN, TOUCHING).message == 'the node is not configured'
         node.start()
         client.offer_until_answered(ORIGIN, APART)
-        before = dict(node.counts)
+        before = {**node.counts, 'checks answered': 2}
         for model in ('exact', 'mlp'):
             assert node.set_parameters([Parameter('model', value=model)])[0].successful
             contact = contacts_by_pair(check(client, ORIGIN, TOUCHING).contacts)['box_a_box_b']
@@ -320,17 +312,81 @@ def test_a_check_leaves_the_ticks_alone(client: Client) -> None:
         client.ask(ORIGIN, TOUCHING)
 
 
-def test_a_costly_request_right_after_another_is_busy(client: Client) -> None:
-    """A cheap one between the same two is answered."""
-    costly = Check.Request(boxes=[a_box(f'{n}', ORIGIN, CUBE) for n in range(91)])
-    cheap = Check.Request(boxes=costly.boxes[:2])
-    with serving(lambda context: ContactNode(context, parameter_overrides=overrides())):
+COSTLY = Check.Request(boxes=[a_box(f'{n}', ORIGIN, CUBE) for n in range(91)])
+CHEAP = Check.Request(boxes=COSTLY.boxes[:2])
+
+
+@pytest.mark.parametrize('executor_type', EXECUTORS)
+def test_costly_requests_wait_for_ticks(client: Client, executor_type: Any) -> None:
+    """For four times as long as the last one took, its sending included; a cheap one does not."""
+    with serving(lambda context: ContactNode(context, parameter_overrides=overrides()),
+                 executor_type):
         service = client._client_of(Check, 'contact_node/check')
-        futures = [service.call_async(request) for request in (costly, cheap, costly)]
-        assert client.spin(lambda: all(future.done() for future in futures))
-    first, between, second = (future.result() for future in futures)
-    assert len(first.contacts.contacts) == 4095 and between.success
-    assert not second.success and second.message.startswith('busy: ')
+        order: list[str] = []
+        asked = {'first': COSTLY, 'second': COSTLY, 'third': COSTLY, 'cheap': CHEAP}
+        futures = [service.call_async(request) for request in asked.values()]
+        for name, future in zip(asked, futures):
+            future.add_done_callback(lambda _, name=name: order.append(name))
+        assert client.spin(lambda: len(order) == len(asked))
+    assert [len(future.result().contacts.contacts) for future in futures] == [4095] * 3 + [1]
+    assert [name for name in order if name != 'cheap'] == ['first', 'second', 'third']
+    assert order.index('cheap') < order.index('second')
+
+
+class Bench:
+    """A `CheckService` whose requests take a time [s] of their own, by a clock that stands."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now, self.sent = 0.0, []
+        monkeypatch.setattr(check_module, 'time', SimpleNamespace(
+            monotonic=lambda: self.now, thread_time=lambda: self.now))
+        monkeypatch.setattr(check_module, 'answer_later', lambda service, take: None)
+        self.timer = Mock()
+        node = Mock(create_timer=Mock(return_value=self.timer),
+                    answered=lambda callback, name: callback)
+        self.counts: Counter[str] = Counter()
+        self.service = CheckService(node, self.counts, lambda: Mock(answer=self.answer))
+        self.end_of_pause = node.create_timer.call_args.args[1]
+
+    def answer(self, request: Any, response: Check.Response) -> Check.Response:
+        response.success = request.name != 'bad'
+        return response
+
+    def ask(self, name: str, boxes: int, seconds: float) -> None:
+        """Take a request whose answer is sent after so long."""
+        def send(response: Check.Response) -> None:
+            self.now += seconds
+            self.sent.append(name if response.success else f'{name}: {response.message[:4]}')
+        self.service._take(SimpleNamespace(name=name, boxes=range(boxes), pairs=()), send)
+
+
+def test_a_pause_is_four_times_as_long_as_its_request(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those who wait come one after the other; each makes its own pause. The 17th is refused."""
+    bench = Bench(monkeypatch)
+    bench.ask('cheap', 80, 0.005)
+    bench.ask('costly', 80, 0.1)
+    bench.ask('one that waits', 5, 0.1)
+    bench.ask('smaller', 4, 0.001)  # 80 boxes in 0.1 s are 4 boxes in 5 ms
+    assert bench.sent == ['cheap', 'costly', 'smaller']
+    assert bench.timer.timer_period_ns == round(0.4e9)
+    for number in range(15):
+        bench.ask(f'{number}', 80, 0.001)
+    bench.ask('one too many', 80, 0.1)
+    assert bench.sent.pop() == 'one too many: busy'
+    bench.now = 0.505
+    bench.end_of_pause()
+    assert bench.sent[3:] == ['one that waits'] and bench.timer.timer_period_ns == round(0.4e9)
+    bench.ask('bad', 0, 0.001)
+    assert bench.sent.pop() == 'bad: '
+    bench.now += 1.0
+    for _ in range(16):
+        bench.end_of_pause()
+    assert bench.sent[4:] == [f'{number}' for number in range(15)]
+    bench.ask('alone', 80, 0.001)
+    assert bench.sent[-1] == 'alone'
+    assert bench.counts == {'checks answered': 20, 'checks refused': 2}
+    times = bench.service.take_times()
+    assert len(times) == 21 and max(times) > 1.0 and not bench.service.take_times()
 
 
 @pytest.mark.parametrize('by_topics', [False, True])

@@ -1,0 +1,32 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The program `service`, with limits that a busy machine meets."""
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from benchmarks import service
+
+
+def test_ticks_come_first_beside_a_planner(capfd: pytest.CaptureFixture[str],
+                                           monkeypatch: pytest.MonkeyPatch) -> None:
+    """A planner that asks for 4,095 contacts without pause leaves a client in lockstep its ticks.
+
+    On a busy machine, times say nothing.
+    """
+    monkeypatch.setattr(service, 'LIMITS', dict.fromkeys(service.QUESTIONS, math.inf))
+    monkeypatch.setattr(service, 'LEAST_SHARE', 0.1)
+    assert service.main(['--quick']) == 0, capfd.readouterr().out
+    assert '50 of 50 ticks answered' in capfd.readouterr().out
+
+
+def test_each_question_has_its_contact() -> None:
+    """Of 2,001 boxes, one touches: an answer without a contact would be cheap."""
+    checker = service.Checker(service.SceneSolver(service.yard()))
+    for question in service.QUESTIONS.values():
+        response = checker.answer(question, service.Check.Response())
+        assert len(response.contacts.contacts) == 1, response.message
+    assert len(checker.answer(service.PLAN, service.Check.Response()).contacts.contacts) == 4095
