@@ -10,7 +10,7 @@ It prints:
 
     0.06 s: 0.0 mm deep, 540 mm/s
     0.13 s: 1.9 mm deep, 966 mm/s
-    0.26 s: 1.8 mm deep, 148 mm/s
+    0.26 s: 1.8 mm deep, 145 mm/s
     0.51 s: 0.0 mm deep, 0 mm/s
     1.01 s: 0.0 mm deep, 0 mm/s
     at rest: force / weight 1.0000, tilt below 0.001°: True
