@@ -1,16 +1,17 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""A question about a few boxes, with their poses, among the fixed boxes of a scene.
+"""A question about a few boxes and bodies, with their poses, among the fixed boxes of a scene.
 
 A guest is a box of a question that the scene does not know. It is box A of its pairs with boxes of
-the scene, and of those with later guests. Moving boxes of the scene that a question does not name
-are absent.
+the scene, and of those with later guests. Moving boxes and bodies that a question does not name are
+absent.
 """
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import product
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from ..core import LENGTH_MAX, LENGTH_MIN, native
 from ..solver.checks import are_poses, name_fault, nearest_name, pose_fault, short_repr, size_fault
 from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver
+from .contacts_of import in_contact
 from .scene_solver import SceneSolver
 
 MOST_BOXES = 256
@@ -26,27 +28,30 @@ MOST_PAIRS = 4096
 KEPT_MARGINS = 4  # of the last questions, each with a broad phase
 Row = tuple[float, ...]  # numbers of one box
 NO_POSE: Row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-"""Pose of a new message: of a fixed box, only the name is given."""
+NO_SIZE: Row = (0.0, 0.0, 0.0)
+"""Pose and size of a new message: of a fixed box, only the name is given."""
+A_BODY: Row = (1.0, 1.0, 1.0)  # instead of the size of a body
 
 
 class SceneCheck:
     """Answers questions on the model of a `SceneSolver`, and keeps nothing of them.
 
-    In its arrays, the first MOST_BOXES rows are guests, and the boxes of the scene follow.
+    In its arrays, the first MOST_BOXES rows are guests. The boxes of the scene follow, and in that
+    of the poses its bodies.
     """
 
     def __init__(self, solver: SceneSolver, *, most_near: int) -> None:
         """Take scene and model; most_near: pairs that one question may leave to the model."""
-        self.solver, self._scene = solver, solver.scene
-        self.most_near = most_near
+        self.solver, self._scene, self.most_near = solver, solver.scene, most_near
         scene = self._scene
         self._names = ['' for _ in range(MOST_BOXES)] + list(scene.names)
-        self._size_of = [tuple(box.size) for box in scene.boxes.values()]
-        self._sizes = np.concatenate((np.ones((MOST_BOXES, 3)), self._size_of))
-        fixed_poses = scene.fixed_poses()[:len(scene.boxes)]
-        self._fixed = {name: tuple(pose) for name, is_fixed, pose in zip(
-            scene.names, scene.is_fixed, fixed_poses.tolist()) if is_fixed}
-        self._poses = np.concatenate((np.full((MOST_BOXES, 7), np.nan), fixed_poses))
+        self._size_of = {name: tuple(box.size) for name, box in scene.boxes.items()}
+        self._sizes = np.concatenate((np.ones((MOST_BOXES, 3)), list(self._size_of.values())))
+        fixed = scene.fixed_poses()
+        self._fixed = {name: tuple(pose) for name, pose in zip(scene.row_of, fixed.tolist())
+                       if not np.isnan(pose[0])}
+        self._rows = np.concatenate((np.full((MOST_BOXES, 7), np.nan), fixed))
+        self._poses = self._rows[:len(self._names)]
         self._is_fixed = np.concatenate((np.zeros(MOST_BOXES, bool), scene.is_fixed))
         self._made_for = lru_cache(KEPT_MARGINS)(self._make)
 
@@ -57,8 +62,8 @@ class SceneCheck:
         meets = np.zeros((count + 1, count + 1), np.uint8)
         meets[0] = 1  # guests come first, and meet everything
         meets[1:1 + len(allowed), 1:1 + len(allowed)] = allowed
-        groups = np.concatenate((np.zeros(MOST_BOXES, np.int32), group + 1)).astype(np.int32)
-        bodies = np.concatenate((np.full(MOST_BOXES, -1, np.int32), self._scene.body_of))
+        groups, bodies = (np.concatenate((np.full(MOST_BOXES, guest), of_boxes)).astype(np.int32)
+                          for guest, of_boxes in ((0, group + 1), (-1, self._scene.body_of)))
         return (native.BroadPhase(self._sizes, self._is_fixed, margin,
                                   self._scene.rows + MOST_BOXES, groups, meets, bodies),
                 ContactSolver(model=self.solver.model, margin=margin))
@@ -68,8 +73,9 @@ class SceneCheck:
                  ) -> tuple[np.ndarray, Contacts]:
         """Return boxes a and b (k, 2) of the pairs in contact, or apart by margin [m] at most.
 
-        names, poses (n, 7), sizes (n, 3): of the boxes of a question. A size of zeros is that of
-        the scene's box. A box that is fixed in the scene has NO_POSE, or the scene's.
+        names, poses (n, 7), sizes (n, 3): of the boxes and bodies of a question. A size of zeros is
+        that of the scene's box; bodies have no other. What is fixed in the scene has NO_POSE, or
+        the scene's.
         pairs: those that are asked for. Without, the scene's pairs of these boxes are. Guests meet
         all boxes of the question and all fixed ones. `names_of` tells the names of the answer.
         Raises ValueError, with field and value, for what is refused.
@@ -77,13 +83,15 @@ class SceneCheck:
         if not 0.0 <= margin <= LENGTH_MAX:
             raise ValueError(f'margin must lie within 0 and {LENGTH_MAX:g} m, not {margin:g}')
         broad_phase, solver = self._made_for(margin)
-        rows = self._rows(names, poses, sizes)
-        moving = rows[~self._is_fixed[rows]]
+        rows = self._take(names, poses, sizes)
+        moving = np.array([row for name, row in rows.items() if name not in self._fixed], np.int64)
         try:
+            self._place_bodies()
             if pairs:
-                places = self._places(names, rows, pairs)
+                places = self._places(rows, pairs)
             else:
-                broad_phase.resize(moving, self._sizes[moving])
+                resized = moving[moving < len(self._poses)]
+                broad_phase.resize(resized, self._sizes[resized])
                 places = broad_phase.find(self._poses, self.most_near)[0]
             if len(places) > self.most_near:
                 raise ValueError(f'pairs: more than {self.most_near} are asked for and near, and '
@@ -91,11 +99,9 @@ class SceneCheck:
                                  'matter')
             contacts = solver.batch(self._poses, sizes=self._sizes, pairs=places)
         finally:
-            self._poses[moving] = np.nan
-        listed = contacts.separation <= margin if margin else contacts.colliding
-        found = np.flatnonzero(listed)
-        found = found[np.argsort(~contacts.colliding[found], kind='stable')]
-        return places[found], contacts[found]
+            self._rows[moving] = np.nan
+            self._place_bodies()
+        return in_contact(places, contacts, margin)
 
     def names_of(self, a: int, b: int) -> tuple[str, str, str]:
         """Return the name of a pair of the last answer, and those of its boxes."""
@@ -104,66 +110,95 @@ class SceneCheck:
             return f'{name_a}_{name_b}', name_a, name_b
         return self._scene.pair_of(a - MOST_BOXES, b - MOST_BOXES).label, name_a, name_b
 
-    def _rows(self, names: Sequence[str], poses: Sequence[Row], sizes: Sequence[Row]) -> np.ndarray:
-        """Take the boxes of a question; return their rows."""
+    def _place_bodies(self) -> None:
+        """Write the poses of boxes by those of their bodies."""
+        if self._scene.bodies:
+            self._scene.place_boxes(self._rows[MOST_BOXES:])
+
+    def _take(self, names: Sequence[str], poses: Sequence[Row], sizes: Sequence[Row],
+              ) -> dict[str, int]:
+        """Take the poses and sizes of a question; return the row of each name."""
         if not 1 <= len(names) <= MOST_BOXES:
             raise ValueError(f'boxes: a request has 1 to {MOST_BOXES} boxes, not {len(names)}')
-        first: dict[str, int] = {}
-        rows, all_poses, all_sizes = [], list(poses), list(sizes)
+        rows: dict[str, int] = {}
+        all_poses, all_sizes = list(poses), list(sizes)
         for number, name in enumerate(names):
-            where = f'boxes[{number}]'
             if fault := name_fault(name):
-                raise ValueError(f'{where}.name: {fault}')
-            if first.setdefault(name, number) != number:
-                raise ValueError(f'{where}: {short_repr(name)} is the name of '
-                                 f'boxes[{first[name]}], too')
-            index = self._scene.index_of.get(name)
-            if index is None:
+                raise ValueError(f'boxes[{number}].name: {fault}')
+            if name in rows:
+                raise ValueError(f'boxes[{number}]: {short_repr(name)} is the name of '
+                                 f'boxes[{names.index(name)}], too')
+            known = self._scene.row_of.get(name)
+            rows[name] = number if known is None else MOST_BOXES + known
+            if known is None:
                 self._names[number] = name
-                rows.append(number)
-                if not any(all_sizes[number]):
-                    raise ValueError(f'{where} {short_repr(name)} has no size, and is no box of '
-                                     f'the scene{nearest_name(name, self._scene.boxes)}')
-                continue
-            rows.append(MOST_BOXES + index)
-            known, fixed = self._size_of[index], self._fixed.get(name)
-            if not any(all_sizes[number]):
-                all_sizes[number] = known
-            if fixed is not None:
-                for what, value, unset, own in (
-                        ('pose', poses[number], NO_POSE, fixed),
-                        ('size', sizes[number], (0.0, 0.0, 0.0), known)):
-                    if value not in (unset, own):
-                        raise ValueError(f'{where} {short_repr(name)} is fixed in the scene with '
-                                         f'{what} {short_repr(own)}, not {short_repr(value)}: '
-                                         f'leave its {what} as a new message has it')
-                all_poses[number] = fixed
+            try:
+                all_poses[number], all_sizes[number] = self._of_scene(
+                    name, poses[number], sizes[number])
+            except ValueError as error:
+                raise ValueError(f'boxes[{number}] {short_repr(name)} {error}') from None
         pose_rows, size_rows = np.array(all_poses), np.array(all_sizes)
         if not (are_poses(pose_rows).all() and np.all(
                 (size_rows >= LENGTH_MIN) & (size_rows <= LENGTH_MAX))):
             for number, (pose, size) in enumerate(zip(pose_rows, size_rows)):
                 if fault := pose_fault(pose) or size_fault(size):
                     raise ValueError(f'boxes[{number}] {short_repr(names[number])}: {fault}')
-        taken = np.array(rows)
-        self._poses[taken], self._sizes[taken] = pose_rows, size_rows
-        return taken
+        taken = np.array(list(rows.values()))
+        self._rows[taken] = pose_rows
+        is_box = taken < len(self._poses)
+        self._sizes[taken[is_box]] = size_rows[is_box]
+        return rows
 
-    def _places(self, names: Sequence[str], rows: np.ndarray, pairs: Sequence[tuple[str, str]],
-                ) -> np.ndarray:
-        """Return the rows (n, 2) of pairs that are listed by names."""
+    def _of_scene(self, name: str, pose: Row, size: Row) -> tuple[Row, Row]:
+        """Return pose and size of a box or body: its own, or those that the scene has.
+
+        Raises ValueError for what contradicts the scene.
+        """
+        known, fixed = self._size_of.get(name), self._fixed.get(name)
+        if name in self._scene.bodies:
+            if any(size):
+                raise ValueError('is a body of the scene, whose boxes have their sizes there')
+            known = A_BODY
+        elif known is None and not any(size):
+            raise ValueError('has no size, and is no box of the scene'
+                             f'{nearest_name(name, self._scene.row_of)}')
+        elif known is not None and fixed is None and self._scene.boxes[name].body:
+            raise ValueError(f'moves with {short_repr(self._scene.boxes[name].body)}: give the '
+                             'pose of this body')
+        if fixed is not None:
+            for what, value, unset, own in (('pose', pose, NO_POSE, fixed),
+                                            ('size', size, NO_SIZE, known)):
+                if value not in (unset, own):
+                    raise ValueError(f'is fixed in the scene with {what} {short_repr(own)}, not '
+                                     f'{short_repr(value)}: leave its {what} as a new message has '
+                                     'it')
+            pose = fixed
+        return pose, size if known is None or any(size) else known
+
+    def _places(self, rows: dict[str, int], pairs: Sequence[tuple[str, str]]) -> np.ndarray:
+        """Return the rows (n, 2) of pairs that are listed by the names of boxes or bodies."""
         if len(pairs) > MOST_PAIRS:
             raise ValueError(f'pairs: a request has at most {MOST_PAIRS}, not {len(pairs)}')
-        row_of = dict(zip(names, rows.tolist()))
+        scene = self._scene
+
+        def boxes_of(name: str, field: str) -> list[int]:
+            if name in rows and name not in scene.bodies:
+                return [rows[name]]
+            known = name in rows or name in self._fixed or (
+                name in scene.boxes and scene.boxes[name].body in rows)
+            if not known:
+                raise ValueError(f'{field}: {short_repr(name)} is neither a box of the request nor '
+                                 f'a fixed box of the scene'
+                                 f'{nearest_name(name, {*rows, *scene.row_of})}')
+            if name in scene.bodies:
+                body = list(scene.bodies).index(name)
+                return [int(row) for row in MOST_BOXES + np.flatnonzero(scene.body_of == body)]
+            return [MOST_BOXES + scene.index_of[name]]
+
+        places: list[tuple[int, int]] = []
         for number, (a, b) in enumerate(pairs):
-            for side, name in (('box_a', a), ('box_b', b)):
-                if name in row_of:
-                    continue
-                row = MOST_BOXES + self._scene.index_of.get(name, -1)
-                if row < MOST_BOXES or not self._is_fixed[row]:
-                    raise ValueError(f'pairs[{number}].{side}: {short_repr(name)} is neither a box '
-                                     'of the request nor a fixed box of the scene'
-                                     f'{nearest_name(name, {*row_of, *self._scene.boxes})}')
-                row_of[name] = row
             if a == b:
                 raise ValueError(f'pairs[{number}]: {short_repr(a)} is both box_a and box_b')
-        return np.array([(row_of[a], row_of[b]) for a, b in pairs])
+            places += product(boxes_of(a, f'pairs[{number}].box_a'),
+                              boxes_of(b, f'pairs[{number}].box_b'))
+        return np.array(places)

@@ -119,6 +119,50 @@ def test_one_box_is_a_question(yard: Checker) -> None:
     assert found(a_box('load', ABOVE_FIXED)) == ['landing']
 
 
+SPREADER = Scene(
+    {'beam': Box((6, 2, 1), (0, 0, 1, 0, 0, 0, 1), body='spreader'),
+     'foot': Box((1, 2, 1), (2.5, 0, 0, 0, 0, 0, 1), body='spreader'),
+     'load': Box(CUBE), 'stack': Box(CUBE, ORIGIN),
+     'post': Box((1, 1, 4), (0, 0, 2, 0, 0, 0, 1), body='gate')},
+    (Pair.between('foot', 'stack'), Pair.between('load', 'stack')),
+    bodies={'spreader': Frame(), 'gate': Frame((20, 0, 0, 0, 0, 0, 1))},
+    patterns=(('spreader', 'gate'), ('spreader', 'load')))
+
+
+def test_a_body_is_a_question() -> None:
+    """Named by its name, with one pose: its boxes meet what the scene pairs them with."""
+    checker = Checker(SceneSolver(SPREADER))
+
+    def found(*boxes: Any, **fields: Any) -> list[str]:
+        return labels(asked(checker, *boxes, **fields))
+
+    def at(x: float, z: float) -> tuple[float, ...]:
+        return (x, 0, z, 0, 0, 0, 1)
+
+    assert found(a_box('spreader', at(-2.5, 1.4))) == ['foot_stack']
+    assert found(a_box('spreader', at(0, 0.4))) == []  # the beam is no pair of the stack
+    assert found(a_box('spreader', at(17, 1))) == ['beam_post', 'foot_post']
+    assert found(a_box('load', at(0, 1.9))) == ['load_stack']
+    assert found(a_box('spreader', at(0, 9)), a_box('load', at(0, 9))) == ['beam_load']
+    assert found(a_box('mine', at(20, 1), CUBE)) == ['mine_post']
+    assert found(a_box('mine', at(0, 9), CUBE), a_box('spreader', at(0, 9))) == ['mine_beam']
+    both = a_box('spreader', at(-2.5, 0.4))
+    assert found(both, pairs=[a_pair('stack', 'spreader')]) == [
+        'stack_beam', 'stack_foot']
+    assert found(both, pairs=[a_pair('beam', 'stack')]) == ['beam_stack']
+    assert found(a_box('mine', at(20, 1), CUBE), pairs=[a_pair('gate', 'mine')]) == ['post_mine']
+    assert found(a_box('gate', ORIGIN)) == []
+    for box, words in (
+            (a_box('beam', ORIGIN), "boxes[0] 'beam' moves with 'spreader': give the pose of this"),
+            (a_box('spreader', ORIGIN, CUBE), "'spreader' is a body of the scene, whose boxes"),
+            (a_box('gate', at(1, 0)), "'gate' is fixed in the scene with pose (20.0, 0.0, 0.0, "),
+            (a_box('spreader', [0] * 7), "boxes[0] 'spreader': quaternion (x=0, y=0, z=0, w=0)")):
+        assert words in asked(checker, box).message
+    assert found(a_box('load', at(0, 1.9))) == ['load_stack']
+    lost = asked(checker, a_box('load', ORIGIN), pairs=[a_pair('load', 'beam')])
+    assert "pairs[0].box_b: 'beam' is neither a box of the request nor a fixed" in lost.message
+
+
 @pytest.mark.parametrize('margin', [0.0, 0.3])
 def test_a_question_is_answered_as_a_tick_of_the_scene_that_it_makes(margin: float) -> None:
     """Guests are boxes of that scene, before its own; whoever is not named has no pose."""
