@@ -14,6 +14,8 @@ from .solver.contact_solver import ContactSolver
 
 if TYPE_CHECKING:
     from .models import make_model
+    from .node.contact_node import ContactNode
+    from .node.read_contacts import ReadContacts, read_contacts
     from .scene.contacts_of import contacts_of
     from .scene.forces import Body, PatchForces
     from .scene.scene import Box, Frame, Pair, Scene
@@ -21,12 +23,14 @@ if TYPE_CHECKING:
     from .scene.scene_solver import SceneSolver
     from .scene.support import support
 
-__all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Frame', 'Pair', 'PatchForces',
-           'Scene', 'SceneSolver', 'contacts_of', 'make_model', 'patch_area', 'patch_areas',
-           'read_scene', 'support']
+__all__ = ['Body', 'Box', 'Contact', 'ContactNode', 'ContactSolver', 'Contacts', 'Frame', 'Pair',
+           'PatchForces', 'ReadContacts', 'Scene', 'SceneSolver', 'contacts_of', 'make_model',
+           'patch_area', 'patch_areas', 'read_contacts', 'read_scene', 'support']
 
 _LOADED_WHEN_USED = {
     'models': ('make_model',),
+    'node.contact_node': ('ContactNode',),
+    'node.read_contacts': ('ReadContacts', 'read_contacts'),
     'scene.contacts_of': ('contacts_of',),
     'scene.forces': ('Body', 'PatchForces'),
     'scene.scene_file': ('read_scene',),

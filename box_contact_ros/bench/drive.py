@@ -26,6 +26,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from box_contact_msgs.msg import Contacts as ContactsMessage
 
 from ..node.messages import make_header
+from ..node.read_contacts import read_contacts
 from ..node.ros_client import DEEP_RELIABLE, pose_message
 from ..node.runtime import GuardedNode, spin_for
 from ..scene.scene import CONTAINER
@@ -148,11 +149,12 @@ class BenchNode(GuardedNode):
         known = [(row_of[stamp], kind, received, data) for received, kind, data in arrivals
                  if (stamp := raw_stamp(data)) in row_of]
         for row, kind, received, data in known:
-            message = deserialize_message(data, ANSWERS[kind][0])
-            if kind != 'contacts' or not message.stale:
+            read = read_contacts(data) if kind == 'contacts' else None
+            if read is None or not read.stale:
                 log.received[kind][row] = received
+            if read is not None and read.touching:
+                log.depths[row] = -read.contacts.separation[0]
             if kind == 'point' and log.node != 'echo':
-                log.points[row] = message.point.x, message.point.y, message.point.z
-            if kind == 'contacts' and message.contacts:
-                log.depths[row] = message.contacts[0].depth
+                point = deserialize_message(data, PointStamped).point
+                log.points[row] = point.x, point.y, point.z
         return bool(known)

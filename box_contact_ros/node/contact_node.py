@@ -104,6 +104,8 @@ touches a topic."""
 class ContactNode(GuardedNode, LifecycleNode):
     """Wires parameters, topics, ticks and diagnostics to the states of a lifecycle node.
 
+    Any executor of rclpy's may serve it, beside other nodes. `start` configures and activates it.
+
     A node on another method derives from this one. It sets `name`, the `prefix` of its contact
     topics and its `parameters` (all of these but `model`), and names the model.
     """
@@ -111,9 +113,11 @@ class ContactNode(GuardedNode, LifecycleNode):
     name: ClassVar[str] = 'contact_node'
     prefix: ClassVar[str] = ''
     parameters: ClassVar[Mapping[str, Setting]] = PARAMETERS
+    has_process = False
+    """Whether the whole process is the node's, as of `run`."""
 
-    def __init__(self, context: Context, **options: Any) -> None:
-        """Begin unconfigured."""
+    def __init__(self, context: Context | None = None, **options: Any) -> None:
+        """Begin unconfigured. context: rclpy's own where none is given; `options` go to Node."""
         super().__init__(self.name, context=context, **options)
         self.autostart: bool = declare(
             self, {'autostart': self.parameters['autostart']})['autostart']
@@ -161,9 +165,10 @@ class ContactNode(GuardedNode, LifecycleNode):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer poses. SUCCESS: active."""
-        # What start-up made stays for good. No full collection (10 ms) has to look at it.
-        gc.collect()
-        gc.freeze()
+        if self.has_process:
+            # What start-up made stays for good. No full collection (10 ms) has to look at it.
+            gc.collect()
+            gc.freeze()
         self._monitor.restart(self._tick.solver.scene.watched)
         self._tick.active = True
         self._say_ready()
@@ -297,6 +302,7 @@ def run(node_type: type[ContactNode], doc: str | None, args: Sequence[str] | Non
 
     def started(context: Context) -> ContactNode:
         node = node_type(context)
+        node.has_process = True
         try:
             if node.autostart:
                 node.start()

@@ -27,7 +27,7 @@ LITTLE = b'\0\1'
 _ORDERS = {b'\0\0': '>', LITTLE: '<'}
 """Byte order by kind: CDR_BE and CDR_LE, which every ROS middleware writes. Others are laid out in
 another way: docs/contributing/decisions/contact-node.md."""
-_PADDING = 3
+PADDING = 3
 """Most bytes after the body, of any value: RTPS pads a message to a multiple of four."""
 _HEAD = struct.Struct('<2s2xiI')  # encapsulation and stamp
 _POSE = struct.Struct('<7d')
@@ -52,32 +52,35 @@ def numbers_at(length: int) -> int:
 
 def parse_pose(data: bytes) -> tuple[tuple[float, ...], str, int, int]:
     """Return numbers, frame_id, seconds and nanoseconds of a PoseStamped, or raise MessageError."""
-    order, sec, nanosec, length = _parse_head(data, 'PoseStamped')
+    order, sec, nanosec, length = parse_head(data, 'PoseStamped')
     at = numbers_at(length)
-    if not 0 <= len(data) - (at + _POSE.size) <= _PADDING:
+    if not 0 <= len(data) - (at + _POSE.size) <= PADDING:
         raise MessageError('not a PoseStamped',
                            f'{len(data)} bytes, where a frame_id of {length} needs '
                            f'{at + _POSE.size}')
-    frame_id = _parse_frame(data, length, 'PoseStamped')
+    frame_id = parse_frame(data, length, 'PoseStamped')
     return struct.unpack_from(f'{order}7d', data, at), frame_id, sec, nanosec
 
 
 def parse_poses(data: bytes) -> tuple[np.ndarray, str, int, int]:
     """Return the same of a PoseArray, numbers (n, 7), or raise MessageError."""
-    order, sec, nanosec, length = _parse_head(data, 'PoseArray')
+    order, sec, nanosec, length = parse_head(data, 'PoseArray')
     count_at = -(-(FRAME_AT + length) // 4) * 4
     count = struct.unpack_from(f'{order}I', data, count_at)[0] if count_at + 4 <= len(data) else 0
     at = ENCAPSULATION + -(-count_at // 8) * 8 if count else count_at + 4
-    if not 0 <= len(data) - (at + count * _POSE.size) <= _PADDING:
+    if not 0 <= len(data) - (at + count * _POSE.size) <= PADDING:
         raise MessageError('not a PoseArray', f'{len(data)} bytes, where {count} poses with a '
                                               f'frame_id of {length} need '
                                               f'{at + count * _POSE.size}')
     numbers = np.frombuffer(data, f'{order}f8', 7 * count, at).reshape(count, 7).astype(np.float64)
-    return numbers, _parse_frame(data, length, 'PoseArray'), sec, nanosec
+    return numbers, parse_frame(data, length, 'PoseArray'), sec, nanosec
 
 
-def _parse_head(data: bytes, message: str) -> tuple[str, int, int, int]:
-    """Return the order of bytes, seconds, nanoseconds, and the length of frame_id."""
+def parse_head(data: bytes, message: str) -> tuple[str, int, int, int]:
+    """Return the order of bytes, seconds, nanoseconds, and the length of frame_id.
+
+    message: the type that a refusal names.
+    """
     if len(data) < FRAME_AT:
         raise MessageError(f'not a {message}',
                            f'{len(data)} bytes, where a header needs {FRAME_AT}')
@@ -89,7 +92,8 @@ def _parse_head(data: bytes, message: str) -> tuple[str, int, int, int]:
     return (order, *struct.unpack_from(f'{order}iII', data, ENCAPSULATION))
 
 
-def _parse_frame(data: bytes, length: int, message: str) -> str:
+def parse_frame(data: bytes, length: int, message: str) -> str:
+    """Return the frame_id of so many bytes, its zero included."""
     frame = data[FRAME_AT:FRAME_AT + length]
     if length and frame.find(b'\0') != length - 1:
         raise MessageError(f'not a {message}', 'frame_id does not end with its first zero')

@@ -17,9 +17,6 @@ from std_msgs.msg import Header
 from box_contact_msgs.msg import Contact as ContactMessage
 
 from ..core import native
-from ..scene.scene import ALONE, Scene
-from ..scene.scene_solver import Answer
-from ..solver.checks import short_repr
 from ..solver.contact import Contact, Contacts
 
 NANOSECONDS = 1_000_000_000
@@ -73,28 +70,6 @@ def contacts_by_pair(message: Any) -> dict[str, Contact]:
     Numbers are those that the node computed, to the bit.
     """
     return {entry.pair: _contact(entry) for entry in message.contacts}
-
-
-def read_answer(message: Any, scene: Scene) -> Answer:
-    """Return the answer that a `Contacts` message tells, as a `SceneSolver` gives it.
-
-    scene: that of the node. Raises MessageError for a pair that the scene lacks.
-    """
-    index, rows = scene.index_of, {pair.label: row for pair, row in zip(scene.pairs, scene.rows)}
-    if scene.patterns:
-        rows = {name: (number, ALONE) for name, number in index.items()} | rows
-    entries = [*message.contacts, *message.near]
-    pairs = [(index.get(entry.box_a, ALONE), index.get(entry.box_b, ALONE)) for entry in entries]
-    for name, is_known in (*((entry.pair, min(pair) >= 0 and scene.has_pair(*pair))
-                             for entry, pair in zip(entries, pairs)),
-                           *((name, name in rows) for name in message.stale)):
-        if not is_known:
-            raise MessageError('unknown pair', f'{short_repr(name)} is no pair of the scene: read '
-                                               'the scene file that the node has')
-    boxes, stale = (np.array(part, np.int64).reshape(-1, 2)
-                    for part in (pairs, [rows[name] for name in message.stale]))
-    return Answer(boxes, Contacts.of([_contact(entry) for entry in entries]), len(boxes), stale,
-                  scene)
 
 
 def _contact(entry: Any) -> Contact:

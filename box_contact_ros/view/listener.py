@@ -23,9 +23,9 @@ from rclpy.qos import QoSProfile
 from box_contact_msgs.msg import Contacts as ContactsMessage
 
 from ..node.contact_node import PARAMETERS as CONTACT_PARAMETERS
-from ..node.messages import read_answer
 from ..node.parameters import Setting, declare, warn_of_unknown
-from ..node.ros_client import PoseTopic, pose_topics, stamp_of
+from ..node.read_contacts import ReadContacts, read_answer, read_contacts
+from ..node.ros_client import PoseTopic, pose_topics
 from ..node.runtime import GuardedNode
 from ..scene.scene import Scene, two_boxes
 from ..scene.scene_file import read_scene
@@ -63,12 +63,12 @@ class DrawnTick:
     latency: float  # time [s] from the stamp to the contacts, NaN if nobody answers
 
 
-def read_touching(message: Any, scene: Scene) -> Answer:
+def read_touching(read: ReadContacts, scene: Scene) -> Answer:
     """Return what touches by a box_contact_msgs/Contacts, the deepest first.
 
     Raises MessageError for a pair that is not in the scene.
     """
-    answer = read_answer(message, scene)
+    answer = read_answer(read, scene)
     touching = np.flatnonzero(answer.contacts.colliding)
     rows = touching[np.argsort(answer.contacts.separation[touching], kind='stable')]
     return answer._replace(pairs=answer.pairs[rows], contacts=answer.contacts[rows])
@@ -117,7 +117,8 @@ class Listener(GuardedNode):
             self.create_subscription(topic.kind, topic.name,
                                      partial(self._on_poses, topic, self._tracks[-1]), topic.qos,
                                      raw=True)
-        self.create_subscription(ContactsMessage, 'contacts', self._on_contacts, contacts_qos)
+        self.create_subscription(ContactsMessage, 'contacts', self._on_contacts, contacts_qos,
+                                 raw=True)
 
     @property
     def quiet(self) -> bool:
@@ -130,10 +131,10 @@ class Listener(GuardedNode):
         self._frame_id, self._heard = poses.frame_id, time.monotonic()
         self._unanswered = min(self._unanswered, self._heard)
 
-    def _on_contacts(self, message: Any) -> None:
-        stamp = stamp_of(message.header)
-        latency = 1e-9 * (self.get_clock().now().nanoseconds - stamp)
-        self._answer = stamp, read_touching(message, self.rows.scene), latency
+    def _on_contacts(self, data: bytes) -> None:
+        read = read_contacts(data)
+        latency = 1e-9 * (self.get_clock().now().nanoseconds - read.stamp)
+        self._answer = read.stamp, read_touching(read, self.rows.scene), latency
         self._unanswered = math.inf
 
     def tick(self) -> DrawnTick | None:

@@ -20,8 +20,7 @@ import numpy as np
 import rclpy
 from lockstep_client import LockstepClient
 
-from box_contact_ros import Body, Contacts, PatchForces
-from box_contact_ros.node.messages import contacts_by_pair
+from box_contact_ros import Body, PatchForces
 
 SIZE, MASS = (12.192, 2.438, 2.591), 20_000.0  # a 40 ft container [m], [kg]
 STEP_MS, PERIOD_MS, LATENCY_MS = 1, 5, 2
@@ -42,11 +41,10 @@ def main() -> None:
     velocities[0, 0], weights[0, 2] = 0.3, -GRAVITY * MASS
     for time in range(0, 2001, STEP_MS):
         if time % PERIOD_MS == 0:
-            asked, contacts = poses.copy(), contacts_by_pair(
-                client.ask(time * 1_000_000, *poses))
+            asked, answer = poses.copy(), client.ask(time * 1_000_000, *poses)
         if time % PERIOD_MS == LATENCY_MS:
-            pairs = [[places['box_a'], places['box_b']] for _ in contacts]
-            forces.hold(np.reshape(pairs, (-1, 2)), Contacts.of(contacts.values()), asked,
+            pairs = [(places[a], places[b]) for _, a, b in answer.names]
+            forces.hold(np.reshape(pairs, (-1, 2)), answer.contacts, asked,
                         age=1e-3 * LATENCY_MS, period=1e-3 * PERIOD_MS)
         velocities = forces.step(1e-3 * STEP_MS, poses, velocities, weights)
         poses[:, :3] += 1e-3 * STEP_MS * velocities[:, :3]

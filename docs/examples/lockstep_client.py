@@ -23,6 +23,7 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from box_contact_msgs.msg import Contacts
+from box_contact_ros import ReadContacts, read_contacts
 
 
 class LockstepClient(Node):
@@ -31,13 +32,13 @@ class LockstepClient(Node):
     def __init__(self) -> None:
         super().__init__('lockstep_client')
         self.poses = [self.create_publisher(PoseStamped, f'box_{name}/pose', 10) for name in 'ab']
-        self.create_subscription(Contacts, 'contacts', self.receive, 10)
+        self.create_subscription(Contacts, 'contacts', self.receive, 10, raw=True)
         self.node_reset = self.create_client(Trigger, 'contact_node/reset')
-        self.answer: Contacts | None = None
+        self.answer: ReadContacts | None = None
 
-    def receive(self, answer: Contacts) -> None:
+    def receive(self, data: bytes) -> None:
         """Keep the newest answer."""
-        self.answer = answer
+        self.answer = read_contacts(data)
 
     def wait_for_node(self) -> None:
         """Wait for the node, and begin an episode: the node forgets all stamps."""
@@ -53,14 +54,14 @@ class LockstepClient(Node):
         rclpy.spin_until_future_complete(self, self.node_reset.call_async(Trigger.Request()))
         self.answer = None
 
-    def ask(self, time_ns: int, *poses: np.ndarray, patience: float = 0.5) -> Contacts:
+    def ask(self, time_ns: int, *poses: np.ndarray, patience: float = 0.5) -> ReadContacts:
         """Return the answer to two poses at a time [ns]; lost poses are sent again."""
         stamp = Time(sec=time_ns // 10**9, nanosec=time_ns % 10**9)
-        while self.answer is None or self.answer.header.stamp != stamp:
+        while self.answer is None or self.answer.stamp != time_ns:
             for publisher, pose in zip(self.poses, poses):
                 publisher.publish(message(stamp, pose))
             until = self.get_clock().now().nanoseconds + patience * 1e9
-            while ((self.answer is None or self.answer.header.stamp != stamp)
+            while ((self.answer is None or self.answer.stamp != time_ns)
                    and self.get_clock().now().nanoseconds < until):
                 rclpy.spin_once(self, timeout_sec=0.01)
         return self.answer
@@ -84,9 +85,10 @@ def main() -> None:
     load = np.array([0.0, 0.0, 2.5925, 0.0, 0.0, 0.0, 1.0])
     for tick in range(1, 6):
         # 5 ms of simulated time per step
-        contacts = client.ask(tick * 5_000_000, load, stack).contacts
-        depth = 1e3 * contacts[0].depth if contacts else 0.0
-        print(f'{5 * tick} ms: {"contact" if contacts else "no contact"}, {depth:.1f} mm deep')
+        answer = client.ask(tick * 5_000_000, load, stack)
+        depth = -1e3 * answer.contacts.separation[0] if answer.touching else 0.0
+        print(f'{5 * tick} ms: {"contact" if answer.touching else "no contact"}, '
+              f'{depth:.1f} mm deep')
         load[2] -= 1e-3
     rclpy.shutdown()
 

@@ -18,11 +18,13 @@ from geometry_msgs.msg import (
     Vector3,
     Vector3Stamped,
 )
+from rclpy.serialization import serialize_message
 from std_msgs.msg import Header
 
 from box_contact_msgs.msg import Box, BoxPair, Contacts
 from box_contact_msgs.msg import Contact as ContactMessage
 from box_contact_ros.node.messages import NANOSECONDS, UPPER, MessageError, make_header
+from box_contact_ros.node.read_contacts import ReadContacts, read_contacts
 from box_contact_ros.scene.pairing import StampedPose
 from box_contact_ros.scene.scene import Pair
 from box_contact_ros.solver.checks import pose_fault
@@ -103,6 +105,11 @@ def make_contacts(header: Header, listed: Iterable[tuple[Pair, Contact]],
     return Contacts(header=header, stale=list(stale),
                     contacts=_entries(pair for pair in pairs if pair[1].colliding),
                     near=_entries(pair for pair in pairs if not pair[1].colliding))
+
+
+def read(message: Contacts) -> ReadContacts:
+    """Return what a message says, as a client reads its bytes."""
+    return read_contacts(serialize_message(message))
 
 
 def _entries(listed: Iterable[tuple[Pair, Contact]]) -> list[ContactMessage]:

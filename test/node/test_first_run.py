@@ -8,7 +8,6 @@ those remedies are followed that need no new start.
 """
 from __future__ import annotations
 
-import gc
 import math
 import re
 import time
@@ -175,7 +174,6 @@ class FirstRuns:
             node.destroy_node()
         for context in self.contexts:
             context.try_shutdown()
-        gc.unfreeze()
 
 
 @pytest.fixture(scope='module')

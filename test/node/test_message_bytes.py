@@ -29,7 +29,8 @@ from typed_messages import (
 from box_contact_msgs.msg import Contacts as ContactsMessage
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.message_bytes import ContactWriter, PoseReader, aligned, header_bytes
-from box_contact_ros.node.messages import MessageError, contacts_by_pair, make_header, read_answer
+from box_contact_ros.node.messages import MessageError, contacts_by_pair, make_header
+from box_contact_ros.node.read_contacts import read_answer, read_contacts
 from box_contact_ros.scene.scene import Pair, two_boxes
 from box_contact_ros.scene.scene_solver import Answer
 from box_contact_ros.solver.contact import Contact, Contacts
@@ -209,6 +210,17 @@ def test_answers_are_written_alike(data, stamp, frame_id, touching, close, stale
     for _ in range(2):  # the second time the writer knows the names
         written = deserialize_message(writer.contacts(header, answer), ContactsMessage)
         assert str(written) == str(wanted)  # as text, where NaN is NaN
+    said = writer.contacts(header, answer)
+    for length in range(0, len(said) - 4, 13):
+        with pytest.raises(MessageError):
+            read_contacts(said[:length])
+    read = read_contacts(said)
+    assert read[:2] == (stamp, frame_id) and read.touching == touching
+    assert read.names == [(pair.label, pair.a, pair.b) for pair in pairs[:len(contacts)]]
+    assert read.stale == [pair.label for pair in pairs[len(contacts):]]
+    for name in ('separation', 'volume', 'point', 'normal', 'colliding'):
+        assert np.array_equal(getattr(read.contacts, name), getattr(answer.contacts, name),
+                              equal_nan=True)
     for c in contacts[:touching]:
         point, normal = (aligned(header) + vector.tobytes() for vector in (c.point, c.normal))
         assert deserialize_message(point, PointStamped) == make_point(typed_header, c)
@@ -224,9 +236,8 @@ def test_what_a_client_reads_is_the_contact_again():
     for answer in (Answer(rows, Contacts.of([overlap]), 1, none, scene),
                    Answer(rows, Contacts.of([APART]), 1, none, scene),
                    Answer(none, Contacts.of([]), 0, rows, scene)):
-        message = deserialize_message(
-            ContactWriter(scene).contacts(header_bytes(0, 'map'), answer), ContactsMessage)
-        read = read_answer(message, scene)
+        read = read_answer(
+            read_contacts(ContactWriter(scene).contacts(header_bytes(0, 'map'), answer)), scene)
         assert np.array_equal(read.stale, answer.stale)
         assert np.array_equal(read.pairs, answer.pairs)
         for name in ('colliding', 'separation', 'volume', 'point', 'normal', 'covariance'):
@@ -235,4 +246,27 @@ def test_what_a_client_reads_is_the_contact_again():
     message = make_contacts(make_header(0, 'map'), [(Pair('p', 'a', 'b'), overlap)])
     assert list(contacts_by_pair(message)) == ['p']
     with pytest.raises(MessageError, match="'p' is no pair of the scene"):
-        read_answer(message, scene)
+        read_answer(read_contacts(serialize_message(message)), scene)
+
+
+def test_contacts_in_the_other_order_of_bytes_are_read():
+    """As a big-endian middleware sends them; what is no message of contacts is refused."""
+    message = make_contacts(make_header(5 * 10**9 + 7, 'map'), [
+        (Pair('p', 'a', 'bcd'), APART)], ['stale'])
+    little = serialize_message(message)
+    big = bytearray(little)
+    big[1] = 0
+    for size, at in ((4, 4), (4, 8), (4, 12), (4, 20), (4, 24), (4, 28), (4, 36), (4, 44)):
+        big[at:at + size] = little[at:at + size][::-1]
+    at = 52
+    assert little[at:at + 8] == np.array([APART.point[0]]).tobytes()
+    for start in range(at, at + 120, 8):
+        big[start:start + 8] = little[start:start + 8][::-1]
+    for start in (at + 120, at + 124):
+        big[start:start + 4] = little[start:start + 4][::-1]
+    for one, other in zip(read_contacts(bytes(big)), read_contacts(little)):
+        assert str(one) == str(other)
+    for bad in (little[:-8], little + b'\0' * 8, GOOD, b'', little[:20] + b'\xff' * 4 + little[24:],
+                little.replace(b'bcd', b'\xff\xff\xff')):
+        with pytest.raises(MessageError):
+            read_contacts(bad)

@@ -21,11 +21,12 @@ from rclpy.parameter import Parameter
 from ros_client import DEEP, Client, serving, stamp_of
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
-from typed_messages import pose_array
+from typed_messages import pose_array, read
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.messages import contacts_by_pair, make_header, read_answer
+from box_contact_ros.node.messages import contacts_by_pair, make_header
+from box_contact_ros.node.read_contacts import read_answer
 from box_contact_ros.node.topics import ARRAY_DEPTH, MOST_PAIRS_WITH_TOPICS
 from box_contact_ros.scene.scene import ALONE
 
@@ -268,7 +269,7 @@ def test_pairs_that_no_list_has(array_client, scene_node):
         stamp = array_client.ask(ON_FLOOR, LORRY)
         assert 'load_floor' in contacts_by_pair(array_client.contacts[stamp])
         stamp = array_client.ask(ON_FLOOR, GONE)
-        answer = read_answer(array_client.contacts[stamp], node._tick.solver.scene)
+        answer = read_answer(read(array_client.contacts[stamp]), node._tick.solver.scene)
         assert array_client.contacts[stamp].stale == ['lorry']
         assert [pair.label for pair, _ in answer.named()] == ['load_floor']
         assert answer.stale.tolist() == [[1, ALONE]]

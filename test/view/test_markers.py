@@ -16,7 +16,7 @@ from patience import PATIENCE
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from ros_client import Client, serving
-from typed_messages import changed, contacts_at
+from typed_messages import changed, contacts_at, read
 from visualization_msgs.msg import Marker, MarkerArray
 
 from box_contact_ros import ContactSolver
@@ -49,7 +49,7 @@ def drawing(touching, scene=YARD):
     """Return the markers of a scene, and those of each namespace."""
     rows = SceneRows(scene)
     poses = np.where(np.isnan(rows.poses), [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0], rows.poses)
-    answer = read_touching(contacts_at(STAMP, touching), scene)
+    answer = read_touching(read(contacts_at(STAMP, touching)), scene)
     markers = scene_markers(DrawnTick(rows, STAMP, 'yard', poses, answer, 0.0))
     return markers, {name: [m for m in markers if m.ns == name] for name in NAMESPACES}
 

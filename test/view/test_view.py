@@ -31,7 +31,7 @@ import viser
 from browser import chromium, open_page
 from PIL import Image
 from test_landing import landed
-from typed_messages import changed, contacts_at, pose_array, pose_stamped
+from typed_messages import changed, contacts_at, pose_array, pose_stamped, read
 from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import connect
 
@@ -100,7 +100,7 @@ def test_contacts_are_drawn_with_the_poses_that_they_answer(make_node, answer_at
     send(node, START - MS, None, TOUCHING)
     news = [lambda: send(node, START, ORIGIN, None), lambda: send(node, START + MS, APART, APART)]
     news.insert(answer_at, lambda: node._on_contacts(
-        contacts_at(START, {PAIR: EXACT})))
+        serialize_message(contacts_at(START, {PAIR: EXACT}))))
     for deliver in news:
         deliver()
     tick = node.tick()
@@ -115,7 +115,7 @@ def test_latency_is_the_time_from_the_stamp_to_the_contacts(make_node):
     node = make_node()
     stamp = node.get_clock().now().nanoseconds - 3 * MS
     send(node, stamp, ORIGIN, TOUCHING)
-    node._on_contacts(contacts_at(stamp, {PAIR: EXACT}))
+    node._on_contacts(serialize_message(contacts_at(stamp, {PAIR: EXACT})))
     assert 3e-3 <= node.tick().latency < 1.0
 
 
@@ -124,7 +124,7 @@ def test_no_contact_stays_where_nobody_answers(make_node, monkeypatch):
     node = make_node()
     assert node.tick() is None and node.quiet
     send(node, START, ORIGIN, TOUCHING)
-    node._on_contacts(contacts_at(START, {PAIR: EXACT}))
+    node._on_contacts(serialize_message(contacts_at(START, {PAIR: EXACT})))
     monkeypatch.setattr(listener, 'UNANSWERED', 0.01)
     send(node, START + MS, ORIGIN, APART)
     time.sleep(0.02)
@@ -141,7 +141,7 @@ def test_time_that_goes_back(make_node):
     node = make_node()
     for stamp, pose in ((START, APART), (START - 10 * NANOSECONDS, TOUCHING)):
         send(node, stamp, ORIGIN, pose)
-        node._on_contacts(contacts_at(stamp, {}))
+        node._on_contacts(serialize_message(contacts_at(stamp, {})))
         assert np.array_equal(node.tick().poses, (ORIGIN, pose))
 
 
@@ -174,7 +174,7 @@ def test_a_body_carries_its_boxes(make_node, tmp_path):
 def test_contacts_of_another_scene_are_refused():
     for message in (contacts_at(1, {Pair.between('a', 'c'): EXACT}), contacts_at(1, {}, ['a_c'])):
         with pytest.raises(MessageError, match="'a_c' is no pair of the scene"):
-            read_touching(message, BOTH)
+            read_touching(read(message), BOTH)
 
 
 def test_the_deepest_contact_comes_first():
@@ -185,7 +185,7 @@ def test_the_deepest_contact_comes_first():
     apart = changed(EXACT, point=np.full(3, math.nan), separation=0.1)
     message = contacts_at(1, {pairs[0]: EXACT, pairs[1]: changed(nothing, separation=-1.0)})
     message.near = contacts_at(1, {pairs[2]: apart}).contacts
-    answer = read_touching(message, scene)
+    answer = read_touching(read(message), scene)
     assert answer.pairs.tolist() == [[0, 2], [0, 1]]
     assert answer.contacts.separation.tolist() == [-1.0, -0.125]
     assert np.isnan(answer.contacts.volume).tolist() == [True, False]
@@ -276,7 +276,7 @@ def test_all_corners_are_in_view_whatever_its_shape(aspect, extents):
 def tick_of(stamp, pose_b, contacts):
     """Return a tick of two boxes with contacts by pair, box a at the origin."""
     return DrawnTick(ROWS, stamp, 'yard', np.array([ORIGIN, pose_b], dtype=float),
-                     read_touching(contacts_at(stamp, contacts), BOTH), 2e-3)
+                     read_touching(read(contacts_at(stamp, contacts)), BOTH), 2e-3)
 
 
 def shown(text):
@@ -477,7 +477,8 @@ def test_two_hundred_boxes_in_a_browser():
     message = contacts_at(START, contacts, [pairs[99].label])
     with closing(Page('127.0.0.1', 8450, rows)) as page, open_page(page.url) as tab:
         known = np.where(np.isnan(rows.poses), np.r_[placed, placed], rows.poses)
-        bring(page, DrawnTick(rows, START, 'yard', known, read_touching(message, scene), 1e-3))
+        answer = read_touching(read(message), scene)
+        bring(page, DrawnTick(rows, START, 'yard', known, answer, 1e-3))
         tab.wait_for('document.getElementById("pairs")?.innerText == "99 of 100"')
         assert tab.text('stale') == '1'
         wait_for_drawing(tab, 5e-4)

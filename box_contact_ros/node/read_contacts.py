@@ -1,0 +1,122 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""A `Contacts` message as arrays, from the bytes of a subscription with `raw=True`.
+
+rclpy makes an object of each point and normal, which takes some ten times as long.
+"""
+from __future__ import annotations
+
+import struct
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..scene.scene import ALONE, Scene
+from ..scene.scene_solver import Answer
+from ..solver.checks import short_repr
+from ..solver.contact import Contacts
+from .message_bytes import (
+    CONTACT_BYTES,
+    ENCAPSULATION,
+    FRAME_AT,
+    MOST_NAMES,
+    PADDING,
+    parse_frame,
+    parse_head,
+)
+from .messages import NANOSECONDS, UPPER, MessageError
+
+NAMES = 3  # that a contact begins with: those of the pair and of its boxes
+
+
+class ReadContacts(NamedTuple):
+    """What a `Contacts` message says; numbers are those that the node computed, to the bit."""
+
+    stamp: int  # of the header [ns]
+    frame_id: str
+    names: list[tuple[str, str, str]]
+    """(k,) of each pair: its name, and those of its boxes A and B."""
+    contacts: Contacts
+    """(k,) those of pairs in contact, then those of pairs that are near; `axis` is -1."""
+    touching: int  # how many are in contact: the first rows
+    stale: list[str]  # names of the pairs, or boxes, that could not be answered
+
+
+def read_contacts(data: bytes) -> ReadContacts:
+    """Return what a serialised `Contacts` message says; raises ValueError for other bytes."""
+    data = bytes(data)
+    order, sec, nanosec, length = parse_head(data, 'Contacts')
+    frame_id = parse_frame(data, length, 'Contacts')
+    count_at = struct.Struct(f'{order}I').unpack_from
+    names: list[Any] = []  # of three each
+    starts, touching = [], 0
+    at = FRAME_AT + length
+    try:
+        for number_of_list in range(2):  # `contacts` and `near`
+            at += -at % 4
+            (count,), at = count_at(data, at), at + 4
+            for _ in range(count):
+                begin = at
+                for _ in range(NAMES):
+                    at += 4 + count_at(data, at)[0]
+                    at += -at % 4
+                names.append(_texts(data[begin:at], order, NAMES))
+                at += (ENCAPSULATION - at) % 8  # doubles are aligned behind the encapsulation
+                starts.append(at)
+                at += CONTACT_BYTES
+            touching = touching if number_of_list else count
+        (count,), at = count_at(data, at), at + 4
+        stale: list[str] = []
+        for _ in range(count):
+            begin = at
+            at += 4 + count_at(data, at)[0]
+            at += -at % 4
+            stale += _texts(data[begin:at], order, 1)
+    except (struct.error, UnicodeDecodeError) as error:
+        raise MessageError('not a Contacts', f'{len(data)} bytes: {error}') from None
+    if not -PADDING <= len(data) - at <= PADDING:
+        raise MessageError('not a Contacts', f'{len(data)} bytes, where {at} are told')
+    body = np.frombuffer(data, f'{order}f8', (len(data) - ENCAPSULATION) // 8, ENCAPSULATION)
+    places = (np.array(starts, np.int64)[:, None] - ENCAPSULATION) // 8
+    rows = body[places + np.arange(CONTACT_BYTES // 8)].astype(np.float64)
+    covariance = np.empty((len(rows), 3, 3))
+    for column, (i, j) in enumerate(zip(*UPPER)):
+        covariance[:, i, j] = covariance[:, j, i] = rows[:, 9 + column]
+    point, normal = rows[:, :3].copy(), rows[:, 3:6].copy()
+    contacts = Contacts(~np.isnan(point[:, 0]), -rows[:, 6], normal, point, rows[:, 7].copy(),
+                        covariance, np.full(len(rows), -1, np.int32))
+    return ReadContacts(sec * NANOSECONDS + nanosec, frame_id, names, contacts, touching, stale)
+
+
+@lru_cache(MOST_NAMES)  # the same in each message
+def _texts(data: bytes, order: str, count: int) -> tuple[str, ...]:
+    """Return strings that stand one behind the other."""
+    texts, at = [], 0
+    for _ in range(count):
+        length, = struct.unpack_from(f'{order}I', data, at)
+        texts.append(data[at + 4:at + 4 + length].rstrip(b'\0').decode())
+        at += 4 + length
+        at += -at % 4
+    return tuple(texts)
+
+
+def read_answer(read: ReadContacts, scene: Scene) -> Answer:
+    """Return the answer that a message tells, as a `SceneSolver` gives it.
+
+    scene: that of the node. Raises MessageError for a pair that the scene lacks.
+    """
+    index, rows = scene.index_of, {pair.label: row for pair, row in zip(scene.pairs, scene.rows)}
+    if scene.patterns:
+        rows = {name: (number, ALONE) for name, number in index.items()} | rows
+    pairs = [(index.get(a, ALONE), index.get(b, ALONE)) for _, a, b in read.names]
+    for name, is_known in (*((names[0], min(pair) >= 0 and scene.has_pair(*pair))
+                             for names, pair in zip(read.names, pairs)),
+                           *((name, name in rows) for name in read.stale)):
+        if not is_known:
+            raise MessageError('unknown pair', f'{short_repr(name)} is no pair of the scene: read '
+                                               'the scene file that the node has')
+    boxes, stale = (np.array(part, np.int64).reshape(-1, 2)
+                    for part in (pairs, [rows[name] for name in read.stale]))
+    return Answer(boxes, read.contacts, len(boxes), stale, scene)
