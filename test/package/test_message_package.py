@@ -5,11 +5,13 @@
 from __future__ import annotations
 
 import re
+import subprocess
 import sys
 from importlib import import_module, metadata
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ROOT / 'box_contact_msgs'
@@ -56,3 +58,27 @@ def test_manifest_is_valid() -> None:
     assert package.get_build_type() == 'ament_cmake'
     if Path(sys.prefix, 'lib', 'libbox_contact.so').is_file():  # pip has read the manifest
         assert metadata.version('box_contact_msgs') == package.version
+
+
+@pytest.mark.filterwarnings('ignore:nodes.Node.traverse:DeprecationWarning')  # of catkin_pkg
+def test_the_branch_that_is_released(tmp_path: Path) -> None:
+    """Bloom finds a package with licence and changelog at the top of the split branch."""
+    packages = pytest.importorskip('catkin_pkg.packages', reason='catkin-pkg is not installed')
+    changelog = import_module('catkin_pkg.changelog')
+
+    def git(*words: object) -> None:
+        subprocess.run(['git', *map(str, words)], check=True, capture_output=True, timeout=PATIENCE)
+
+    if not (ROOT / '.git').exists():
+        pytest.skip('not a checkout')
+    clone, branch = tmp_path / 'clone', tmp_path / 'branch'
+    git('clone', '--quiet', '--depth', 1, f'file://{ROOT}', clone)
+    git('-C', clone, 'subtree', 'split', '--prefix', 'box_contact_msgs', '--branch', 'split')
+    git('clone', '--quiet', '--branch', 'split', clone, branch)
+    (path, package), = packages.find_packages(str(branch)).items()
+    assert (path, package.name) == ('.', 'box_contact_msgs')
+    assert (branch / package.licenses[0].file).read_text('utf-8') == (
+        ROOT / 'LICENSE').read_text('utf-8')
+    versions = [version for version, *_ in changelog.get_changelog_from_path(
+        str(branch), package.name).foreach_version()]
+    assert versions == [package.version]
