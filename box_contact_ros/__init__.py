@@ -14,8 +14,9 @@ from .solver.contact_solver import ContactSolver
 
 if TYPE_CHECKING:
     from .models import make_model
-    from .node.contact_node import ContactNode
-    from .node.read_contacts import ReadContacts, read_contacts
+    from .node.contact_node import ContactNode as ContactNode
+    from .node.read_contacts import ReadContacts as ReadContacts
+    from .node.read_contacts import read_contacts as read_contacts
     from .scene.contacts_of import contacts_of
     from .scene.forces import Body, PatchForces
     from .scene.scene import Box, Frame, Pair, Scene
@@ -23,9 +24,9 @@ if TYPE_CHECKING:
     from .scene.scene_solver import SceneSolver
     from .scene.support import support
 
-__all__ = ['Body', 'Box', 'Contact', 'ContactNode', 'ContactSolver', 'Contacts', 'Frame', 'Pair',
-           'PatchForces', 'ReadContacts', 'Scene', 'SceneSolver', 'contacts_of', 'make_model',
-           'patch_area', 'patch_areas', 'read_contacts', 'read_scene', 'support']
+__all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Frame', 'Pair', 'PatchForces',
+           'Scene', 'SceneSolver', 'contacts_of', 'make_model', 'patch_area', 'patch_areas',
+           'read_scene', 'support']  # those of `node` need ROS: `import *` does without
 
 _LOADED_WHEN_USED = {
     'models': ('make_model',),
@@ -51,4 +52,4 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     """Return the exported names too that were not used yet."""
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *(name for names in _LOADED_WHEN_USED.values() for name in names)})
