@@ -76,14 +76,12 @@ def answer_later(service: Service, take: Callable[[Any, Send], None]) -> None:
     Test: test_check.py::test_costly_requests_wait_for_ticks.
     """
     send = service.send_response
-    requests: list[Any] = []
 
-    def keep(request: Any, response: Any) -> Any:
-        requests.append(request)
-        return response
+    def keep(request: Any, _: Any) -> Any:
+        return request  # rclpy hands it to `send_response`
 
-    def answer(_: Any, header: Any) -> None:  # rclpy calls it right after the callback
-        take(requests.pop(), lambda response: send(response, header))
+    def answer(request: Any, header: Any) -> None:
+        take(request, lambda response: send(response, header))
     service.callback = keep
     service.send_response = answer  # type: ignore[assignment, method-assign]
 
