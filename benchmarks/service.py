@@ -32,9 +32,9 @@ from box_contact_msgs.srv import Check
 from box_contact_ros.arguments import program_parser
 from box_contact_ros.bench.echo_node import raw_stamp, with_stamp
 from box_contact_ros.node.check import Checker
-from box_contact_ros.node.messages import make_header
-from box_contact_ros.node.ros_client import DEEP_RELIABLE, pose_message, set_pose
+from box_contact_ros.node.messages import make_header, pose_message, set_pose
 from box_contact_ros.node.runtime import GuardedNode, run_node, running_node, spin_once
+from box_contact_ros.node.topics import DEEP_RELIABLE
 from box_contact_ros.processes import keep_to_this_host, program, running
 from box_contact_ros.scene.scene import Box, Scene
 from box_contact_ros.scene.scene_file import read_scene

@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Extras of setup.py: a folder names the one that it needs, and a missing one ends in one line."""
+"""Extras of setup.py: a folder or module names its own, and a missing one ends in one line."""
 from __future__ import annotations
 
 import sys

@@ -3,6 +3,5 @@
 
 """The crane in MuJoCo, its node, and the demo."""
 
-from ..extras import require
-
-require('sim')
+CRANE_WRENCH = 'crane/wrench'
+"""Topic of the force of the contacts on the crane's load. The view shows it, without MuJoCo."""

@@ -14,14 +14,19 @@ off, so the load comes to rest on the stack only under the wrench of a contact f
 Conventions: SI units; world frame with z up, the ground at z = 0, the stack's centre above the
 origin. A pose is `x y z qx qy qz qw` of the body's centre. Angles of a `CraneScenario` are degrees.
 """
+# ruff: noqa: E402 - a missing MuJoCo ends in one line
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
+
+from ..extras import require
+
+require('sim')
+import mujoco
 
 from ..scene.forces import GRAVITY, Body
 from ..scene.scene import CONTAINER

@@ -29,11 +29,11 @@ from rclpy.signals import SignalHandlerOptions
 
 from box_contact_msgs.msg import Contacts
 
-from ..node.messages import contacts_by_pair, make_header
+from ..node.messages import contacts_by_pair, make_header, pose_message, stamp_of
 from ..node.parameters import Setting, declare, flag, number, parse_command_line, warn_of_unknown
-from ..node.ros_client import CRANE_WRENCH, DEEP_RELIABLE, pose_message, stamp_of
 from ..node.runtime import REFUSALS, GuardedNode, running_node, spin_once
-from ..node.topics import contact_qos
+from ..node.topics import DEEP_RELIABLE, contact_qos
+from . import CRANE_WRENCH
 from .crane import CraneScenario
 from .landing import CORNER_SPEED_LIMIT, ClosedLoop, Landing, LandingRecord, LoopState, with_patch
 

@@ -43,8 +43,7 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--view', action='store_true', help='show landing after landing')
     parser.add_argument('--real-time', action='store_true', help='do not wait for late answers')
     options = parser.parse_args(args)
-    if options.view:
-        require('view')
+    require('sim', *(['view'] if options.view else []))
     domain = keep_to_this_host()
     print('A crane sets one container down on another. A contact node answers its poses with\n'
           f'model {options.model}; only these contacts hold the load up. Both are in ROS domain '

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PoseStamped
 from std_msgs.msg import Header
 
 from box_contact_msgs.msg import Contact as ContactMessage
@@ -36,6 +37,24 @@ def make_header(stamp: int, frame_id: str) -> Header:
     """Return the header of a stamp [ns]."""
     return Header(stamp=Time(sec=stamp // NANOSECONDS, nanosec=stamp % NANOSECONDS),
                   frame_id=frame_id)
+
+
+def stamp_of(header: Header) -> int:
+    """Return a header's stamp [ns]."""
+    return int(header.stamp.sec) * NANOSECONDS + int(header.stamp.nanosec)
+
+
+def pose_message(header: Header, pose: np.ndarray) -> PoseStamped:
+    """Return the message of a pose `x y z qx qy qz qw`."""
+    message = PoseStamped(header=header)
+    set_pose(message.pose, pose)
+    return message
+
+
+def set_pose(pose: Any, numbers: np.ndarray) -> None:
+    """Write a pose `x y z qx qy qz qw` into a geometry_msgs/Pose."""
+    p, q = pose.position, pose.orientation
+    p.x, p.y, p.z, q.x, q.y, q.z, q.w = map(float, numbers)
 
 
 class KeptMessages:

@@ -24,6 +24,8 @@ from .rclpy_workarounds import RCLError, with_info
 
 MOST_PAIRS_WITH_TOPICS = 1000
 """Two publishers a pair take milliseconds and memory, here and in every process that listens."""
+DEEP_RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
+"""Of a client: what the DDS layer delivers while Python is busy must not push out the rest."""
 CONTACT_DEPTH = 10
 POSE_DEPTH = 100
 """Poses that wait: 100 ms at 1 kHz, longer than any collection of garbage."""

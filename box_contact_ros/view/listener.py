@@ -11,25 +11,30 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from geometry_msgs.msg import PoseArray, PoseStamped
 from rclpy.context import Context
 from rclpy.qos import QoSProfile
 
 from box_contact_msgs.msg import Contacts as ContactsMessage
 
 from ..node.contact_node import PARAMETERS as CONTACT_PARAMETERS
+from ..node.message_bytes import PoseReader
+from ..node.messages import MessageError
 from ..node.parameters import Setting, declare, warn_of_unknown
 from ..node.read_contacts import ReadContacts, read_answer, read_contacts
-from ..node.ros_client import PoseTopic, pose_topics
 from ..node.runtime import GuardedNode
-from ..scene.scene import Scene, two_boxes
+from ..node.topics import pose_qos
+from ..scene.pairing import StampedPose
+from ..scene.scene import ALL_BOXES, Scene, two_boxes
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import Answer
+from ..solver.checks import are_poses
 
 KEPT = 1000  # poses kept per topic: a second at 1 kHz
 UNANSWERED = 0.5
@@ -72,6 +77,48 @@ def read_touching(read: ReadContacts, scene: Scene) -> Answer:
     touching = np.flatnonzero(answer.contacts.colliding)
     rows = touching[np.argsort(answer.contacts.separation[touching], kind='stable')]
     return answer._replace(pairs=answer.pairs[rows], contacts=answer.contacts[rows])
+
+
+class PoseTopic(NamedTuple):
+    """A topic that a scene's poses come on."""
+
+    name: str
+    kind: type  # of its messages
+    qos: QoSProfile
+    names: Sequence[str]  # of boxes or bodies
+    read: Callable[[bytes], StampedPose]
+    """Return the poses (n, 7) of these names, NaN for one that is not there.
+
+    Raises MessageError.
+    """
+
+
+def pose_topics(scene: Scene) -> list[PoseTopic]:
+    """Return how the poses of all that moves come, in the scene's order."""
+    topics = []
+    for source, topic in scene.sources.items():
+        is_array = source == ALL_BOXES
+        names, read = (scene.moving, _read_array) if is_array else ((source,), _read_one)
+        # Each topic has a reader of its own, which knows the topic's frame.
+        topics.append(PoseTopic(topic, PoseArray if is_array else PoseStamped, pose_qos(source),
+                                names, partial(read, PoseReader(), len(names))))
+    return topics
+
+
+def _read_one(reader: PoseReader, _: int, data: bytes) -> StampedPose:
+    pose = reader.read_pose(data)
+    return pose._replace(numbers=np.array([pose.numbers]))
+
+
+def _read_array(reader: PoseReader, count: int, data: bytes) -> StampedPose:
+    """Return so many poses. A bad pose becomes NaN: the contact node reports it."""
+    poses = reader.read_poses(data)
+    if len(poses.numbers) != count:
+        raise MessageError('wrong number of poses',
+                           f'{len(poses.numbers)} poses, but {count} boxes and bodies of the scene '
+                           'move')
+    poses.numbers[~are_poses(poses.numbers)] = np.nan
+    return poses
 
 
 class Track:

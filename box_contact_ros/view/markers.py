@@ -20,9 +20,8 @@ from rclpy.context import Context
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ..node.messages import make_header
+from ..node.messages import make_header, set_pose
 from ..node.parameters import parse_command_line
-from ..node.ros_client import set_pose
 from ..node.runtime import run_node
 from ..node.topics import contact_qos
 from ..solver.contact import Contacts

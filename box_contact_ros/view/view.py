@@ -20,9 +20,10 @@ from geometry_msgs.msg import WrenchStamped
 from rclpy.context import Context
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
+from ..demo import CRANE_WRENCH
 from ..extras import require
+from ..node.messages import stamp_of
 from ..node.parameters import Setting, parse_command_line, text, whole_number
-from ..node.ros_client import CRANE_WRENCH, stamp_of
 from ..node.runtime import run_node
 from .listener import SCENE_PARAMETERS, Listener
 
