@@ -45,6 +45,7 @@ from .parameters import (
     Setting,
     declare,
     flag,
+    limited,
     number,
     one_of,
     parse_command_line,
@@ -62,6 +63,7 @@ LONGEST = 1e6  # s, about twelve days
 NAMED_TOPICS = 3  # how many pose topics the node names when it is ready
 
 
+@limited(additional_constraints=f'one of: {", ".join(MODELS)}')
 def model(name: str, value: Any) -> str:
     """Validate the name of a model."""
     check_model(name, text(name, value))

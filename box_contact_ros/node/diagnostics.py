@@ -251,19 +251,20 @@ class Diagnostics:
 
 
 def _lateness(load: Load, sent: float, overtaken: int) -> Iterator[Finding]:
-    """Yield that answers are late, or poses left out for newer ones; sent: poses per box."""
-    remedy = ('the node is too slow for these poses; give it a core of its own, list fewer pairs, '
-              'set pair_topics to false, or send poses less often')
-    if not load.evaluations:
-        if overtaken:
-            yield Finding('late', f'answers are late: none for {load.seconds:.1f} s; '
-                                  f'{load.lost + overtaken} poses lost', remedy)
-        return
-    age = float(np.median(load.ages[-NEWEST_ANSWERS:]))
+    """Yield that answers are late, or that a burst of poses was lost; sent: poses per box."""
+    lost = load.lost + overtaken
+    age = float(np.median(load.ages[-NEWEST_ANSWERS:])) if load.evaluations else 0.0
     ticks = 1e-3 * age * sent / load.seconds
-    if ticks > LATE_TICKS or overtaken:
-        yield Finding('late', f'answers are late: {age:.0f} ms, {ticks:.0f} ticks; '
-                              f'{load.lost + overtaken} poses lost', remedy)
+    if ticks > LATE_TICKS or (overtaken and not load.evaluations):
+        late = (f'{age:.0f} ms, {ticks:.0f} ticks' if load.evaluations else
+                f'none for {load.seconds:.1f} s')
+        yield Finding('late', f'answers are late: {late}; {lost} poses lost',
+                      'the node is too slow for these poses; give it a core of its own, list fewer '
+                      'pairs, set pair_topics to false, or send poses less often')
+    elif overtaken:
+        yield Finding('burst', f'a burst of poses was lost: {lost}',
+                      'more came at once than the queue holds, or the node stood still; send them '
+                      'evenly, or raise the depth by qos_overrides')
 
 
 def _findings(summary: Summary, refused: Sequence[str], unseen: Sequence[str],
@@ -336,11 +337,11 @@ def _rejection_line(reason: str, rejection: RejectedPose) -> str:
         return (f'{box}: stamp {stamp} is older than {newest}; refused: publish in the order of '
                 'the stamps, from one publisher')
     assert reason == REPEATED
-    if rejection.stamp == rejection.newest:
+    if rejection.stamps == 1:
         return (f'{box}: stamp {stamp} does not advance; refused: set header.stamp (`ros2 topic '
                 'pub` does for `stamp: now`), or start with pairing:=latest')
-    return (f'{box}: stamp {stamp} has come before; refused: send each stamp once, or start with '
-            'pairing:=latest')
+    return (f'{box}: stamp {stamp} has come before; refused: its tick is answered once; wait '
+            'longer for the answer, call ~/reset before an episode begins anew, or ask ~/check')
 
 
 def _some(names: Sequence[str]) -> str:

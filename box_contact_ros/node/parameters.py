@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
 from ..arguments import program_parser
@@ -22,6 +22,8 @@ from .rclpy_workarounds import parameter_overrides
 
 Validator = Callable[[str, Any], Any]
 """From a parameter's name and value to the value as the node uses it; ValueError if it is wrong."""
+Limits = Mapping[str, Any]
+"""What a ParameterDescriptor says of accepted values, by its fields."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,20 @@ class Setting:
     description: str
     validate: Validator
 
+    @property
+    def limits(self) -> Limits:
+        """Return what `ros2 param describe` shows of accepted values."""
+        limits: Limits = getattr(self.validate, 'limits', {})
+        return limits
+
+
+def limited(**limits: Any) -> Callable[[Validator], Validator]:
+    """Decorate a validator with the limits that it checks, by fields of a ParameterDescriptor."""
+    def decorate(validate: Validator) -> Validator:
+        validate.limits = limits  # type: ignore[attr-defined]
+        return validate
+    return decorate
+
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
@@ -39,6 +55,7 @@ def _is_number(value: Any) -> bool:
 
 def number(low: float, high: float) -> Validator:
     """Validate a number within [low, high]; integers are as good as floats."""
+    @limited(floating_point_range=[FloatingPointRange(from_value=float(low), to_value=float(high))])
     def validate(name: str, value: Any) -> float:
         if not _is_number(value):
             raise ValueError(f'{name} must be a number, not {short_repr(value)}')
@@ -50,6 +67,7 @@ def number(low: float, high: float) -> Validator:
 
 def whole_number(low: int, high: int) -> Validator:
     """Validate a whole number within [low, high]."""
+    @limited(integer_range=[IntegerRange(from_value=low, to_value=high, step=1)])
     def validate(name: str, value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
             raise ValueError(f'{name} must be a whole number from {low} to {high}, '
@@ -58,6 +76,7 @@ def whole_number(low: int, high: int) -> Validator:
     return validate
 
 
+@limited(additional_constraints='three numbers > 0')
 def size(name: str, value: Any) -> tuple[float, ...]:
     """Validate three full extents [m]."""
     given = list(value) if isinstance(value, Sequence) else value
@@ -78,6 +97,7 @@ def text(name: str, value: Any) -> str:
 
 def one_of(choices: Iterable[str]) -> Validator:
     """Validate one of some strings."""
+    @limited(additional_constraints=f'one of: {", ".join(choices)}')
     def validate(name: str, value: Any) -> str:
         choice = text(name, value)
         if choice not in choices:
@@ -111,7 +131,8 @@ def declare(node: Node, settings: Mapping[str, Setting], *, live: Collection[str
             node.declare_parameter(
                 name, list(value) if isinstance(value, tuple) else value,
                 ParameterDescriptor(description=setting.description, dynamic_typing=True,
-                                    read_only=name not in live), ignore_override=True)
+                                    read_only=name not in live, **setting.limits),
+                ignore_override=True)
     return values
 
 

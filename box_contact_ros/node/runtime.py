@@ -206,6 +206,11 @@ def running_node(make_node: Callable[[Context], NodeKind], args: Sequence[str] |
     try:
         rclpy.init(args=None if args is None else list(args), context=context,
                    signal_handler_options=signals)
+    except RCLError as error:
+        if 'logging' in str(error):  # a home that cannot be written to
+            raise ValueError(f'{error}: set ROS_LOG_DIR to a folder that can be written to'
+                             ) from error
+        raise
     except UnknownROSArgsError as error:
         raise ValueError(f'after --ros-args, ROS does not know {error}: a parameter is '
                          '-p NAME:=VALUE, a name is remapped by -r FROM:=TO') from error

@@ -99,6 +99,7 @@ class RejectedPose(NamedTuple):
     box: str
     stamp: int   # [ns]
     newest: int  # newest stamp of the box so far [ns]
+    stamps: int = 0  # how many stamps of the box are remembered
 
 
 TickPoses = list['StampedPose | None']
@@ -265,7 +266,8 @@ class Pairing(ABC):
     def _count(self, reason: str, box: str, stamp: int) -> None:
         """Count a pose, and note it for the log."""
         self.counts[reason] += 1
-        self.rejections[reason] = RejectedPose(box, stamp, self._boxes[box].newest)
+        state = self._boxes[box]
+        self.rejections[reason] = RejectedPose(box, stamp, state.newest, len(state.taken))
 
     def _has_partner(self, box: str, present: Mapping[str, Any]) -> bool:
         """Return whether the other box of some pair of a box is present, or fixed."""

@@ -13,7 +13,7 @@ import pytest
 from box_contact_ros import SceneSolver
 from box_contact_ros.node import diagnostics
 from box_contact_ros.node.diagnostics import ACTIVE, Diagnostics, TickMonitor
-from box_contact_ros.scene.pairing import OVERTAKEN, StampPairing
+from box_contact_ros.scene.pairing import OVERTAKEN, StampedPose, StampPairing
 from box_contact_ros.scene.scene import two_boxes
 
 MAX_AGE = 10**9  # ns
@@ -28,11 +28,15 @@ def node(monkeypatch):
     node = Mock()
     node.get_clock().now().nanoseconds = 0
     node.get_fully_qualified_name.return_value = '/node'
-    reporter = Diagnostics(node, counts, TickMonitor())
+    monitor = TickMonitor()
+    reporter = Diagnostics(node, counts, monitor)
     pairing = StampPairing(SOLVER.scene, max_age=MAX_AGE)
     topics = Mock(why_silent=lambda box: f'nobody publishes {box}')
 
-    def report(seconds, *checks):
+    def report(seconds, *checks, age=None):
+        """Report after so long, with times of requests [s]; age: of an answer [ns]."""
+        if age is not None:
+            monitor.evaluated(10_000, age, [])
         clock[0] += seconds
         reporter.report(ACTIVE, SOLVER.scene, 'exact', pairing, topics, 0, checks)
         status = node.create_publisher().publish.call_args.args[0].status[0]
@@ -57,6 +61,7 @@ def test_a_busy_node_does_not_say_that_poses_stop(node):
     assert 'stopped' not in report(3.0)
     counts.update({'poses': 200, OVERTAKEN: 200})
     assert report(3.0) == 'answers are late: none for 3.0 s; 200 poses lost'
+    assert 'list fewer pairs' in report.lines[-1].args[0]
     assert report(1.0).startswith('poses have stopped: none for 1 s')
 
 
@@ -82,3 +87,27 @@ def test_a_node_that_only_serves_requests_is_well(node):
     assert report(1.0, 0.001) == 'answering requests'
     counts['poses'] += 1
     assert report(1.0, 0.001) == 'no answers'
+
+
+def test_a_burst_that_is_lost_is_not_a_node_that_is_late(node):
+    """Its answers are new: the node need not be faster."""
+    counts, report = node
+    counts.update({'poses': 200, OVERTAKEN: 100})
+    assert report(1.0, age=10**5) == 'a burst of poses was lost: 100'
+    assert 'raise the depth' in report.lines[-1].args[0]
+    counts.update({'poses': 200, OVERTAKEN: 100})
+    assert report(1.0, age=10**9).startswith('answers are late: 1000 ms, 100 ticks; 100 poses lost')
+
+
+@pytest.mark.parametrize('stamps, words', [
+    ((0, 0), 'stamp 0 s does not advance; refused: set header.stamp'),
+    ((1, 2, 2), 'stamp 2e-09 s has come before; refused: its tick is answered once; wait'),
+    ((1, 2, 1), 'stamp 1e-09 s has come before')])
+def test_who_sends_a_stamp_again_is_told_why(stamps, words):
+    """A publisher that does not stamp may use `latest`; a client in lockstep may not."""
+    pairing = StampPairing(SOLVER.scene, max_age=MAX_AGE)
+    for stamp in stamps:
+        pairing.add('box_a', StampedPose((0, 0, 0, 0, 0, 0, 1), '', stamp))
+    (reason, rejection), = pairing.rejections.items()
+    line = diagnostics._rejection_line(reason, rejection)
+    assert words in line and ('latest' in line) == (len(stamps) == 2)

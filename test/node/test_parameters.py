@@ -92,3 +92,18 @@ def test_a_word_that_ros_does_not_know_ends_the_program(capsys, signal_handlers)
     assert capsys.readouterr().err == (
         "error: after --ros-args, ROS does not know ['model:=exact']: a parameter is "
         '-p NAME:=VALUE, a name is remapped by -r FROM:=TO\n')
+
+
+def test_ranges_and_choices_are_described():
+    """As `ros2 param describe` shows them; what is outside is refused in the node's words."""
+    with serving(lambda context: ContactNode(context)) as node:
+        told = {name: node.describe_parameter(name) for name in contact_node.PARAMETERS}
+        refused, = node.set_parameters([Parameter('tolerance', value=-1.0)])
+        assert 'tolerance' in refused.reason and not refused.successful
+        assert node.set_parameters([Parameter('max_age', value=2)])[0].successful
+    interval, = told['margin'].floating_point_range
+    assert (interval.from_value, interval.to_value) == (0.0, 1e50)
+    assert told['pairing'].additional_constraints == 'one of: stamp, latest'
+    assert told['model'].additional_constraints.startswith('one of: exact, mlp')
+    assert told['size_a'].additional_constraints == 'three numbers > 0'
+    assert parameters.whole_number(1, 9).limits['integer_range'][0].to_value == 9

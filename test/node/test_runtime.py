@@ -94,6 +94,16 @@ def test_an_end_that_hangs_is_ended():
     assert done.returncode == 1 and 'destroy_node' in done.stderr
 
 
+def test_a_home_that_cannot_be_written_to(tmp_path):
+    """One line names the variable."""
+    (tmp_path / 'file').touch()
+    done = subprocess.run([sys.executable, '-m', 'box_contact_ros.node.contact_node'],
+                          capture_output=True, text=True, timeout=PATIENCE,
+                          env={**os.environ, 'ROS_LOG_DIR': str(tmp_path / 'file' / 'log')})
+    assert done.returncode == 1 and 'Traceback' not in done.stderr
+    assert 'set ROS_LOG_DIR to a folder that can be written to' in done.stderr
+
+
 def test_a_node_that_cannot_start_says_why(run, capsys):
     """One line and status 1; nothing where a signal has ended the context."""
     def refuse(context, *, gone=False):
