@@ -7,6 +7,7 @@ from __future__ import annotations
 import ast
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -87,3 +88,35 @@ def test_record(program, tmp_path: Path) -> None:
     assert output.splitlines() == [f'{count} of {topic}' for topic, count in counts.items()]
     assert set(counts) == {'/box_a/pose', '/box_b/pose', '/contacts'}
     assert min(counts.values()) >= 1
+
+
+ASK_ONCE = """
+import sys, numpy, rclpy
+from lockstep_client import LockstepClient
+rclpy.init(args=sys.argv)
+stack = numpy.array([0, 0, 0, 0, 0, 0, 1])
+answer = LockstepClient().ask(10**9, stack + numpy.array([0, 0, 2.581, 0, 0, 0, 0]), stack)
+print(answer.names[0][0], round(-answer.contacts.separation[0], 6))
+"""
+
+
+def test_cpp_with_ros(program, tmp_path: Path) -> None:
+    """The client of ~/check prints what it says, and the node answers as a contact node does."""
+    cmake = shutil.which('cmake')
+    prefixes = [sys.prefix, *os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)]
+    if not cmake or not any(Path(prefix, 'share/rclcpp/cmake').is_dir() for prefix in prefixes):
+        pytest.skip('rclcpp is not installed')
+    for words in ((cmake, '-S', EXAMPLES / 'cpp', '-B', tmp_path), (cmake, '--build', tmp_path)):
+        subprocess.run(words, check=True, timeout=PATIENCE)
+    program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready')
+    printed = subprocess.run([tmp_path / 'check_client'], check=True, capture_output=True,
+                             text=True, timeout=PATIENCE).stdout
+    assert f'//   {printed}' in (EXAMPLES / 'cpp/check_client.cpp').read_text('utf-8')
+    with subprocess.Popen([tmp_path / 'ros_node', '--ros-args', '-r', '__ns:=/cpp']) as node:
+        try:
+            asked = subprocess.run(
+                [sys.executable, '-c', ASK_ONCE, '--ros-args', '-r', '__ns:=/cpp'], check=True,
+                cwd=EXAMPLES, capture_output=True, text=True, timeout=PATIENCE)
+        finally:
+            node.terminate()
+    assert asked.stdout == 'box_a_box_b 0.01\n'

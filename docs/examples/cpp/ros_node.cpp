@@ -1,0 +1,61 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// A rclcpp node that answers in your own process, without the contact node: it publishes the
+// contacts of two 40 ft containers. It is a component where rclcpp_components is installed.
+//
+// It answers once the poses of both boxes are in with one stamp, and refuses what is no pose.
+#include <stdexcept>
+
+#include "box_contact/contact_message.hpp"
+#include "box_contact_msgs/msg/contacts.hpp"
+#include "geometry_msgs/msg/pose_stamped.hpp"
+#include "rclcpp/rclcpp.hpp"
+
+using box_contact_msgs::msg::Contacts;
+using geometry_msgs::msg::PoseStamped;
+
+class BoxContactNode : public rclcpp::Node {
+ public:
+  explicit BoxContactNode(const rclcpp::NodeOptions& options) : Node("box_contact", options) {
+    contacts_ = create_publisher<Contacts>("contacts", 10);
+    for (int side = 0; side < 2; ++side)
+      subscriptions_[side] = create_subscription<PoseStamped>(
+          side ? "box_b/pose" : "box_a/pose", rclcpp::SensorDataQoS(),
+          [this, side](const PoseStamped& message) { take(side, message); });
+  }
+
+ private:
+  static box_contact::Box box_at(const PoseStamped& message) {
+    const auto& [p, q] = std::tie(message.pose.position, message.pose.orientation);
+    return {{{p.x, p.y, p.z}, {q.x, q.y, q.z, q.w}}, {12.192, 2.438, 2.591}};
+  }
+
+  void take(int side, const PoseStamped& message) try {
+    last_[side] = message;
+    if (last_[0].header != last_[1].header) return;
+    Contacts answer;
+    answer.header = message.header;
+    const auto contact = box_contact::collide(box_at(last_[0]), box_at(last_[1]));
+    if (contact.colliding)
+      answer.contacts.push_back(box_contact::to_message(contact, "box_a_box_b", "box_a", "box_b"));
+    contacts_->publish(answer);
+  } catch (const std::invalid_argument& error) {
+    RCLCPP_WARN(get_logger(), "refused: %s", error.what());
+  }
+
+  PoseStamped last_[2];
+  rclcpp::Publisher<Contacts>::SharedPtr contacts_;
+  rclcpp::Subscription<PoseStamped>::SharedPtr subscriptions_[2];
+};
+
+#ifdef BOX_CONTACT_COMPONENT
+#include "rclcpp_components/register_node_macro.hpp"
+RCLCPP_COMPONENTS_REGISTER_NODE(BoxContactNode)
+#else
+int main(int argc, char** argv) {
+  rclcpp::init(argc, argv);
+  rclcpp::spin(std::make_shared<BoxContactNode>(rclcpp::NodeOptions()));
+  rclcpp::shutdown();
+}
+#endif
