@@ -29,6 +29,7 @@ from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 mujoco.set_mju_user_warning(logging.getLogger(__name__).warning)
 
 STEP = 0.001  # of MuJoCo's physics
+HEAVY = 1e9  # mass [kg] and inertia [kg m²] of what MuJoCo is to carry without slowing down
 SEARCHED = 10  # steps from one search of neighbours to the next
 CORNERS = 0.5 * np.array(list(product((-1, 1), repeat=3)))
 FLOOR = ((60.0, 60.0, 1.0), 0.0, (0.0, 0.0, -0.5))
@@ -45,7 +46,7 @@ class Boxes:
     mass: np.ndarray  # (n,) [kg]
     pose: np.ndarray  # (n, 7) of the boxes' centres
     centre: np.ndarray  # (n, 3) of mass, in the box's own frame [m]
-    velocity: np.ndarray  # (n, 6) of the centre of mass, zero at first
+    velocity: np.ndarray  # (n, 6) of the centre of mass
 
     @classmethod
     def of(cls, rows: Sequence[tuple]) -> Boxes:
@@ -61,6 +62,11 @@ class Boxes:
                 centre[k] = more[1]
         return cls(np.array([row[0] for row in rows], dtype=float),
                    np.array([row[1] for row in rows], dtype=float), pose, centre, np.zeros((n, 6)))
+
+    @property
+    def carrier(self) -> int | None:
+        """Return the fixed box that moves by its velocity alone, if there is one."""
+        return next(iter(np.flatnonzero((self.mass == 0.0) & self.velocity.any(axis=1))), None)
 
     @property
     def inertia(self) -> np.ndarray:
@@ -120,12 +126,16 @@ def near_pairs(boxes: Boxes, margin: float) -> np.ndarray:
 
 
 def corner_speeds(boxes: Boxes) -> np.ndarray:
-    """Return the speeds (n, 8) of the corners of the free boxes [m/s]."""
-    arm = np.einsum('nij,nkj->nki', rotation_matrix(boxes.pose[:, 3:]),
-                    CORNERS * boxes.size[:, None] - boxes.centre[:, None])
-    velocity = boxes.velocity[:, None]
-    return np.linalg.norm(velocity[:, :, :3] + np.cross(velocity[:, :, 3:], arm),
-                          axis=2)[boxes.mass > 0]
+    """Return the speeds (n, 8) of the corners of the free boxes, relative to a carrier [m/s]."""
+    rotation = rotation_matrix(boxes.pose[:, 3:])
+    arm = np.einsum('nij,nkj->nki', rotation, CORNERS * boxes.size[:, None])
+    centre = np.einsum('nij,nj->ni', rotation, boxes.centre)
+    motion = boxes.velocity[:, None]
+    speed = motion[:, :, :3] + np.cross(motion[:, :, 3:], arm - centre[:, None])
+    if (k := boxes.carrier) is not None:
+        speed -= boxes.velocity[k, :3] + np.cross(
+            boxes.velocity[k, 3:], boxes.pose[:, None, :3] + arm - boxes.pose[k, :3])
+    return np.linalg.norm(speed, axis=2)[boxes.mass > 0]
 
 
 class Ours:
@@ -179,7 +189,7 @@ class Theirs:
         spec.option.gravity = 0.0, 0.0, -GRAVITY
         spec.option.timestep = step
         spec.memory = 2**28
-        self.free = boxes.mass > 0
+        self.free, self.carrier = boxes.mass > 0, boxes.carrier
         for k, free in enumerate(self.free):
             x, y, z, qx, qy, qz, qw = boxes.pose[k]
             body = spec.worldbody.add_body(pos=(x, y, z), quat=(qw, qx, qy, qz))
@@ -188,12 +198,29 @@ class Theirs:
                 body.explicitinertial = True
                 body.mass, body.inertia = boxes.mass[k], boxes.inertia[k]
                 body.ipos = boxes.centre[k]
+            elif k == self.carrier:
+                body.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=(0, 0, 1))
+                body.explicitinertial = True
+                body.mass, body.inertia = HEAVY, (HEAVY,) * 3
             body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=0.5 * boxes.size[k],
                           friction=(FRICTION, 0.005, 0.0001))
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         self.tick, self.spent = 0, 0.0
         self.bodies = 1 + np.flatnonzero(self.free)
+        joints = self.model.body_jntadr[self.bodies]
+        self.places = self.model.jnt_qposadr[joints][:, None] + np.arange(7)
+        self.rates = self.model.jnt_dofadr[joints][:, None] + np.arange(6)
+        self.data.qpos[self.places] = boxes.pose[self.free][:, [0, 1, 2, 6, 3, 4, 5]]
+        rotation = rotation_matrix(boxes.pose[self.free, 3:])
+        v = boxes.velocity[self.free]
+        arm = np.einsum('nij,nj->ni', rotation, boxes.centre[self.free])
+        spin = np.einsum('nji,nj->ni', rotation, v[:, 3:])
+        self.data.qvel[self.rates] = np.hstack([v[:, :3] - np.cross(v[:, 3:], arm), spin])
+        if self.carrier is not None:
+            joint = self.model.body_jntadr[1 + self.carrier]
+            self.hinge = self.model.jnt_qposadr[joint]
+            self.data.qvel[self.model.jnt_dofadr[joint]] = boxes.velocity[self.carrier, 5]
 
     def step(self) -> None:
         """Advance all boxes by a step."""
@@ -204,8 +231,11 @@ class Theirs:
         start = time.perf_counter()
         mujoco.mj_step(self.model, self.data)
         self.spent += time.perf_counter() - start
-        boxes.pose[free] = self.data.qpos.reshape(-1, 7)[:, [0, 1, 2, 4, 5, 6, 3]]
-        v = self.data.qvel.reshape(-1, 6)
+        boxes.pose[free] = self.data.qpos[self.places][:, [0, 1, 2, 4, 5, 6, 3]]
+        if self.carrier is not None:
+            half = 0.5 * self.data.qpos[self.hinge]
+            boxes.pose[self.carrier, 5:] = np.sin(half), np.cos(half)
+        v = self.data.qvel[self.rates]
         rotation = rotation_matrix(boxes.pose[free, 3:])
         spin = np.einsum('nij,nj->ni', rotation, v[:, 3:])
         arm = np.einsum('nij,nj->ni', rotation, boxes.centre[free])

@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What stands by one contact per pair, beside MuJoCo: towers, walls, piles, pallets, a gripper.
+"""What stands by one contact per pair, beside MuJoCo: towers, piles, pallets, a gripper, a yard.
 
 `python -m benchmarks.stacks` runs every scene by `PatchForces`, at several steps, rates and
 latencies, and by MuJoCo with contacts of its own. Both begin with the same boxes, and get the same
@@ -226,6 +226,56 @@ def ratio(heavy: float) -> Scene:
         FLOOR, ((1.0,) * 3, 10.0, (0, 0, 0.5)), ((1.0,) * 3, 10.0 * heavy, (0, 0, 1.5))]), 4.0)
 
 
+def cube_on_four() -> Scene:
+    """Return a cube of 20 m on four of 1 m, all of one density."""
+    feet = [((1.0,) * 3, 500.0, (x, y, 0.5)) for x, y in product((-9.0, 9.0), repeat=2)]
+    return Scene('cube on four, 1:8000', Boxes.of([
+        FLOOR, *feet, ((20.0,) * 3, 8000 * 500.0, (0, 0, 11.0))]), 4.0)
+
+
+def twist_locks() -> Scene:
+    """Return two loaded containers, each on four twist-locks that nothing fastens."""
+    lock, rows, height = (0.16, 0.12, 0.05), [FLOOR], 0.0
+    for _ in range(2):
+        rows += [(lock, 5.0, (x, y, height + 0.5 * lock[2]))
+                 for x, y in product((-5.9, 5.9), (-1.1, 1.1))]
+        rows.append((CONTAINER, 25_000.0, (0, 0, height + lock[2] + 0.5 * CONTAINER[2])))
+        height += lock[2] + CONTAINER[2]
+    return Scene('containers on loose twist-locks', Boxes.of(rows), 5.0)
+
+
+def heap(count: int = 30) -> Scene:
+    """Return bars of any direction, dropped on a heap."""
+    rng, rows = np.random.default_rng(8), [FLOOR]
+    for k in range(count):
+        q = rng.normal(size=4)
+        rows.append(((1.0, 0.1, 0.1), 6.0, (*rng.uniform(-0.3, 0.3, 2), 0.6 + 0.3 * k),
+                     q / np.linalg.norm(q)))
+    return Scene('heap of 30 bars', Boxes.of(rows), 12.0)
+
+
+def packed_pallets(count: int = 3, layers: int = 5) -> Scene:
+    """Return pallets side by side, each with 40 cartons that touch their neighbours."""
+    base, carton, rows = (1.2, 0.8, 0.144), (0.3, 0.4, 0.25), [FLOOR]
+    for k in range(count):
+        corner = np.array([0.0, 0.8 * k, 0.0])
+        rows.append((base, 25.0, corner + 0.5 * np.array(base)))
+        for x, y, z in product(range(4), range(2), range(layers)):
+            rows.append((carton, 9.0, corner + (0.0, 0.0, base[2]) + carton * np.array(
+                [x + 0.5, y + 0.5, z + 0.5])))
+    return Scene('three packed pallets', Boxes.of(rows), 4.0)
+
+
+def turntable() -> Scene:
+    """Return a tower of three cubes on a plate that turns once in ten seconds."""
+    rows = [((6.0, 6.0, 0.2), 0.0, (0.0, 0.0, -0.1))]
+    rows += [((0.5,) * 3, 50.0, (2.0, 0.0, 0.5 * k + 0.25)) for k in range(3)]
+    boxes = Boxes.of(rows)
+    boxes.velocity[:, 5] = 2.0 * math.pi / 10.0
+    boxes.velocity[1:, 1] = 2.0 * boxes.velocity[1:, 5]
+    return Scene('turntable', boxes, 10.0)
+
+
 def slope(kind: str) -> Scene:
     """Return boxes on a slope below the angle of friction and of tipping."""
     degrees = {'plate': 25.0, 'tall': 15.0, 'five': 8.0}[kind]
@@ -304,6 +354,7 @@ SCENES: tuple[Callable[[], Scene], ...] = (
     partial(tower, 20), partial(tower, 20, jitter=0.03), wall, pyramid, pile, bars, mixed, pallet,
     partial(containers, False), partial(containers, True), partial(off_centre, 0.4),
     partial(off_centre, 0.45), partial(ratio, 10.0), partial(ratio, 100.0),
+    cube_on_four, twist_locks, heap, packed_pallets, turntable,
     partial(slope, 'plate'), partial(slope, 'tall'), partial(slope, 'five'),
     *(partial(gripper, force) for force in (2.0, 5.0, 20.0, 50.0)),
     *(partial(real_pallet, order) for order in ORDERS))

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -15,7 +16,7 @@ pytest.importorskip('mujoco')
 
 from benchmarks import settled, stacks
 from benchmarks.loops import MUJOCO, TIMINGS, Boxes, Scene, Timing, corner_speeds, steps
-from benchmarks.stacks import ORDERS, off_centre, ratio, run, sideways, slope, stays
+from benchmarks.stacks import ORDERS, off_centre, ratio, run, sideways, slope, stays, turntable
 from box_contact_ros.scene.forces import GRAVITY
 
 
@@ -33,6 +34,21 @@ def test_a_free_box_turns_about_its_centre_of_mass(timing: Timing | None) -> Non
         [0.3 - 0.3 * np.cos(angle), -0.3 * np.sin(angle)], abs=2e-3)
     assert corner_speeds(boxes).max() == pytest.approx(
         np.hypot(0.5 * GRAVITY, spin * np.hypot(0.8, 1.0)), rel=1e-3)
+
+
+@pytest.mark.parametrize('timing', [None, TIMINGS[0]])
+def test_a_turntable_carries_its_tower(timing: Timing | None) -> None:
+    """The plate keeps its rate, and speeds are relative to it: zero at first, and not after."""
+    scene = replace(turntable(), seconds=0.5)
+    assert corner_speeds(scene.boxes).max() < 1e-15
+    for _ in steps(scene, timing):
+        pass
+    angle = 2.0 * np.arctan2(scene.boxes.pose[0, 5], scene.boxes.pose[0, 6])
+    assert angle == pytest.approx(0.1 * np.pi, rel=1e-6)
+    speeds = corner_speeds(scene.boxes)
+    assert speeds.max() < 0.02
+    scene.boxes.velocity[1:] = 0.0
+    assert corner_speeds(scene.boxes).min() > 1.0
 
 
 @pytest.mark.parametrize('timing', TIMINGS, ids=str)
