@@ -23,7 +23,7 @@ import numpy as np
 
 from box_contact_ros import Body, ContactSolver, PatchForces
 from box_contact_ros.scene.forces import FRICTION, GRAVITY
-from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.solver.pose import rotation_matrix
 
 # MuJoCo would write warnings to a file MUJOCO_LOG.TXT in the working directory.
 mujoco.set_mju_user_warning(logging.getLogger(__name__).warning)
@@ -103,19 +103,6 @@ TIMINGS = (Timing(0.001, 1000.0, 0.0), Timing(0.004, 250.0, 0.0), Timing(0.001, 
 MUJOCO = 'MuJoCo, 1 ms'
 
 
-def move(boxes: Boxes, h: float) -> None:
-    """Advance the poses by their velocities."""
-    arm = np.einsum('nij,nj->ni', rotation_matrix(boxes.pose[:, 3:]), boxes.centre)
-    place = boxes.pose[:, :3] + arm + h * boxes.velocity[:, :3]
-    spin = boxes.velocity[:, 3:]
-    angle = np.linalg.norm(spin, axis=1, keepdims=True) * h
-    turn = np.hstack([0.5 * h * np.sinc(angle / (2 * np.pi)) * spin, np.cos(angle / 2)])
-    q = quaternion_multiply(turn, boxes.pose[:, 3:])
-    boxes.pose[:, 3:] = q / np.linalg.norm(q, axis=1, keepdims=True)
-    boxes.pose[:, :3] = place - np.einsum('nij,nj->ni', rotation_matrix(boxes.pose[:, 3:]),
-                                          boxes.centre)
-
-
 def near_pairs(boxes: Boxes, margin: float) -> np.ndarray:
     """Return the pairs (k, 2) whose bounding boxes come within a margin; one of them moves."""
     half = 0.5 * np.einsum('nij,nj->ni', np.abs(rotation_matrix(boxes.pose[:, 3:])), boxes.size)
@@ -173,9 +160,8 @@ class Ours:
             self.answers.append((self.tick + self.late, self.pairs, contacts, boxes.pose.copy()))
         while self.answers and self.answers[0][0] <= self.tick:
             self.forces.hold(*self.answers.popleft()[1:], age=self.latency)
-        boxes.velocity = self.forces.step(h, boxes.pose, boxes.velocity, outside)
+        boxes.pose, boxes.velocity, _ = self.forces.advance(h, boxes.pose, boxes.velocity, outside)
         self.spent += time.perf_counter() - start
-        move(boxes, h)
         self.tick += 1
 
 

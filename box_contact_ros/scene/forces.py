@@ -4,8 +4,8 @@
 """From contacts to forces: the patches of all pairs as velocity constraints.
 
 A simulator asks for contacts, at every physics step or less often. `PatchForces` takes each answer
-with the poses of the question. At every physics step it then gives the velocities of all
-bodies, or the wrenches that lead to them. One load on fixed boxes is a scene like any other.
+with the poses of the question. At every physics step it then moves all bodies, or gives the
+wrenches that move them. One load on fixed boxes is a scene like any other.
 
 It is a face of code in libbox_contact; docs/explanation/force.md describes the method, sequential
 impulses (Catto, 2005).
@@ -18,13 +18,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core import INERTIA_SLACK, LENGTH_MAX, MASS_MAX, MASS_MIN, native
-from ..solver.checks import as_floats, as_number, as_pairs, as_size, as_whole, short_repr
+from ..core import INERTIA_SLACK, LENGTH_MAX, MASS_MAX, MASS_MIN, THREADS_MAX, native
+from ..solver.checks import as_floats, as_number, as_pairs, as_size, as_whole, as_wholes, short_repr
 from ..solver.contact import Contacts
 
 GRAVITY = 9.81
@@ -77,25 +77,70 @@ class Body:
         return cls(mass=mass, inertia=mass / 12.0 * (squares.sum() - squares))
 
 
+class Motion(NamedTuple):
+    """What a step leads to: a row for each body.
+
+    poses       (n, 7), at the end of the step
+    velocities  (n, 6), at its end
+    wrenches    (n, 6), of contacts: their mean over the step, with what pushes overlaps out; for a
+                simulator that moves the bodies by itself, instead of poses and velocities
+    """
+
+    poses: np.ndarray
+    velocities: np.ndarray
+    wrenches: np.ndarray
+
+
+class Loads(NamedTuple):
+    """What each contact carried, the mean over the last step: a row for each pair of boxes.
+
+    Forces are those on box B; A gets the opposite. All is zero where nothing presses.
+
+    pairs         (k, 2): boxes A and B, by the lower and then the higher one
+    pressing      (k,), along the normal from A to B [N]
+    friction      (k, 3) [N]
+    torsion       (k,), of friction, along the normal [N m]
+    centre        (k, 3), of pressure [m]
+    corners       (k, 4, 3), of the rectangle that stands for the patch, in turn [m]
+    corner_loads  (k, 4): the part of `pressing` at each corner, never below 0 [N]
+    """
+
+    pairs: np.ndarray
+    pressing: np.ndarray
+    friction: np.ndarray
+    torsion: np.ndarray
+    centre: np.ndarray
+    corners: np.ndarray
+    corner_loads: np.ndarray
+
+
 class PatchForces:
     """The forces of patches on all bodies, a physics step at a time, by sequential impulses.
 
     Bodies are known by their places 0 to n − 1, those of the boxes of a `SceneSolver` or of rows of
-    `ContactSolver.batch`. Poses are (n, 7), velocities and wrenches (n, 6).
+    `ContactSolver.batch`. Poses (n, 7) are those of boxes, `x y z qx qy qz qw`. Velocities (n, 6)
+    are linear, of the centre of mass, then angular. Wrenches (n, 6) are a force, then a torque
+    about the centre of mass. All are in the common frame.
+
+    To take a body out of the middle, put the last one in its place, `forget` both, and
+    `set_bodies` without the last.
     """
 
-    def __init__(self, bodies: Sequence[Body], *, friction: float = FRICTION,
-                 iterations: int = 50, relaxations: int = 5) -> None:
+    def __init__(self, bodies: Sequence[Body], *, friction: float = FRICTION, substeps: int = 4,
+                 iterations: int = 4, relaxations: int = 1, threads: int = 1) -> None:
         """Begin without patches.
 
-        friction: Coulomb's μ of pairs without one of their own. iterations: of sequential impulses
-        in a step, at most; relaxations: more of them, which remove the speed of pushing out.
+        friction: Coulomb's μ of pairs without one of their own. substeps: equal parts of a step;
+        heavy bodies on light ones need them. iterations: of sequential impulses in a sub-step, at
+        most; relaxations: more of them, which remove the speed of pushing out. threads: at most;
+        they change no bit.
         ValueError: names the field and its value.
         """
         self._native = native.PatchForces(
-            *_columns(bodies), as_whole(iterations, 'iterations', 1, _MOST),
+            *_columns(bodies), as_whole(substeps, 'substeps', 1, _MOST),
+            as_whole(iterations, 'iterations', 1, _MOST),
             as_whole(relaxations, 'relaxations', 0, _MOST),
-            as_number(friction, 'friction'))
+            as_whole(threads, 'threads', 1, THREADS_MAX), as_number(friction, 'friction'))
 
     def set_bodies(self, bodies: Sequence[Body]) -> None:
         """Change masses, add bodies at the end, or drop bodies there with their patches."""
@@ -131,37 +176,29 @@ class PatchForces:
             None if surface_velocity is None else _as_rows(surface_velocity, 'surface_velocity', 3),
             None if stiffness is None else _as_rows(stiffness, 'stiffness'), *times)
 
-    def step(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
-             wrenches: ArrayLike | None = None) -> np.ndarray:
-        """Return the velocities (n, 6) with which the bodies move during a step of `dt` [s].
+    def advance(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
+                wrenches: ArrayLike | None = None) -> Motion:
+        """Return where the bodies are after a step of `dt` [s], and what contacts did.
 
-        wrenches: all but those of contacts, gravity among them. Call `step` or `wrenches` once
-        a step. Steps of less than 1 s may differ in length.
+        poses, velocities: at its start. wrenches: all but those of contacts, gravity among them.
+        Call `advance` once a step. Steps of less than 1 s may differ in length.
         ValueError: names field and value; nothing changes then.
         """
-        return self._step(dt, poses, velocities, wrenches, False)
-
-    def wrenches(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
-                 wrenches: ArrayLike | None = None) -> np.ndarray:
-        """Return what contacts do (n, 6), for a simulator that integrates by itself.
-
-        They are constant over the step, and lead to the velocities that `step` would return.
-        """
-        return self._step(dt, poses, velocities, wrenches, True)
-
-    def _step(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
-              wrenches: ArrayLike | None, as_wrenches: bool) -> np.ndarray:
         dt = as_number(dt, 'dt')
-        found = self._native.step(dt, poses, velocities, wrenches, as_wrenches)
+        found = self._native.advance(dt, poses, velocities, wrenches)
         if found is None:  # they are not all plain arrays
-            found = self._native.step(
+            found = self._native.advance(
                 dt, _as_rows(poses, 'poses', 7), _as_rows(velocities, 'velocities', 6),
-                None if wrenches is None else _as_rows(wrenches, 'wrenches', 6), as_wrenches)
-        return found
+                None if wrenches is None else _as_rows(wrenches, 'wrenches', 6))
+        return Motion._make(found)
 
-    def forget(self, body: int) -> None:
-        """Forget the patches of one body, which was put elsewhere."""
-        self._native.forget(as_whole(body, 'body', 0, _MOST))
+    def loads(self) -> Loads:
+        """Return what each pair carried in the last step."""
+        return Loads._make(self._native.loads())
+
+    def forget(self, bodies: ArrayLike) -> None:
+        """Forget the patches of bodies (k,), which were put elsewhere."""
+        self._native.forget(as_wholes(bodies, 'bodies'))
 
     def reset(self) -> None:
         """Forget all patches."""

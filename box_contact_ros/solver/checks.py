@@ -138,18 +138,24 @@ def as_floats(value: ArrayLike, name: str, shapes: str, *accepted: tuple[int | N
     raise ValueError(f'{name} must be {shapes}, not an array of shape {array.shape}')
 
 
-def as_pairs(value: ArrayLike, name: str) -> np.ndarray:
-    """Return pairs of whole numbers (n, 2) as a contiguous int64 array."""
+def as_wholes(value: ArrayLike, name: str, *columns: int) -> np.ndarray:
+    """Return whole numbers, rows of so many columns (n, *columns), as a contiguous int64 array."""
     try:
         array = _as_array(value)
     except (TypeError, ValueError, OverflowError):
         array = np.empty((), dtype=object)
     if array.shape == (0,):  # an empty list
-        array = array.reshape(0, 2)
+        array = array.reshape(0, *columns)
     whole = array.dtype.kind in 'iu' or array.size == 0
-    if not whole or array.ndim != 2 or array.shape[1] != 2:
-        raise ValueError(f'{name} must be whole numbers (n, 2), not {short_repr(value)}')
+    if not whole or array.ndim != 1 + len(columns) or array.shape[1:] != columns:
+        shape = f'({", ".join(("n", *map(str, columns)))}{"" if columns else ","})'
+        raise ValueError(f'{name} must be whole numbers {shape}, not {short_repr(value)}')
     return np.require(array, np.int64, ('C', 'A'))  # of 2^63 and more, it makes negative numbers
+
+
+def as_pairs(value: ArrayLike, name: str) -> np.ndarray:
+    """Return pairs of whole numbers (n, 2) as a contiguous int64 array."""
+    return as_wholes(value, name, 2)
 
 
 def as_places(value: ArrayLike, name: str, count: int) -> np.ndarray:

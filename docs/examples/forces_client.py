@@ -5,12 +5,12 @@
 
 Start `box_contact_contact_node` first. The client asks 200 times a second, and its answers come 2
 ms late. `PatchForces` takes each answer with the poses that it was asked for. At every physics step
-it then gives the velocities.
+it then moves the load.
 
 It prints:
 
-    50 ms: -6.99 mm deep, 583.4 mm/s
-    100 ms: 0.14 mm deep, 10.8 mm/s
+    50 ms: -7.00 mm deep, 583.4 mm/s
+    100 ms: 0.14 mm deep, 0.0 mm/s
     200 ms: 0.03 mm deep, 0.0 mm/s
     500 ms: 0.03 mm deep, 0.0 mm/s
     2000 ms: 0.03 mm deep, 0.0 mm/s
@@ -46,13 +46,12 @@ def main() -> None:
             pairs = [(places[a], places[b]) for _, a, b in answer.names]
             forces.hold(np.reshape(pairs, (-1, 2)), answer.contacts, asked,
                         age=1e-3 * LATENCY_MS, period=1e-3 * PERIOD_MS)
-        velocities = forces.step(1e-3 * STEP_MS, poses, velocities, weights)
-        poses[:, :3] += 1e-3 * STEP_MS * velocities[:, :3]
+        poses, velocities, wrenches = forces.advance(1e-3 * STEP_MS, poses, velocities, weights)
         if time in (50, 100, 200, 500, 2000):
             print(f'{time} ms: {1e3 * (2.591 - poses[0, 2]):.2f} mm deep, '
                   f'{1e3 * np.linalg.norm(velocities):.1f} mm/s')
-    wrench = forces.wrenches(1e-3 * STEP_MS, poses, velocities, weights)[0]
-    print(f'force / weight {wrench[2] / (GRAVITY * MASS):.4f}, slid {1e3 * poses[0, 0]:.0f} mm')
+    print(f'force / weight {wrenches[0, 2] / (GRAVITY * MASS):.4f}, '
+          f'slid {1e3 * poses[0, 0]:.0f} mm')
     rclpy.shutdown()
 
 

@@ -10,7 +10,7 @@ It prints:
 
     0.06 s: 0.0 mm deep, 540 mm/s
     0.13 s: 1.9 mm deep, 966 mm/s
-    0.26 s: 1.8 mm deep, 145 mm/s
+    0.26 s: 1.8 mm deep, 146 mm/s
     0.51 s: 0.0 mm deep, 0 mm/s
     1.01 s: 0.0 mm deep, 0 mm/s
     at rest: force / weight 1.0000, tilt below 0.001°: True
@@ -67,8 +67,8 @@ def main() -> None:
             if step == LATE:
                 forces.hold([(0, 1)], contacts, asked, age=LATE * STEP)
             velocities[0] = velocity_of(data)
-            data.xfrc_applied[1] = forces.wrenches(STEP, np.array([pose_of(data), STACK]),
-                                                   velocities, weights)[0]
+            data.xfrc_applied[1] = forces.advance(STEP, np.array([pose_of(data), STACK]),
+                                                  velocities, weights).wrenches[0]
             mujoco.mj_step(model, data)
         if tick in (10, 25, 50, 100, 200):
             print(f'{data.time:.2f} s: {1e3 * max(0.0, -contacts.separation[0]):.1f} mm deep, '

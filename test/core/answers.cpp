@@ -113,16 +113,7 @@ void print_tower() {
     box_contact::collide({poses, poses, sizes, sizes, pairs},
                          {nullptr, separation, normal, point, volume, covariance});
     forces.hold(answer, poses);
-    forces.step(h, poses, velocities, weights, velocities);
-    for (int k = 1; k < count; ++k) {
-      const double *v = velocities[k].linear, *w = velocities[k].angular;
-      double *q = poses[k].quaternion, x = q[0], y = q[1], z = q[2], s = q[3];
-      for (int i = 0; i < 3; ++i) poses[k].position[i] += h * v[i];
-      q[0] += 0.5 * h * (w[0] * s + (w[1] * z - w[2] * y));
-      q[1] += 0.5 * h * (w[1] * s + (w[2] * x - w[0] * z));
-      q[2] += 0.5 * h * (w[2] * s + (w[0] * y - w[1] * x));
-      q[3] -= 0.5 * h * (w[0] * x + (w[1] * y + w[2] * z));
-    }
+    forces.advance(h, poses, velocities, weights);
   }
   for (int k = 0; k < count; ++k) {
     for (double number : poses[k].position) std::printf("%a ", number);

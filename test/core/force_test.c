@@ -59,10 +59,9 @@ static void drop(void) {
       check(bc_patch_forces_hold(forces, &answer, asked) == BC_OK, "hold");
     }
     outside[0].force[0] = step > 1000 ? 40000.0 : 0.0;
-    check(bc_patch_forces_step(forces, 0.001, poses, velocities, outside, velocities, wrenches) ==
-              BC_OK,
-          "step");
-    for (int k = 0; k < 3; ++k) poses[0].position[k] += velocities[0].linear[k] * 0.001;
+    bc_motion motion = {sizeof motion, poses, velocities, wrenches};
+    check(bc_patch_forces_advance(forces, 0.001, poses, velocities, outside, &motion) == BC_OK,
+          "advance");
   }
   for (int k = 0; k < 3; ++k) printf("%a ", poses[0].position[k]);
   for (int k = 0; k < 3; ++k) printf("%a ", wrenches[0].force[k]);
@@ -71,7 +70,8 @@ static void drop(void) {
   check(bc_patch_forces_copy(forces, &copy) == BC_OK, "copy");
   check(bc_patch_forces_bodies(copy) == 2, "its bodies");
   bc_patch_forces_reset(forces);
-  bc_patch_forces_step(forces, 0.001, poses, velocities, outside, NULL, wrenches);
+  bc_motion pushed = {.size = sizeof pushed, .wrenches = wrenches};
+  bc_patch_forces_advance(forces, 0.001, poses, velocities, outside, &pushed);
   check(fabs(wrenches[0].force[2]) < 1.0, "reset");
   int64_t count = bc_patch_forces_save(copy, NULL, 0);
   char* state = malloc((size_t)count);
@@ -79,10 +79,13 @@ static void drop(void) {
   bc_patch_forces_destroy(copy);
   check(bc_patch_forces_load(state, count, &copy) == BC_OK, "load");
   check(bc_patch_forces_load(state, count - 1, &forces) == BC_BAD_ARGUMENT && !forces, "damaged");
-  bc_patch_forces_step(copy, 0.001, poses, velocities, outside, NULL, wrenches);
+  bc_patch_forces_advance(copy, 0.001, poses, velocities, outside, &pushed);
   check(wrenches[0].force[2] > 1e5, "the loaded copy");
-  check(bc_patch_forces_forget(copy, 1) == BC_OK, "forget");
-  bc_patch_forces_step(copy, 0.001, poses, velocities, outside, NULL, wrenches);
+  bc_load load;
+  check(bc_patch_forces_loads(copy, &load, 1) == 1 && load.box_a == 0 && load.box_b == 1, "loads");
+  check(fabs(load.pressing - load.friction[2] - wrenches[0].force[2]) < 10.0, "carried");
+  check(bc_patch_forces_forget(copy, &pair[1], 1) == BC_OK, "forget");
+  bc_patch_forces_advance(copy, 0.001, poses, velocities, outside, &pushed);
   check(fabs(wrenches[0].force[2]) < 1e3, "forgotten");
   free(state);
   bc_patch_forces_destroy(copy);
@@ -128,11 +131,12 @@ static void check_answers(bc_patch_forces* forces, const bc_pose* poses) {
   check(bc_patch_forces_hold(forces, &answer, poses) == BC_BAD_ARGUMENT, "an age");
   bc_velocity velocities[2];
   memset(velocities, 0, sizeof velocities);
-  check(bc_patch_forces_step(forces, 1.0, poses, velocities, NULL, NULL, NULL) == BC_BAD_ARGUMENT,
+  bc_motion motion = {.size = sizeof motion, .velocities = velocities};
+  check(bc_patch_forces_advance(forces, 1.0, poses, velocities, NULL, &motion) == BC_BAD_ARGUMENT,
         "a second");
   check(strstr(bc_error_text(), "below 1 s, not 1") != NULL, "its words");
   velocities[1].angular[2] = 1e60;
-  check(bc_patch_forces_step(forces, 0.1, poses, velocities, NULL, NULL, NULL) == BC_BAD_ARGUMENT,
+  check(bc_patch_forces_advance(forces, 0.1, poses, velocities, NULL, &motion) == BC_BAD_ARGUMENT,
         "too fast");
   check(strstr(bc_error_text(), "velocities[1] has 1e+60") != NULL, "its words");
 }
@@ -159,7 +163,7 @@ static void check_refusals(void) {
   check(bc_patch_forces_hold(forces, &answer, poses) == BC_BAD_ARGUMENT, "no normals");
   answer.size = sizeof answer + 1;
   check(bc_patch_forces_hold(forces, &answer, poses) == BC_BAD_ABI, "another answer");
-  check(bc_patch_forces_step(NULL, 0.001, poses, NULL, NULL, NULL, NULL) == BC_BAD_ARGUMENT,
+  check(bc_patch_forces_advance(NULL, 0.001, poses, NULL, NULL, NULL) == BC_BAD_ARGUMENT,
         "no forces");
   bc_patch_forces_destroy(forces);
   bc_patch_forces_destroy(NULL);

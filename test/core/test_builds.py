@@ -59,12 +59,7 @@ def tower() -> np.ndarray:
                          + [Body.of_box((1, 1, 1), 600.0)] * (count - 1))
     for _ in range(400):
         forces.hold(pairs, solver.batch(poses, sizes=sizes, pairs=pairs), poses)
-        velocities = forces.step(h, poses, velocities, weights)
-        w0, w1, w2 = velocities[:, 3:].T
-        x, y, z, s = poses[:, 3:].T
-        poses += h * np.column_stack([velocities[:, :3], 0.5 * np.column_stack([
-            w0 * s + (w1 * z - w2 * y), w1 * s + (w2 * x - w0 * z), w2 * s + (w0 * y - w1 * x),
-            -(w0 * x + (w1 * y + w2 * z))])])
+        poses, velocities, _ = forces.advance(h, poses, velocities, weights)
     return np.hstack([poses, velocities])
 
 

@@ -410,7 +410,7 @@ def constant(file: str, name: str) -> str:
 HARD = [len(cases.pairs.pose_a) for cases in hard_poses.load().values()]
 LAYERS = [weights.shape for weights, _ in load_mlp().networks[NETWORK].layers]
 STEPS = inspect.signature(PatchForces).parameters
-FORCES, CHORDS, AXIS = 'force/patch_forces.hpp', 'mlp/chords.hpp', 'separating_axis.hpp'
+FORCES, CHORDS, AXIS = 'force/block.hpp', 'mlp/chords.hpp', 'separating_axis.hpp'
 SOFT, LATE, PARALLEL = (constant(file, name) for file, name in (
     (FORCES, 'soft_frequency'), (FORCES, 'late_frequency'), (AXIS, 'parallel')))
 LEVELS = int(constant(CHORDS, 'levels'))
@@ -422,14 +422,18 @@ LIMITS = {
     'contributing/decisions/patch-law.md': (
         f'Frequency of {SOFT}/window', f'Frequency of {LATE}/T',
         f'Damping ratio {constant(FORCES, "soft_damping_ratio")}',
-        f'{STEPS["iterations"].default} iterations'),
+        f'{STEPS["substeps"].default} sub-steps of {STEPS["iterations"].default} iterations'),
     'contributing/decisions/planes.md': (
         f'less than {constant("overlap/planes.hpp", "flush_limit")} of the overlap',),
     'contributing/testing.md': (f'{sum(HARD):,} cases in {len(HARD)} families',),
     'explanation/force.md': (
-        f'up to {STEPS["iterations"].default} times per step',
-        f'Up to {STEPS["relaxations"].default} more iterations',
-        f'the frequency {SOFT}/window', f'{float(SOFT) ** -2:.1f}·g·step² deep',
+        f'has {STEPS["substeps"].default} sub-steps',
+        f'up to {STEPS["iterations"].default} times',
+        f'{STEPS["relaxations"].default} more iteration ',
+        f'{constant("force/rectangle.hpp", "torsion_share")} times the mean',
+        f'last {constant("force/patch_forces.hpp", "intervals_kept")} intervals',
+        f'{1 / float(constant(FORCES, "window_shrinkage"))} of the window before',
+        f'the frequency {SOFT}/window', f'{float(SOFT) ** -2:.1f}·g·h² deep',
         f'the frequency is {LATE}/T', f'g·T²/{float(LATE) ** 2}',
         f'faster than {constant(FORCES, "push_out_limit")} m/s',
         f'overdue by {constant(FORCES, "overdue_periods")} periods'),

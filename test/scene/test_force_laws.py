@@ -8,6 +8,7 @@ import copy
 import math
 import pickle
 from dataclasses import replace
+from hashlib import sha256
 
 import numpy as np
 import pytest
@@ -51,14 +52,12 @@ class World:
 
     def wrenches(self) -> np.ndarray:
         """Return the wrenches of the next step, by a copy that takes it."""
-        return copy.copy(self.forces).wrenches(STEP, self.poses, self.velocities, self.outside)
+        return copy.copy(self.forces).advance(
+            STEP, self.poses, self.velocities, self.outside).wrenches
 
     def step(self, dt: float = STEP) -> None:
-        self.velocities = self.forces.step(dt, self.poses, self.velocities, self.outside)
-        self.poses[:, :3] += dt * self.velocities[:, :3]
-        turns = np.hstack([0.5 * dt * self.velocities[:, 3:], np.ones((len(self.poses), 1))])
-        turned = quaternion_multiply(turns, self.poses[:, 3:])
-        self.poses[:, 3:] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+        self.poses, self.velocities, _ = self.forces.advance(
+            dt, self.poses, self.velocities, self.outside)
 
     def run(self, steps: int, **rows) -> World:
         for _ in range(steps):
@@ -118,7 +117,8 @@ def test_a_centre_of_mass_beyond_the_edge_tips() -> None:
         world.poses[0, 0] = -9.5
         world.hold()
         before = world.velocities[1].copy()
-        after = world.forces.step(STEP, world.poses, world.velocities, world.outside)[1]
+        world.step()
+        after = world.velocities[1]
         assert (abs(after[4] - before[4]) > 1e-4) == tips
 
 
@@ -192,7 +192,7 @@ def test_remainders_of_a_frame_do_no_harm() -> None:
             t += dt
             shortest = min(shortest, dt)
     assert 0.0 < shortest < 1e-17
-    assert world.poses[-1, 2] + 0.5 == pytest.approx(9.99005, abs=1e-5)
+    assert world.poses[-1, 2] + 0.5 == pytest.approx(9.99938, abs=1e-5)
     assert np.abs(world.velocities).max() < 1e-9
 
 
@@ -254,28 +254,27 @@ def two_free(**options: int) -> World:
 def test_momentum_is_conserved(relaxations: int) -> None:
     """Of two free bodies, linear and angular, in each step.
 
-    Relaxation acts a step later, when the arms have changed by the way of that step.
+    Relaxation acts at the end of a sub-step, with the arms of its beginning.
     """
     world = two_free(relaxations=relaxations)
 
-    def momentum(velocities: np.ndarray) -> np.ndarray:
+    def momentum() -> np.ndarray:
         rotation = rotation_matrix(world.poses[1:, 3:])
         inertia = np.einsum('nij,j,nkj->nik', rotation, world.bodies[1].inertia, rotation)
-        spin = np.einsum('nij,nj->ni', inertia, velocities[1:, 3:])
-        linear = MASS * velocities[1:, :3]
+        spin = np.einsum('nij,nj->ni', inertia, world.velocities[1:, 3:])
+        linear = MASS * world.velocities[1:, :3]
         return np.concatenate([linear.sum(axis=0),
                                (np.cross(world.poses[1:, :3], linear) + spin).sum(axis=0)])
 
     touched = False
     for _ in range(20):
         world.hold()
-        after = world.forces.step(STEP, world.poses, world.velocities)
-        touched |= bool(np.abs(after - world.velocities).max() > 1e-3)
-        change = np.abs(momentum(after) - momentum(world.velocities))
+        before, velocities = momentum(), world.velocities
+        world.step()
+        touched |= bool(np.abs(world.velocities - velocities).max() > 1e-3)
+        change = np.abs(momentum() - before)
         assert change[:3].max() < 1e-9 * MASS
-        assert change[3:].max() < (1e-2 if relaxations else 1e-9) * MASS
-        world.velocities = after
-        world.poses[:, :3] += STEP * after[:, :3]
+        assert change[3:].max() < (1e-3 if relaxations else 1e-9) * MASS
     assert touched
 
 
@@ -297,15 +296,16 @@ def test_energy_is_not_gained() -> None:
 
 def test_wrenches_lead_to_the_velocities() -> None:
     """Impulse divided by the step: a foreign integrator gets the same motion."""
-    world = two_free()
+    world = two_free(relaxations=0)
     world.hold()
-    wrenches = copy.copy(world.forces).wrenches(STEP, world.poses, world.velocities, world.outside)
-    after = world.forces.step(STEP, world.poses, world.velocities, world.outside)
-    assert np.abs(wrenches).max() > 1.0
-    assert world.velocities[1:, :3] + STEP * wrenches[1:, :3] / MASS == pytest.approx(after[1:, :3])
+    before = world.velocities
+    motion = world.forces.advance(STEP, world.poses, before, world.outside)
+    assert np.abs(motion.wrenches).max() > 1.0
+    assert before[1:, :3] + STEP * motion.wrenches[1:, :3] / MASS == pytest.approx(
+        motion.velocities[1:, :3])
     # A cube's inertia is the same about all axes, and there is no gyroscopic torque.
-    assert world.velocities[1:, 3:] + STEP * wrenches[1:, 3:] / (MASS / 6.0) == pytest.approx(
-        after[1:, 3:])
+    assert before[1:, 3:] + STEP * motion.wrenches[1:, 3:] / (MASS / 6.0) == pytest.approx(
+        motion.velocities[1:, 3:])
 
 
 def test_swapping_a_and_b_changes_nothing() -> None:
@@ -327,6 +327,46 @@ def test_the_order_of_pairs_changes_no_bit() -> None:
     assert one.velocities.tobytes() == two.velocities.tobytes()
 
 
+def jumble(**options: int) -> World:
+    return World(pose(z=0.51, turn=(0.01, 0.02, 0.1, 1.0)),
+                 pose(0.2, 0.1, 1.53, (0.03, -0.01, 0.3, 1.0)),
+                 pose(-0.1, 0.3, 2.54, (0.0, 0.02, 0.7, 1.0)), substeps=1, iterations=50, **options)
+
+
+def move(world: World) -> None:
+    """Move the boxes of a world by their velocities."""
+    world.poses = world.poses.copy()
+    world.poses[:, :3] += STEP * world.velocities[:, :3]
+    turns = np.hstack([0.5 * STEP * world.velocities[:, 3:], np.ones((len(world.poses), 1))])
+    turned = quaternion_multiply(turns, world.poses[:, 3:])
+    world.poses[:, 3:] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+
+
+def test_one_sub_step_has_recorded_bits() -> None:
+    """Of three cubes that fall askew: velocities without relaxation, and by wrenches with it.
+
+    Both are those of the sequential impulses without sub-steps that came before.
+    """
+    world = jumble(relaxations=0)
+    for _ in range(40):
+        world.hold()
+        world.velocities = world.forces.advance(
+            STEP, world.poses, world.velocities, world.outside).velocities
+        move(world)
+    assert sha256(world.velocities.tobytes()).hexdigest()[:16] == 'a19fcee2a9811dc9'
+    world = jumble(relaxations=5)
+    for _ in range(40):
+        world.hold()
+        world.velocities = world.velocities.copy()
+        forces = world.outside + world.forces.advance(
+            STEP, world.poses, world.velocities, world.outside).wrenches
+        world.velocities[1:, :3] += STEP / MASS * forces[1:, :3]
+        world.velocities[1:, 3:] += STEP * 0.06 * forces[1:, 3:]
+        move(world)
+    assert world.velocities[3] == pytest.approx([
+        0.00859439, 0.0269045, -0.33086803, 0.17994792, -0.11310356, 0.0480498], abs=1e-8)
+
+
 # --- bodies and answers ---------------------------------------------------------------------------
 
 
@@ -337,12 +377,13 @@ def pair_of_stacks() -> World:
 def test_one_body_is_forgotten_without_the_others() -> None:
     """The neighbours keep their impulses, so nothing but the body's own patches starts anew."""
     world, same = pair_of_stacks(), pair_of_stacks()
-    world.forces.forget(4)
+    world.forces.forget([4])
     for each in (world, same):
         each.pairs = each.pairs[(each.pairs != 4).all(axis=1)]
         each.hold()
-    after, expected = (each.forces.step(STEP, each.poses, each.velocities, each.outside)
-                       for each in (world, same))
+    for each in (world, same):
+        each.step()
+    after, expected = world.velocities, same.velocities
     assert after[1:3].tobytes() == expected[1:3].tobytes()
     assert after[4, 2] == pytest.approx(-GRAVITY * STEP, rel=1e-3)
 
@@ -355,7 +396,8 @@ def test_bodies_enter_leave_and_change_mass() -> None:
     world.run(300)
     assert world.wrenches()[2, 2] == pytest.approx(3.0 * WEIGHT, rel=1e-6)
     world.forces.set_bodies([FIXED, world.bodies[1]])
-    found = world.forces.wrenches(STEP, world.poses[:2], world.velocities[:2], world.outside[:2])
+    found = world.forces.advance(
+        STEP, world.poses[:2], world.velocities[:2], world.outside[:2]).wrenches
     assert found.shape == (2, 6) and found[1, 2] > 0.0
 
 
@@ -381,17 +423,20 @@ def test_a_stale_pair_keeps_its_patch() -> None:
 def test_an_overdue_answer_pushes_nothing_out(steps: int) -> None:
     """Of a cube 20 mm deep: with answers at 200 Hz, pushing ends three periods after the last."""
     world = World(pose(z=0.48), gravity=(0, 0, 0))
+
+    def push() -> float:
+        world.step()
+        way = world.poses[1, 2] - 0.48
+        world.poses[1, 2], world.velocities[1] = 0.48, 0.0
+        return way
+
     for _ in range(3):
         world.hold()
-        world.poses[1, 2] = 0.48
         for _ in range(5):
-            world.step()
-            world.poses[1, 2], world.velocities[1] = 0.48, 0.0
+            push()
     for _ in range(steps):
-        world.step()
-        world.poses[1, 2], world.velocities[1] = 0.48, 0.0
-    world.step()
-    assert (world.velocities[1, 2] > 1e-3) == (steps == 2)
+        push()
+    assert (push() > 1e-3 * STEP) == (steps == 2)
 
 
 def test_a_late_answer_does_not_throw() -> None:
@@ -408,6 +453,27 @@ def test_a_late_answer_does_not_throw() -> None:
     assert abs(world.poses[1, 2] - 0.5) < 2e-3
 
 
+@pytest.mark.parametrize('foreign', [False, True])
+def test_late_answers_level_a_load(foreign: bool) -> None:
+    """Contacts at 50 Hz, 5 ms late, lay a tilted cube flat in 1.5 s, g·T²/6.25 deep, T = 15 ms."""
+    world = World(pose(z=0.55, turn=(0.01, 0.02, 0.0, 1.0)))
+    for tick in range(1500):
+        if tick % 20 == 0:
+            asked = world.contacts(), world.poses.copy()
+        if tick % 20 == 5:
+            world.forces.hold(world.pairs, *asked, age=0.005, period=0.02)
+        if not foreign:
+            world.step()
+            continue
+        wrenches = world.outside + world.forces.advance(
+            STEP, world.poses, world.velocities, world.outside).wrenches
+        world.velocities = world.velocities + STEP / MASS * wrenches * [1, 1, 1, 6, 6, 6]
+        move(world)
+    up = rotation_matrix(world.poses[1:, 3:])[0, :, 2]
+    assert np.hypot(up[0], up[1]) < 1e-9
+    assert 0.5 - world.poses[1, 2] == pytest.approx(GRAVITY * 0.015**2 / 6.25, rel=1e-3)
+
+
 # --- state ----------------------------------------------------------------------------------------
 
 
@@ -422,7 +488,7 @@ def test_copies_continue_bit_by_bit() -> None:
         velocities = world.velocities
         for _ in range(3):
             twin.hold(world.pairs, contacts, world.poses)
-            velocities = twin.step(STEP, world.poses, velocities, world.outside)
+            velocities = twin.advance(STEP, world.poses, velocities, world.outside).velocities
         found.append(velocities.tobytes())
     assert len(set(found)) == 1
     assert len({bytes(twin) for twin in twins}) == 1
@@ -448,7 +514,9 @@ def test_reset_forgets_all() -> None:
 
 def landed(turn=(0.0, 0.0, 0.0, 1.0), shift=(0.0, 0.0, 0.0), carrier=(0.0, 0.0, 0.0),
            factor: float = 1.0) -> np.ndarray:
-    """Return where two tilted boxes are, .4 s after they were let go, one upon the other.
+    """Return where two tilted boxes are, 0.14 s after they were let go, one upon the other.
+
+    Both have hit what is below them. Later they tumble, which magnifies rounding.
 
     All is moved and turned, on a carrier at a speed [m/s], and masses are multiplied; the poses
     returned are as if they were not.
@@ -461,9 +529,9 @@ def landed(turn=(0.0, 0.0, 0.0, 1.0), shift=(0.0, 0.0, 0.0), carrier=(0.0, 0.0, 
     world.poses[:, :3] = world.poses[:, :3] @ rotation.T + shift
     world.velocities[:, :3] = carrier
     world.outside[:, :3] = world.outside[:, :3] @ rotation.T
-    world.run(400)
+    world.run(140)
     found = world.poses.copy()
-    found[:, :3] = (found[:, :3] - shift - 0.4 * np.array(carrier)) @ rotation
+    found[:, :3] = (found[:, :3] - shift - 0.14 * np.array(carrier)) @ rotation
     back = np.tile(turn * (-1, -1, -1, 1), (3, 1))
     found[:, 3:] = quaternion_multiply(back, found[:, 3:])
     return found / np.hstack([np.ones((3, 6)), np.sign(found[:, 6:])])

@@ -103,8 +103,11 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: PatchForces([], iterations=2**40), 'iterations', str(2**40)),
     (lambda: PatchForces([], relaxations=1.5), 'relaxations', '1.5'),
     (lambda: FORCES.set_bodies([None]), 'bodies[0]', 'None'),
-    (lambda: FORCES.forget(2), 'body', '2'),
-    (lambda: FORCES.forget('a'), 'body', "'a'"),
+    (lambda: PatchForces([], substeps=0), 'substeps', '0'),
+    (lambda: PatchForces([], threads=1025), 'threads', '1025'),
+    (lambda: FORCES.forget([2]), 'bodies[0]', '2'),
+    (lambda: FORCES.forget(['a']), 'bodies', "['a']"),
+    (lambda: FORCES.forget(1), 'bodies', '1'),
     (lambda: PatchForces.from_bytes('text'), 'state', "'text'"),
     (lambda: PatchForces.from_bytes(b'text'), 'state', '4 bytes'),
 
@@ -131,14 +134,14 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: hold(surface_velocity=[(0, 0)]), 'surface_velocity', '(1, 2)'),
     (lambda: hold(age='1'), 'age', "'1'"),
     (lambda: hold(period=-0.1), 'period', '-0.1'),
-    (lambda: FORCES.step(1.0, POSES, STILL), 'dt', '1'),
-    (lambda: FORCES.step(0.0, POSES, STILL), 'dt', '0'),
-    (lambda: FORCES.step('1', POSES, STILL), 'dt', "'1'"),
-    (lambda: FORCES.step(0.1, POSES[:1], STILL), 'poses', '(1, 7)'),
-    (lambda: FORCES.step(0.1, POSES, STILL + INF), 'velocities[0]', 'inf'),
-    (lambda: FORCES.step(0.1, POSES, STILL + 1e200), 'velocities[0]', '1e+200'),
-    (lambda: FORCES.wrenches(0.1, POSES, STILL, STILL + NAN), 'wrenches[0]', 'nan'),
-    (lambda: FORCES.wrenches(0.1, POSES, STILL[:, :5]), 'velocities', '(2, 5)'),
+    (lambda: FORCES.advance(1.0, POSES, STILL), 'dt', '1'),
+    (lambda: FORCES.advance(0.0, POSES, STILL), 'dt', '0'),
+    (lambda: FORCES.advance('1', POSES, STILL), 'dt', "'1'"),
+    (lambda: FORCES.advance(0.1, POSES[:1], STILL), 'poses', '(1, 7)'),
+    (lambda: FORCES.advance(0.1, POSES, STILL + INF), 'velocities[0]', 'inf'),
+    (lambda: FORCES.advance(0.1, POSES, STILL + 1e200), 'velocities[0]', '1e+200'),
+    (lambda: FORCES.advance(0.1, POSES, STILL, STILL + NAN), 'wrenches[0]', 'nan'),
+    (lambda: FORCES.advance(0.1, POSES, STILL[:, :5]), 'velocities', '(2, 5)'),
 
     (lambda: Box((1, 2, -1)), 'size', '(1, 2, -1)'),
     (lambda: Box(('1', '2', '3')), 'size', "('1', '2', '3')"),
@@ -225,9 +228,9 @@ class Traitor:
 
 def test_bodies_that_change_while_arrays_are_read() -> None:
     """Rows are counted after all is converted: more bodies would read and write past the arrays."""
-    for call in (lambda forces: forces.step(0.1, Traitor(forces, POSES), STILL),
-                 lambda forces: forces.step(0.1, POSES, Traitor(forces, STILL)),
-                 lambda forces: forces.wrenches(0.1, POSES, STILL, Traitor(forces, STILL)),
+    for call in (lambda forces: forces.advance(0.1, Traitor(forces, POSES), STILL),
+                 lambda forces: forces.advance(0.1, POSES, Traitor(forces, STILL)),
+                 lambda forces: forces.advance(0.1, POSES, STILL, Traitor(forces, STILL)),
                  lambda forces: forces.hold([(0, 1)], CONTACTS, Traitor(forces, POSES))):
         with pytest.raises(ValueError, match='poses must be an array of shape'):
             call(PatchForces([BODY, BODY]))
@@ -243,7 +246,8 @@ def test_the_limits_themselves_are_accepted() -> None:
         forces = PatchForces(bodies)
         forces.hold([(0, 1)], thin, POSES)
         for dt in (1e-50, np.nextafter(1.0, 0.0), np.float32(0.1)):
-            assert np.isfinite(forces.step(dt, POSES, STILL)).all()
+            assert all(np.isfinite(rows).all() for rows in forces.advance(dt, POSES, STILL))
+            assert all(np.isfinite(columns).all() for columns in forces.loads())
         assert bytes(PatchForces.from_bytes(bytes(forces))) == bytes(forces)
     SOLVER.batch(POSES, POSES, threads=1024)
 
@@ -252,8 +256,8 @@ def test_a_saved_state_keeps_the_limits() -> None:
     """Each number of a state replaced by NaN, by minus 1e200 and by zero: refused, or harmless."""
     forces = PatchForces([BODY, BODY])
     forces.hold([(0, 1)], CONTACTS, POSES)
-    forces.step(0.01, POSES, STILL)
-    state, head = bytes(forces), 3 * 8
+    forces.advance(0.01, POSES, STILL)
+    state, head = bytes(forces), 4 * 8
     refused = 0
     for at in range(head, len(state), 8):
         for number in (NAN, -1e200, 0.0):
@@ -264,5 +268,5 @@ def test_a_saved_state_keeps_the_limits() -> None:
                 assert 'state' in str(error)
                 refused += number != 0.0
             else:
-                assert np.isfinite(changed.step(0.01, POSES, STILL)).all()
+                assert all(np.isfinite(rows).all() for rows in changed.advance(0.01, POSES, STILL))
     assert refused > 1.8 * (len(state) - head) / 8

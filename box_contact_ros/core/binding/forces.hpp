@@ -39,8 +39,9 @@ inline std::vector<bc_body> read_bodies(PyObject* masses, PyObject* inertias, Py
 inline PyObject* forces_new(PyTypeObject* type, PyObject* args, PyObject*) {
   PyObject *masses, *inertias, *centres;
   bc_force_options options = BC_DEFAULT_FORCE_OPTIONS;
-  if (!PyArg_ParseTuple(args, "OOOiid:PatchForces", &masses, &inertias, &centres,
-                        &options.iterations, &options.relaxations, &options.friction))
+  if (!PyArg_ParseTuple(args, "OOOiiiid:PatchForces", &masses, &inertias, &centres,
+                        &options.substeps, &options.iterations, &options.relaxations,
+                        &options.threads, &options.friction))
     return nullptr;
   std::vector<bc_body> bodies = read_bodies(masses, inertias, centres);
   bc_patch_forces* forces;
@@ -55,7 +56,7 @@ inline PyObject* forces_set_bodies(PyObject* self, PyObject* const* args, Py_ssi
   Py_RETURN_NONE;
 }
 
-// Arguments of `hold` and `step` are plain arrays, or Python converts them before it calls. No code of
+// Arguments of `hold` and `advance` are plain arrays, or Python converts them before it calls. No code of
 // Python's runs between the count of bodies and the use of the arrays: it could change the bodies.
 
 // The array of a row for each body or contact, if any.
@@ -98,11 +99,16 @@ inline PyObject* forces_hold(PyObject* self, PyObject* const* args, Py_ssize_t c
   Py_RETURN_TRUE;
 }
 
-inline PyObject* forces_step(PyObject* self, PyObject* const* args, Py_ssize_t count) {
-  if (count != 5) fail(PyExc_TypeError, "step(dt, poses, velocities, outside, as_wrenches)");
+// An array of the numbers of structs.
+template <class Struct>
+Struct* rows_of(const Array<double>& array) {
+  return reinterpret_cast<Struct*>(array.numbers);
+}
+
+inline PyObject* forces_advance(PyObject* self, PyObject* const* args, Py_ssize_t count) {
+  if (count != 4) fail(PyExc_TypeError, "advance(dt, poses, velocities, outside)");
   double dt = PyFloat_AsDouble(args[0]);
   if (PyErr_Occurred()) return nullptr;
-  bool as_wrenches = truth_of(args[4]);
   Array<double> poses, velocities, outside;
   if (!read_plain(args[1], poses) || !read_plain(args[2], velocities) ||
       !read_plain(args[3], outside) || !poses.object || !velocities.object)
@@ -111,18 +117,41 @@ inline PyObject* forces_step(PyObject* self, PyObject* const* args, Py_ssize_t c
   check_rows(poses, "poses", {bodies, 7});
   check_rows(velocities, "velocities", {bodies, 6});
   check_rows(outside, "wrenches", {bodies, 6});
-  auto found = make<double>({bodies, 6});
-  check(bc_patch_forces_step(
-      forces_of(self), dt, reinterpret_cast<const bc_pose*>(poses.numbers),
-      reinterpret_cast<const bc_velocity*>(velocities.numbers),
-      reinterpret_cast<const bc_wrench*>(outside.numbers),
-      as_wrenches ? nullptr : reinterpret_cast<bc_velocity*>(found.numbers),
-      as_wrenches ? reinterpret_cast<bc_wrench*>(found.numbers) : nullptr));
-  return found.object.release();
+  auto moved = make<double>({bodies, 7}), after = make<double>({bodies, 6});
+  auto wrenches = make<double>({bodies, 6});
+  bc_motion motion{sizeof(bc_motion), rows_of<bc_pose>(moved), rows_of<bc_velocity>(after),
+                   rows_of<bc_wrench>(wrenches)};
+  check(bc_patch_forces_advance(forces_of(self), dt, rows_of<bc_pose>(poses),
+                                rows_of<bc_velocity>(velocities), rows_of<bc_wrench>(outside),
+                                &motion));
+  return pack(&PyTuple_Type, moved, after, wrenches);
 }
 
-inline PyObject* forces_forget(PyObject* self, PyObject* body) {
-  check(bc_patch_forces_forget(forces_of(self), whole_of(body)));
+inline PyObject* forces_loads(PyObject* self, PyObject*) {
+  std::vector<bc_load> loads(size_t(bc_patch_forces_loads(forces_of(self), nullptr, 0)));
+  auto n = npy_intp(loads.size());
+  bc_patch_forces_loads(forces_of(self), loads.data(), int64_t(n));
+  auto pairs = make<int64_t>({n, 2});
+  auto pressing = make<double>({n}), friction = make<double>({n, 3}), torsion = make<double>({n});
+  auto centre = make<double>({n, 3}), corners = make<double>({n, 4, 3});
+  auto corner_loads = make<double>({n, 4});
+  for (npy_intp k = 0; k < n; ++k) {
+    const bc_load& load = loads[size_t(k)];
+    pairs.numbers[2 * k] = load.box_a;
+    pairs.numbers[2 * k + 1] = load.box_b;
+    pressing.numbers[k] = load.pressing;
+    torsion.numbers[k] = load.torsion;
+    std::memcpy(friction.numbers + 3 * k, load.friction, sizeof load.friction);
+    std::memcpy(centre.numbers + 3 * k, load.centre, sizeof load.centre);
+    std::memcpy(corners.numbers + 12 * k, load.corners, sizeof load.corners);
+    std::memcpy(corner_loads.numbers + 4 * k, load.corner_loads, sizeof load.corner_loads);
+  }
+  return pack(&PyTuple_Type, pairs, pressing, friction, torsion, centre, corners, corner_loads);
+}
+
+inline PyObject* forces_forget(PyObject* self, PyObject* bodies) {
+  auto places = read<int64_t>(bodies, "bodies", {any_length});
+  check(bc_patch_forces_forget(forces_of(self), places.numbers, places.length(0)));
   Py_RETURN_NONE;
 }
 
@@ -154,18 +183,21 @@ inline PyMethodDef forces_methods[] = {
      "hold(pairs, separation, normal, point, volume, covariance, poses, friction, surface, "
      "stiffness, age, period)\n--\n\nTake the arrays of an answer; None for the last three.\n\n"
      "Return False, and change nothing, where one is no plain array."},
-    {"step", method<forces_step>(), METH_FASTCALL,
-     "step(dt, poses, velocities, outside, as_wrenches)\n--\n\nReturn velocities or wrenches (n, "
-     "6).\n\nReturn None, and change nothing, where one is no plain array."},
-    {"forget", method<forces_forget>(), METH_O, "forget(body)\n--\n\nForget a body's patches."},
+    {"advance", method<forces_advance>(), METH_FASTCALL,
+     "advance(dt, poses, velocities, outside)\n--\n\nReturn poses (n, 7), velocities and wrenches "
+     "(n, 6).\n\nReturn None, and change nothing, where one is no plain array."},
+    {"loads", method<forces_loads>(), METH_NOARGS,
+     "loads()\n--\n\nReturn the columns of what each pair carried."},
+    {"forget", method<forces_forget>(), METH_O,
+     "forget(bodies)\n--\n\nForget the patches of bodies (k,)."},
     {"reset", method<forces_reset>(), METH_NOARGS, "reset()\n--\n\nForget all patches."},
     {"save", method<forces_save>(), METH_NOARGS, "save()\n--\n\nReturn the state as bytes."},
     {"load", method<forces_load>(), METH_O | METH_CLASS,
      "load(bytes)\n--\n\nReturn forces of saved bytes."},
     {nullptr, nullptr, 0, nullptr}};
 inline PyType_Slot forces_slots[] = {
-    {Py_tp_doc, const_cast<char*>("PatchForces(mass, inertia, centre, iterations, relaxations, "
-                                  "friction)\n--\n\nPatches as velocity constraints. See force.h.")},
+    {Py_tp_doc, const_cast<char*>("PatchForces(mass, inertia, centre, substeps, iterations, "
+                                  "relaxations, threads, friction)\n--\n\nPatches as velocity constraints. See force.h.")},
     {Py_tp_new, slot<forces_new>()},
     {Py_tp_dealloc, reinterpret_cast<void*>(Holder<Forces>::dealloc)},
     {Py_tp_methods, forces_methods},

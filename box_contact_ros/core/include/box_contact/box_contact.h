@@ -33,7 +33,7 @@ extern "C" {
 #endif
 
 /* Raised by a change that a compiled program cannot follow. `bc_abi` is that of the library. */
-#define BC_ABI 2
+#define BC_ABI 3
 
 typedef enum bc_status {
   BC_OK = 0,

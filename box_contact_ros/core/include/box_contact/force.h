@@ -4,7 +4,7 @@
 /* From contacts to forces, by sequential impulses. For C and C++.
  *
  * A simulator gives each answer to the forces, with the poses for which it was asked. At every
- * physics step they return the velocities of the bodies, or the wrenches that lead to them.
+ * physics step they return where the bodies go, or the wrenches that move them.
  *
  *   bc_body bodies[2] = {{20000.0, {2.1e4, 2.6e5, 2.6e5}, {0, 0, 0}}, {0}};   a load, a fixed box
  *   bc_patch_forces* forces;
@@ -12,13 +12,15 @@
  *   bc_patches answer = {sizeof(bc_patches), 1, pairs, separation, normal, point, volume,
  *                       covariance, NULL, NULL, NULL, 0.0, 0.0};
  *   bc_patch_forces_hold(forces, &answer, poses);
- *   bc_patch_forces_step(forces, 0.001, poses, velocities, weights, velocities, NULL);
+ *   bc_motion motion = {sizeof(bc_motion), poses, velocities, NULL};
+ *   bc_patch_forces_advance(forces, 0.001, poses, velocities, weights, &motion);
  *
  * A body is known by its place, 0 to count − 1. Its pose is that of its box, as the solver takes it.
  * Velocities and wrenches are in the common frame, at and about the centre of mass.
  * docs/explanation/force.md has the equations. One thread at a time may use an object.
- * `bc_patch_forces_hold` and `bc_patch_forces_step` allocate no memory once as many pairs have been
- * held. The bits are the same on all instruction sets.
+ * `bc_patch_forces_hold` allocates no memory once as many pairs have been held, and
+ * `bc_patch_forces_advance` by one thread none at all. The bits are the same on all instruction sets,
+ * and for any number of threads.
  */
 #ifndef BOX_CONTACT_FORCE_H
 #define BOX_CONTACT_FORCE_H
@@ -68,12 +70,36 @@ typedef struct bc_patches {
 
 typedef struct bc_force_options {
   size_t size;     /* sizeof(bc_force_options) */
-  int iterations;  /* of sequential impulses in a step, at most */
+  int substeps;    /* equal parts of an advance; heavy bodies on light ones need them */
+  int iterations;  /* of sequential impulses in a sub-step, at most */
   int relaxations; /* iterations more, at most, which remove the speed of pushing out */
+  int threads;     /* 1 to 1,024; bodies that patches join are moved by one of them */
   double friction; /* Coulomb's μ [1] */
 } bc_force_options;
 
-#define BC_DEFAULT_FORCE_OPTIONS {sizeof(bc_force_options), 50, 5, 0.5}
+#define BC_DEFAULT_FORCE_OPTIONS {sizeof(bc_force_options), 4, 4, 1, 1, 0.5}
+
+/* What an advance leads to: arrays of a row for each body; NULL: not wanted. The poses and velocities
+ * may be those that are given. */
+typedef struct bc_motion {
+  size_t size; /* sizeof(bc_motion) */
+  bc_pose* poses;
+  bc_velocity* velocities; /* after relaxation */
+  bc_wrench* wrenches;     /* of contacts, for a simulator that moves the bodies by itself: constant
+                              over the step, and with what pushes overlaps out */
+} bc_motion;
+
+/* What the contact of two boxes carried: the mean over the last advance, after relaxation. All forces
+ * are those on box B; A gets the opposite. All is zero where nothing presses. */
+typedef struct bc_load {
+  int64_t box_a, box_b;
+  double pressing;        /* along the normal, from A to B [N] */
+  double friction[3];     /* [N] */
+  double torsion;         /* of friction, along the normal [N m] */
+  double centre[3];       /* of pressure [m] */
+  double corners[4][3];   /* of the patch's rectangle: ++, +-, --, -+ along its axes 1 and 2 [m] */
+  double corner_loads[4]; /* the part of `pressing` at each corner; never below 0 [N] */
+} bc_load;
 
 typedef struct bc_patch_forces bc_patch_forces;
 
@@ -88,8 +114,9 @@ BC_API int64_t bc_patch_forces_bodies(const bc_patch_forces* forces); /* how man
 /* Change masses, add bodies at the end, or drop bodies there with their patches. */
 BC_API bc_status bc_patch_forces_set_bodies(bc_patch_forces* forces, const bc_body* bodies,
                                             int64_t count);
-/* Forget the patches of one body, which was put elsewhere, or all patches. */
-BC_API bc_status bc_patch_forces_forget(bc_patch_forces* forces, int64_t body);
+/* Forget the patches of bodies, which were put elsewhere, or all patches. */
+BC_API bc_status bc_patch_forces_forget(bc_patch_forces* forces, const int64_t* bodies,
+                                        int64_t count);
 BC_API void bc_patch_forces_reset(bc_patch_forces* forces);
 
 /* Take an answer, asked for at `poses` (one for each body). Pairs that are left out are forgotten.
@@ -98,13 +125,17 @@ BC_API void bc_patch_forces_reset(bc_patch_forces* forces);
 BC_API bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches* answer,
                                       const bc_pose* poses);
 
-/* Take a step of `dt` seconds: 1e-50 or more, and less than 1. Steps may differ in length. `outside`
- * are the wrenches beside those of contacts, gravity among them; NULL: none. `after` are the
- * velocities with which the bodies move during the step; `wrenches` are those of contacts, constant
- * over the step, that lead to them. Either may be NULL, and `after` may be `velocities`. */
-BC_API bc_status bc_patch_forces_step(bc_patch_forces* forces, double dt, const bc_pose* poses,
-                                      const bc_velocity* velocities, const bc_wrench* outside,
-                                      bc_velocity* after, bc_wrench* wrenches);
+/* Advance by `dt` seconds: 1e-50 or more, and less than 1. Steps may differ in length. `outside` are
+ * the wrenches beside those of contacts, gravity among them, constant over the step; NULL: none.
+ * Bodies whose velocities come back as they were returned go on. Those that come back with the
+ * velocities to which the wrenches led first lose the speed of pushing out: the nearer counts. */
+BC_API bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, const bc_pose* poses,
+                                         const bc_velocity* velocities, const bc_wrench* outside,
+                                         const bc_motion* motion);
+
+/* Write what each pair carried, by the lower and the higher box, and return how many there are; nothing
+ * is written if `capacity` is less. */
+BC_API int64_t bc_patch_forces_loads(const bc_patch_forces* forces, bc_load* loads, int64_t capacity);
 
 /* Write the state as bytes, for machines of the same byte order, and return how many there are;
  * nothing is written if `capacity` is less. Make forces of such bytes: BC_BAD_ARGUMENT for other bytes,

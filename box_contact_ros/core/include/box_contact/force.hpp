@@ -4,8 +4,8 @@
 // From contacts to forces in C++17, by sequential impulses.
 //
 //   box_contact::PatchForces forces(bodies);
-//   forces.hold(answer, poses);                                     // when an answer comes
-//   forces.step(0.001, poses, velocities, weights, velocities);     // at every physics step
+//   forces.hold(answer, poses);                             // when an answer comes
+//   forces.advance(0.001, poses, velocities, weights);      // at every physics step
 //
 // force.h describes the arguments, and docs/explanation/force.md the method. Refused input throws
 // std::invalid_argument that names field and value.
@@ -25,6 +25,7 @@ namespace box_contact {
 using Velocity = bc_velocity;  // of the centre of mass [m/s], [rad/s], common frame
 using Wrench = bc_wrench;      // force [N], and torque [N m] about the centre of mass, common frame
 using Patches = bc_patches;    // an answer
+using Load = bc_load;          // what the contact of two boxes carried
 
 struct Body {
   double mass;        // [kg]; 0: no force moves it
@@ -36,15 +37,17 @@ struct Body {
 class PatchForces {
  public:
   struct Options {
-    int iterations = 50;    // of sequential impulses in a step, at most
-    int relaxations = 5;    // iterations more, at most, which remove the speed of pushing out
+    int substeps = 4;       // equal parts of an advance; heavy bodies on light ones need them
+    int iterations = 4;     // of sequential impulses in a sub-step, at most
+    int relaxations = 1;    // iterations more, at most, which remove the speed of pushing out
+    int threads = 1;        // at most
     double friction = 0.5;  // Coulomb's μ
   };
 
   explicit PatchForces(Span<const Body> bodies) : PatchForces(bodies, Options()) {}
   PatchForces(Span<const Body> bodies, const Options& options) {
-    bc_force_options plain{sizeof(bc_force_options), options.iterations, options.relaxations,
-                           options.friction};
+    bc_force_options plain{sizeof(bc_force_options), options.substeps, options.iterations,
+                           options.relaxations,      options.threads,  options.friction};
     bc_patch_forces* made;
     detail::check(bc_patch_forces_create(plain_of(bodies), std::int64_t(bodies.size()), &plain, &made));
     forces_.reset(made);
@@ -64,7 +67,10 @@ class PatchForces {
   void set_bodies(Span<const Body> bodies) {
     detail::check(bc_patch_forces_set_bodies(forces_.get(), plain_of(bodies), std::int64_t(bodies.size())));
   }
-  void forget(std::int64_t body) { detail::check(bc_patch_forces_forget(forces_.get(), body)); }
+  // Forget the patches of bodies, which were put elsewhere.
+  void forget(Span<const std::int64_t> bodies) {
+    detail::check(bc_patch_forces_forget(forces_.get(), bodies.data(), std::int64_t(bodies.size())));
+  }
   void reset() { bc_patch_forces_reset(forces_.get()); }
 
   // Take an answer, asked for at `poses`; pairs that are left out are forgotten.
@@ -73,17 +79,22 @@ class PatchForces {
     detail::check(bc_patch_forces_hold(forces_.get(), &answer, poses.data()));
   }
 
-  // The velocities during a step of `dt` [s]; `outside` are all wrenches but those of contacts.
-  void step(double dt, Span<const Pose> poses, Span<const Velocity> velocities,
-            Span<const Wrench> outside, Span<Velocity> after) {
-    check_count(after.size());
-    step(dt, poses, velocities, outside, after.data(), nullptr);
+  // Move the bodies for `dt` [s]; `outside` are all wrenches but those of contacts, or none.
+  void advance(double dt, Span<Pose> poses, Span<Velocity> velocities, Span<const Wrench> outside = {}) {
+    advance(dt, poses, velocities, outside, {sizeof(bc_motion), poses.data(), velocities.data(), nullptr});
   }
-  // The wrenches of contacts that lead to them, for a simulator that integrates by itself.
+  // The mean wrenches of contacts, for a simulator that moves the bodies by itself.
   void wrenches(double dt, Span<const Pose> poses, Span<const Velocity> velocities,
                 Span<const Wrench> outside, Span<Wrench> found) {
     check_count(found.size());
-    step(dt, poses, velocities, outside, nullptr, found.data());
+    advance(dt, poses, velocities, outside, {sizeof(bc_motion), nullptr, nullptr, found.data()});
+  }
+
+  // What each pair carried, by the lower and the higher box: the mean of the last advance.
+  std::vector<Load> loads() const {
+    std::vector<Load> found(std::size_t(bc_patch_forces_loads(forces_.get(), nullptr, 0)));
+    bc_patch_forces_loads(forces_.get(), found.data(), std::int64_t(found.size()));
+    return found;
   }
 
   // The state as bytes, and forces of such bytes.
@@ -111,13 +122,13 @@ class PatchForces {
     if (std::int64_t(count) != bc_patch_forces_bodies(forces_.get()))
       detail::raise(BC_BAD_ARGUMENT, "a row is needed for each body");
   }
-  void step(double dt, Span<const Pose> poses, Span<const Velocity> velocities,
-            Span<const Wrench> outside, Velocity* after, Wrench* found) {
+  void advance(double dt, Span<const Pose> poses, Span<const Velocity> velocities,
+               Span<const Wrench> outside, const bc_motion& motion) {
     check_count(poses.size());
     check_count(velocities.size());
     if (outside.size()) check_count(outside.size());
-    detail::check(bc_patch_forces_step(forces_.get(), dt, poses.data(), velocities.data(), outside.data(),
-                               after, found));
+    detail::check(bc_patch_forces_advance(forces_.get(), dt, poses.data(), velocities.data(),
+                                          outside.data(), &motion));
   }
 
   std::unique_ptr<bc_patch_forces, Destroy> forces_;

@@ -108,6 +108,18 @@ inline Placed placed_at(const bc_pose& pose, const Vec<double>& centre) {
   return {vector(pose.position) + axes * centre, axes};
 }
 
+// Turn a quaternion x y z w by an angular velocity ω, in the common frame, for a time h. Its tan(θ/4) is
+// t + t³/3 with t = h·ω/4, so the angle is short of h·ω by (h·ω)⁵/1920.
+inline void spin(double (&q)[4], const Vec<double>& angular, double h) {
+  Vec<double> t = (0.25 * h) * angular;
+  t = (1.0 + dot(t, t) / 3.0) * t;
+  double squared = dot(t, t), share = 1.0 / (1.0 + squared), w = share * (1.0 - squared);
+  Vec<double> v = (2.0 * share) * t, u = vector_at(q);
+  Vec<double> turned = (w * u + q[3] * v) + cross(v, u);
+  q[3] = w * q[3] - dot(v, u);
+  std::copy_n(turned.v, 3, q);
+}
+
 // The turn of a body between two places, as a vector: sin θ along the axis, for small θ its angle.
 inline Vec<double> turn(const Placed& from, const Placed& to) {
   Vec<double> sum{0.0, 0.0, 0.0};

@@ -7,14 +7,12 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
-#include <exception>
 #include <limits>
-#include <thread>
 #include <vector>
 
 #include "../../include/box_contact/box_contact.h"
 #include "../kernel.hpp"
+#include "threads.hpp"
 
 namespace box_contact::detail {
 
@@ -56,9 +54,6 @@ inline bool solve_pair(const Solver& solver, const PairNumbers& pair, bc_patch p
   return true;
 }
 
-// More threads than this are refused: a number that no machine's cores ask for is a mistake.
-constexpr int threads_max = 1024;
-
 // Rows that a thread takes at a time: some 100 µs of work, and whole blocks.
 constexpr long rows_per_chunk = 512;
 
@@ -67,31 +62,18 @@ inline long solve_in_threads(const Solver& solver, const Rows& rows, long count,
   long chunks = (count + rows_per_chunk - 1) / rows_per_chunk;
   std::vector<Counts> counts_of(threads, Counts{});
   std::vector<long> refused_of(threads, count);
-  std::atomic<long> next{0};
-  auto work = [&](long thread) {
-    for (long chunk = next++; chunk < chunks; chunk = next++) {
-      long begin = chunk * rows_per_chunk, end = std::min(begin + rows_per_chunk, count);
-      long refused = solver.solve(rows, begin, end, results, counts_of[thread]);
-      if (refused >= 0) refused_of[thread] = std::min(refused_of[thread], refused);
-    }
-  };
-  std::vector<std::thread> others;
-  others.reserve(threads - 1);
-  try {
-    for (long thread = 1; thread < threads; ++thread) others.emplace_back(work, thread);
-  } catch (const std::exception&) {
-    // No more threads, or no memory for them: those that run take all chunks.
-  }
-  work(0);
-  for (std::thread& other : others) other.join();
+  in_threads(threads, chunks, [&](long thread, long chunk) {
+    long begin = chunk * rows_per_chunk, end = std::min(begin + rows_per_chunk, count);
+    long refused = solver.solve(rows, begin, end, results, counts_of[thread]);
+    if (refused >= 0) refused_of[thread] = std::min(refused_of[thread], refused);
+  });
   for (const Counts& part : counts_of) counts += part;
   long refused = *std::min_element(refused_of.begin(), refused_of.end());
   return refused < count ? refused : -1;
 }
 
-// Solve `count` rows, in as many threads as are asked for and worth it. Each takes the next chunk until
-// none is left: a thread that starts late costs little. Rows are independent, so no bit depends on the
-// number of threads. Returns the first row that is refused, or −1.
+// Solve `count` rows, in as many threads as are asked for and worth it. Rows are independent, so no bit
+// depends on the number of threads. Returns the first row that is refused, or −1.
 inline long solve_rows(const Solver& solver, const Rows& rows, long count, const Results& results,
                        long threads, Counts& counts) {
   threads = std::min(threads, (count + rows_per_chunk - 1) / rows_per_chunk);

@@ -15,6 +15,7 @@ namespace box_contact::detail {
 namespace {
 
 using force::Body;
+using force::Load;
 using force::PatchForces;
 
 PatchForces& forces_of(bc_patch_forces* forces) { return *reinterpret_cast<PatchForces*>(forces); }
@@ -69,7 +70,7 @@ bc_status read_bodies(const bc_body* given, int64_t count, std::vector<Body>& bo
   return BC_OK;
 }
 
-constexpr int64_t state_format = 0x3246504342;  // "BCPF2"
+constexpr int64_t state_format = 0x3346504342;  // "BCPF3"
 
 int64_t state_size(const PatchForces& forces) {
   size_t size = 0;
@@ -133,10 +134,13 @@ bc_status check_row(const bc_patches& answer, size_t k, int64_t count) {
 }
 
 bc_status check_options(const bc_force_options& all) {
-  if (all.iterations < 1)
-    return fail(BC_BAD_ARGUMENT, "iterations must be 1 or more, not %d", all.iterations);
+  for (auto [field, count] : {std::pair("substeps", all.substeps), {"iterations", all.iterations}})
+    if (count < 1) return fail(BC_BAD_ARGUMENT, "%s must be 1 or more, not %d", field, count);
   if (all.relaxations < 0)
     return fail(BC_BAD_ARGUMENT, "relaxations must be 0 or more, not %d", all.relaxations);
+  if (all.threads < 1 || all.threads > threads_max)
+    return fail(BC_BAD_ARGUMENT, "threads must be within 1 and %d, not %d", threads_max,
+                all.threads);
   if (!force::is_amount(all.friction))
     return fail(BC_BAD_ARGUMENT, "friction must be within 0 and 1e50, not %g", all.friction);
   return BC_OK;
@@ -191,8 +195,9 @@ bc_status bc_patch_forces_create(const bc_body* bodies, int64_t count,
     if (bc_status status = check_options(all)) return status;
     std::vector<Body> read;
     if (bc_status status = read_bodies(bodies, count, read)) return status;
-    *forces = handle(
-        new PatchForces(std::move(read), {all.iterations, all.relaxations, all.friction}));
+    *forces = handle(new PatchForces(std::move(read), {all.substeps, all.iterations,
+                                                       all.relaxations, all.threads,
+                                                       all.friction}));
     return BC_OK;
   });
 }
@@ -226,12 +231,15 @@ bc_status bc_patch_forces_set_bodies(bc_patch_forces* forces, const bc_body* bod
   });
 }
 
-bc_status bc_patch_forces_forget(bc_patch_forces* forces, int64_t body) {
+bc_status bc_patch_forces_forget(bc_patch_forces* forces, const int64_t* bodies, int64_t count) {
   return guarded([&] {
-    if (!forces) return refuse_null("forces");
-    if (body < 0 || size_t(body) >= forces_of(forces).bodies().size())
-      return fail(BC_BAD_ARGUMENT, "body: there is no body %lld", (long long)body);
-    forces_of(forces).forget(int32_t(body));
+    if (!forces || (!bodies && count > 0)) return refuse_null(forces ? "bodies" : "forces");
+    auto known = int64_t(forces_of(forces).bodies().size());
+    for (int64_t k = 0; k < count; ++k)
+      if (bodies[k] < 0 || bodies[k] >= known)
+        return fail(BC_BAD_ARGUMENT, "bodies[%lld]: there is no body %lld", (long long)k,
+                    (long long)bodies[k]);
+    forces_of(forces).forget(bodies, count);
     return BC_OK;
   });
 }
@@ -261,33 +269,45 @@ bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches* answer
   });
 }
 
-bc_status bc_patch_forces_step(bc_patch_forces* forces, double dt, const bc_pose* poses,
-                               const bc_velocity* velocities, const bc_wrench* outside,
-                               bc_velocity* after, bc_wrench* wrenches) {
+bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, const bc_pose* poses,
+                                  const bc_velocity* velocities, const bc_wrench* outside,
+                                  const bc_motion* motion) {
   return guarded([&] {
-    if (!forces || !poses || !velocities)
-      return refuse_null(!forces ? "forces" : !poses ? "poses" : "velocities");
+    if (!forces || !poses || !velocities || !motion)
+      return refuse_null(!forces ? "forces" : !poses ? "poses" : motion ? "velocities" : "motion");
+    bc_motion all{};
+    if (!read(motion, all)) return fail(BC_BAD_ABI, "motion.size is unknown");
     size_t bodies = forces_of(forces).bodies().size();
     if (bc_status status = check_step(dt, bodies, poses, velocities, outside)) return status;
-    forces_of(forces).step(dt, poses, velocities, outside, after, wrenches);
+    forces_of(forces).advance(dt, poses, velocities, outside, all);
     return BC_OK;
   });
+}
+
+int64_t bc_patch_forces_loads(const bc_patch_forces* forces, bc_load* loads, int64_t capacity) {
+  if (!forces) return 0;
+  const PatchForces& self = forces_of(forces);
+  auto count = int64_t(self.loads().size());
+  if (!loads || capacity < count) return count;
+  for (const Load& load : self.loads()) *loads++ = load.over(self.load_time());
+  return count;
 }
 
 int64_t bc_patch_forces_save(const bc_patch_forces* forces, void* bytes, int64_t capacity) {
   if (!forces) return 0;
   const PatchForces& self = forces_of(forces);
-  const int64_t head[] = {state_format, int64_t(self.bodies().size()), int64_t(self.patch_count())};
-  auto size = int64_t(sizeof head) + state_size(self);
+  PatchForces::RowCounts counts = self.row_counts();
+  auto size = int64_t(sizeof state_format + sizeof counts) + state_size(self);
   if (!bytes || capacity < size) return size;
   auto* at = static_cast<char*>(bytes);
-  std::memcpy(at, head, sizeof head);
-  at += sizeof head;
-  PatchForces::visit_state(self, [&at](const auto* values, size_t count) {
+  auto write = [&at](const auto* values, size_t count) {
     static_assert(std::is_trivially_copyable_v<std::remove_pointer_t<decltype(values)>>);
     if (count > 0) std::memcpy(at, values, count * sizeof *values);
     at += count * sizeof *values;
-  });
+  };
+  write(&state_format, 1);
+  write(&counts, 1);
+  PatchForces::visit_state(self, write);
   return size;
 }
 
@@ -296,23 +316,29 @@ bc_status bc_patch_forces_load(const void* bytes, int64_t count, bc_patch_forces
     if (!forces) return refuse_null("forces");
     *forces = nullptr;
     if (!bytes) return refuse_null("bytes");
-    int64_t head[3] = {};
     auto* at = static_cast<const char*>(bytes);
-    if (count >= int64_t(sizeof head)) std::memcpy(head, at, sizeof head);
-    at += sizeof head;
-    // Each body and each patch takes bytes, so no more of them than bytes are made room for.
-    bool fits = head[0] == state_format && 0 <= head[1] && head[1] <= count && 0 <= head[2] &&
-                head[2] <= count;
-    PatchForces loaded({}, {1, 0, 0.0});
-    if (fits) loaded.make_room(size_t(head[1]), size_t(head[2]));
-    if (!fits || int64_t(sizeof head) + state_size(loaded) != count)
-      return fail(BC_BAD_ARGUMENT, "state: %lld bytes are not a state of this version",
-                  (long long)count);
-    PatchForces::visit_state(loaded, [&at](auto* values, size_t rows) {
+    auto read = [&at](auto* values, size_t rows) {
       if (rows > 0) std::memcpy(static_cast<void*>(values), at, rows * sizeof *values);
       at += rows * sizeof *values;
-    });
-    if (!loaded.is_sound()) return fail(BC_BAD_ARGUMENT, "state: the bytes are damaged");
+    };
+    int64_t format = 0;
+    PatchForces::RowCounts counts{};
+    auto head = int64_t(sizeof format + sizeof counts);
+    if (count >= head) {
+      read(&format, 1);
+      read(&counts, 1);
+    }
+    // Each row takes bytes, so no more rows than bytes are made room for.
+    bool fits = format == state_format &&
+                std::all_of(counts.begin(), counts.end(),
+                            [count](int64_t rows) { return 0 <= rows && rows <= count; });
+    PatchForces loaded({}, {1, 1, 0, 1, 0.0});
+    if (fits) loaded.make_rows(counts);
+    if (!fits || head + state_size(loaded) != count)
+      return fail(BC_BAD_ARGUMENT, "state: %lld bytes are not a state of this version",
+                  (long long)count);
+    PatchForces::visit_state(loaded, read);
+    if (!loaded.restore()) return fail(BC_BAD_ARGUMENT, "state: the bytes are damaged");
     *forces = handle(new PatchForces(std::move(loaded)));
     return BC_OK;
   });
