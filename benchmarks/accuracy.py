@@ -26,17 +26,19 @@ import numpy as np
 
 from box_contact_ros.arguments import model_name, within
 from box_contact_ros.core import DEPTH_FLOOR
-from box_contact_ros.networks.paper import turned
 from box_contact_ros.networks.weights_file import WeightsError
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.pose import rotation_matrix
 
-from . import output
+from . import output, settled
 from .contestant import Contestant, ours
 from .errors import ContactErrors, contact_errors
 from .output import markdown_table
+from .paper.numpy_model import turned
 from .pose_sets import LOADS, SETS, Pairs, drawn
 
+MEASURED = {**SETS, **LOADS, 'settled': settled.at_rest}
+"""Sets of poses: drawn ones, and recorded goods at rest of scenes that train no network."""
 PAIRS, QUICK_PAIRS = 100_000, 5_000
 CLASSES = ('vertex-face', 'edge-edge', 'edge-face', 'face-face')
 SHOWN = (1e-6, 10.0)  # errors that are drawn to scale [%]; others are at the edge
@@ -137,7 +139,7 @@ def measure_all(models: Sequence[Contestant], count: int, seed: int) -> list[Acc
     from tqdm import tqdm
 
     rows = []
-    for place, (name, make) in enumerate(tqdm((SETS | LOADS).items(), desc='accuracy', unit='set')):
+    for place, (name, make) in enumerate(tqdm(MEASURED.items(), desc='accuracy', unit='set')):
         pairs = drawn(make, np.random.default_rng([seed, place]), count)
         truth = pairs.contacts()
         rows += [measure(model, name, pairs, truth) for model in models]

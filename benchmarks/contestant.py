@@ -13,7 +13,6 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,8 +31,6 @@ MODELS = ('exact', 'mlp', 'paper', *(f'soup-{n}' for n in (8, 10, 12, 14, 16, 18
 """Our contestants; the soups are those of the paper's Table 3."""
 CORE_MODELS = ('exact', 'mlp')
 """Models in C++ with volume and covariance: each instruction set of the machine is measured."""
-SIZES_FOLDER = Path(__file__).with_name('mlp_sizes')
-"""Weights of other sizes of the network of `mlp`: `python -m training mlp --sizes`."""
 ENDING = 5.0  # time that a subprocess has to end after its answer [s]
 MOST_CONTACTS = 16  # contacts asked for; two boxes have at most eight
 
@@ -127,11 +124,9 @@ def ours(model: Any, *, weights: str | None = None, name: str = '') -> Contestan
 
 
 def other_networks() -> list[Contestant]:
-    """Return `mlp` by its other sizes, and `paper` on containers with x, y and z as outputs."""
+    """Return `paper` on containers with x, y and z as outputs."""
     place = resource_path('weights', 'paper-12.192x2.438x2.591-place.safetensors')
-    return [*(ours('mlp', weights=str(path), name=path.stem)
-              for path in sorted(SIZES_FOLDER.glob('mlp-*.safetensors'))),
-            ours('paper', weights=str(place), name='paper-place')]
+    return [ours('paper', weights=str(place), name='paper-place')]
 
 
 def _deepest(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> np.ndarray:

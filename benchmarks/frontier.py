@@ -55,9 +55,7 @@ IN_SHORT = ('exact', 'mlp', 'paper', 'paper-place', 'soup-8', 'soup-22')
 QUICK_MODELS = ('exact', 'mlp', 'paper', 'soup-8')
 ODD_NORMAL = 10.0  # error of an engine's normal that is explained [deg]
 
-SIZES = ('mlp-16-16', 'mlp-20-18', 'mlp', 'mlp-32-32')
-"""The network of `mlp` by size; the shipped one has 24-24."""
-SHOWN = {'exact': ('exact', 'C0', 0), **dict.fromkeys(SIZES, ('mlp, four sizes', 'C2', 0)),
+SHOWN = {'exact': ('exact', 'C0', 0), 'mlp': ('mlp', 'C2', 0),
          'paper': ("the paper's network", 'C4', 4),
          'paper-place': ('the same, output x y z', 'C4', -2),
          'soup-8': ('polygon soup, N = 8', 'C5', -5),

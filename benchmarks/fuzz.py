@@ -32,7 +32,7 @@ import numpy as np
 
 from box_contact_ros.arguments import within
 from box_contact_ros.core import DEPTH_FLOOR, FEATURES, OUTPUTS, UNITS_MAX, native
-from box_contact_ros.networks.mlp import core_numbers
+from box_contact_ros.networks.models import core_numbers
 from box_contact_ros.networks.weights_file import Network
 from box_contact_ros.solver.contact import FIELDS, Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
@@ -62,8 +62,9 @@ SMOOTH = 2.0**-46
 EXACT = 1e-9
 """The same of `exact`, whose sums cancel; or SLIVER times size by depth, if that is more."""
 SLIVER = 1e-15
-OUTSIDE = 2.0**-43
-"""How far a point may be outside the bounds, of the size and the coordinates: roundings."""
+OUTSIDE, INEXACT = 2.0**-43, 2.0**-21
+"""How far a point may be outside the bounds, of the size and the coordinates: roundings. Across the
+normal the bounds of `mlp` are float32: INEXACT of the size more, along it of the depth."""
 
 SWAP, SINGLE = 1 << 20, 1 << 21
 GATES = judge.GATES | {SWAP: 'changed by a swap', SINGLE: 'not its single call'}
@@ -220,11 +221,14 @@ def mlp_faults(pairs: Pairs, found: Contacts) -> np.ndarray:
     are the patch box (core/src/mlp/patch_box.hpp).
     """
     rows = np.flatnonzero(found.colliding)
-    axes, middle, half, *_ = native.mlp_inputs(*pairs.rows(rows))
+    axes, middle, half, _ = native.mlp_inputs(*pairs.rows(rows))
     off = np.abs(np.einsum('nji,nj->ni', axes, found.point[rows] - middle))
-    reach = pairs.size[rows] + np.abs(found.point[rows]).max(axis=1)
-    within = np.all(off <= half + OUTSIDE * reach[:, None], axis=1)
-    within &= found.volume[rows] <= (1.0 + OUTSIDE) * np.prod(2.0 * half, axis=1)
+    size = pairs.size[rows]
+    deep = np.maximum(half[:, 2], -found.separation[rows])
+    inexact = INEXACT * np.stack([size, size, deep], axis=1)
+    inexact += OUTSIDE * (size + np.abs(found.point[rows]).max(axis=1))[:, None]
+    within = np.all(off <= half + inexact, axis=1)
+    within &= found.volume[rows] <= (1.0 + INEXACT) * np.prod(2.0 * half, axis=1)
     faults = np.zeros(len(found.colliding), dtype=np.int64)
     faults[rows] = (np.where(within, 0, judge.OUT_OF_BOUNDS)
                     | np.where(_least(found, rows) >= -SMOOTH, 0, judge.NEGATIVE))

@@ -11,6 +11,7 @@ was placed, and after it had settled with steps of 1 ms by `PatchForces`, MuJoCo
 """
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,6 +21,10 @@ from .pose_sets import Pairs
 
 FILE = Path(__file__).with_suffix('.npz')
 PLACED, OURS = 'as placed', 'PatchForces'
+LEARNT = ('tower20_jitter', 'pyramid55', 'containers5_wind', 'pile200',
+          'pallets4_on_each_other_full', 'jenga54', 'b2_card_house_5', 'bars_heap',
+          'rapier_keva_5_floors', 'integer-grid pallet')
+"""Scenes that the network of `mlp` is trained on. The others measure it."""
 
 
 class Recorded(NamedTuple):
@@ -40,6 +45,20 @@ def read(file: Path = FILE) -> Recorded:
         return Recorded(Pairs(*(arrays[name] for name in Pairs._fields)),
                         arrays['scene_names'][arrays['scene']],
                         arrays['engine_names'][arrays['engine']])
+
+
+@cache
+def touching(*, learnt: bool) -> Pairs:
+    """Return the pairs that touch of the scenes in `LEARNT`, or of all others."""
+    recorded = read()
+    pairs = recorded.pairs.rows(np.isin(recorded.scene, LEARNT) == learnt)
+    return pairs.rows(pairs.contacts().colliding)
+
+
+def at_rest(rng: np.random.Generator, n: int) -> Pairs:
+    """Goods at rest as simulators left them, at most n pairs of scenes that train no network."""
+    pairs = touching(learnt=False)
+    return pairs.rows(rng.permutation(len(pairs.size))[:n])
 
 
 def write(file: Path, recorded: Recorded) -> None:

@@ -57,11 +57,11 @@ def make_model(name: str, *, weights: str | os.PathLike[str] | None = None) -> M
     if weights is not None and name not in ('mlp', 'paper'):
         raise ValueError(f'weights have no effect on model {short_repr(name)}: leave them out')
     if name == 'mlp' and weights is not None:
-        from .networks.mlp import read_mlp
+        from .networks.models import read_mlp
         return read_mlp(weights)
     if name == 'paper':
-        from .networks.paper import Paper, ShippedPaper
-        return ShippedPaper() if weights is None else Paper.read(weights)
+        from .networks.models import read_paper
+        return read_paper(weights)
     if name in NATIVE:
         return as_model(name)
     from .soup.soup import Soup

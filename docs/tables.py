@@ -35,11 +35,12 @@ MEASURED_AS = {'mujoco': {'contestant': 'MuJoCo mj_collision', 'point': 'deepest
 SHOWN = ('AVX-512', 'AVX2')  # instruction sets, the README's first
 CONTAINER = 12_192.0  # longest edge [mm]
 SETS = {
-    'random cubes': 'cubes in any pose, 0.1–10 % deep',
-    'touching': 'cubes in any pose that just touch',
-    'random sizes': 'random pairs of sizes, to 1:20',
+    'landings': 'containers that land on each other',
+    'settled': 'goods at rest',
     'stacks': 'stacks, tilt 1e-6–1e-3 rad',
-    'tilted stacks': 'stacks, tilt 1e-3–0.1 rad',
+    'parcels': 'parcels on each other at any yaw',
+    'random cubes': 'cubes in any pose, 0.1–10 % deep',
+    'random sizes': 'random pairs of sizes, to 1:20',
     'containers': '40 ft containers, 5° sway',
 }
 

@@ -4,7 +4,7 @@
 """Make the data, fit the networks, write the weights files with their model cards.
 
 mlp                      any two boxes; the default
-mlp --sizes              other sizes of its network, which the report frontier compares
+mlp --sizes              the other sizes of its network that are shipped
 paper                    two boxes of edge 2 that just touch, as the paper draws them
 paper --scene NAME       two equal boxes in the poses of a scene
 paper-…, table-1-…       what only the tables of benchmarks.paper need
@@ -20,23 +20,38 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 
-from benchmarks.contestant import SIZES_FOLDER
 from benchmarks.output import QUICK_RESULTS, make_folder, report_parser
 from benchmarks.paper import jobs
 from box_contact_ros.arguments import within
 from box_contact_ros.core import UNITS_MAX
-from box_contact_ros.networks.mlp import NETWORK
-from box_contact_ros.networks.weights_file import load_weights
+from box_contact_ros.networks.models import GROUP, MLP, PAPER, mlp_numbers
 
 from . import paper, recipe
 
-MLP, PAPER = 'mlp', 'paper'
 NAMES = (MLP, *jobs.JOBS)
 SHIPPED_HEADER = Path(__file__).parents[1].joinpath(
     'box_contact_ros', 'core', 'src', 'mlp', 'shipped_network.hpp')
 """The shipped weights as the library has them."""
+HEADER = """// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// The shipped network of model `mlp`. `python -m training mlp` writes it with the weights file.
+#pragma once
+
+namespace box_contact::detail {
+
+// Inputs, units of both hidden layers, outputs and two flags, then groups of eight units.
+// clang-format off
+constexpr float shipped_network[] = {
+NUMBERS
+};
+// clang-format on
+
+}  // namespace box_contact::detail
+"""
 QUICK_COUNTS, QUICK_STARTS, QUICK_EPOCHS = (1000, 500, 2000), 3, 70
 """`--quick`, for the paper's: enough to see the error fall, in seconds."""
 
@@ -78,6 +93,15 @@ def _commit() -> str:
     return done.stdout.strip()
 
 
+def _header(network: np.ndarray) -> str:
+    """Return the text of `SHIPPED_HEADER` for a network as the core reads it."""
+    numbers = [f'{float(number)!r}F' for number in network]
+    first = len(numbers) % GROUP
+    lines = [', '.join(numbers[:first])]
+    lines += [', '.join(numbers[at:at + GROUP]) for at in range(first, len(numbers), GROUP)]
+    return HEADER.replace('NUMBERS', '\n'.join(f'    {line},' for line in lines))
+
+
 def _print(path: Path, card: dict[str, Any]) -> None:
     """Print what a training took, and the errors of its card."""
     print(f'{path}, {card["training"]["minutes"]} min\n{json.dumps(card["metrics"], indent=1)}')
@@ -86,14 +110,12 @@ def _print(path: Path, card: dict[str, Any]) -> None:
 def _train_mlp(options: argparse.Namespace, hidden: tuple[int, int] | None = None) -> None:
     """Train the shipped network, or one of other hidden layers."""
     name = '-'.join((MLP, *map(str, hidden or ())))
-    folder = options.out or (SIZES_FOLDER if hidden else jobs.SHIPPED)
-    path = folder / f'{name}.safetensors'
+    path = (options.out or jobs.SHIPPED) / f'{name}.safetensors'
     card = recipe.train(path, seed=options.seed, commit=_commit(), quick=options.quick,
                         hidden=hidden or recipe.HIDDEN)
     _print(path, card)
     if hidden is None and options.out is None:
-        network = load_weights(path).networks[NETWORK]
-        SHIPPED_HEADER.write_text(recipe.header(network.layers), encoding='utf-8')
+        SHIPPED_HEADER.write_text(_header(mlp_numbers(path)), encoding='utf-8')
         print(f'{SHIPPED_HEADER}: build the library anew')
 
 

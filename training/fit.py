@@ -19,12 +19,11 @@ from box_contact_ros.networks.weights_file import Layers
 
 from .samples import MlpSamples
 
-MOST_EXPONENT, LEAST_MARGIN = 3.0, 1e-3  # as in core/src/mlp/mlp_model.hpp
-SOFT = 3e-3
-"""Error below which the loss is quadratic, and above which it is linear."""
-TAIL = 10.0  # weight of the mean square beside it: the worst cases count
-UNITS = (0.25, 1.0, 1.0)
-"""Errors of point, volume and covariance that weigh the same."""
+LEAST_VOLUME, LEAST_DEVIATION, MOST_DEVIATION = 1e-5, 1e-3, 3.0**-0.5  # as in mlp_model.hpp
+START = (-0.3, -0.3, -0.3, 0.4, 0.45, 0.45, 0.45, 0.0, 0.0, 0.0)  # outputs before the training
+SOFT = 3e-3  # error below which the loss is quadratic, and above which it is linear
+TAIL = 20.0  # weight of the mean square beside it: the worst cases count
+UNITS = (0.15, 1.0, 1.0)  # errors of point, volume and covariance that weigh the same
 
 
 class MlpErrors(NamedTuple):
@@ -36,30 +35,25 @@ class MlpErrors(NamedTuple):
 
 
 class PatchNetwork(torch.nn.Module):
-    """Two hidden layers of rectified units, and seven outputs: exponents of factors."""
+    """Two hidden layers of rectified units; outputs: centroid, volume, covariance's root."""
 
     def __init__(self, hidden: tuple[int, int]) -> None:
         super().__init__()
         self.first = torch.nn.Linear(FEATURES, hidden[0])
         self.second = torch.nn.Linear(*hidden)
         self.output = torch.nn.Linear(hidden[1], OUTPUTS)
-        with torch.no_grad():  # begin with the body of the chords
+        with torch.no_grad():
             self.output.weight *= 0.1
-            self.output.bias *= 0.0
+            self.output.bias.copy_(torch.tensor(START))
 
-    def forward(self, samples: MlpSamples) -> tuple[Tensor, Tensor, Tensor]:
+    def forward(self, features: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Return centroids (n, 3), volumes (n,) and covariances (n, 3, 3) in the patch boxes."""
-        x = torch.relu(self.second(torch.relu(self.first(samples.features))))
-        size = self.output(x)
-        factors = torch.where(size < 0.0, 1.0 / (1.0 + size.abs().clamp(max=MOST_EXPONENT)),
-                              1.0 + size.clamp(0.0, MOST_EXPONENT))
-        place = (0.5 + 0.5 * samples.mean).clamp(max=1.0 - LEAST_MARGIN)
-        odds = place * factors[:, :3]
-        most = torch.diagonal(samples.covariance, dim1=1, dim2=2).rsqrt()
-        deviations = torch.minimum(factors[:, 4:], most)
-        return (2.0 * odds / (odds + 1.0 - place) - 1.0,
-                (samples.volume * factors[:, 3]).clamp(max=1.0),
-                samples.covariance * deviations[:, :, None] * deviations[:, None, :])
+        said = self.output(torch.relu(self.second(torch.relu(self.first(features)))))
+        root = torch.zeros(len(said), 3, 3)
+        root[:, (0, 1, 2), (0, 1, 2)] = said[:, 4:7].clamp(LEAST_DEVIATION, MOST_DEVIATION)
+        root[:, (1, 2, 2), (0, 0, 1)] = said[:, 7:10].clamp(-MOST_DEVIATION, MOST_DEVIATION)
+        return (said[:, :3].clamp(-1.0, 1.0), said[:, 3].square().clamp(LEAST_VOLUME, 1.0),
+                root @ root.transpose(1, 2))
 
     def layers(self) -> Layers:
         """Return the layers."""
@@ -72,13 +66,13 @@ def tensors(samples: MlpSamples) -> MlpSamples:
 
 
 def errors_of(network: torch.nn.Module, batch: MlpSamples) -> MlpErrors:
-    """Return the errors of contacts."""
-    mean, volume, covariance = network(batch)
+    """Return the errors of contacts, but for moves into the boxes: these make them less."""
+    mean, volume, covariance = network(batch.features)
     scale = batch.half[:, :, None] * batch.half[:, None, :]
-    trace = torch.diagonal(scale * batch.true_covariance, dim1=1, dim2=2).sum(1)
-    wrong = (covariance - batch.true_covariance) * scale
-    return MlpErrors(((mean - batch.true_mean) * batch.half).norm(dim=1),
-                     (volume / batch.true_volume - 1.0).abs(),
+    trace = torch.diagonal(scale * batch.covariance, dim1=1, dim2=2).sum(1)
+    wrong = (covariance - batch.covariance) * scale
+    return MlpErrors(((mean - batch.mean) * batch.half).norm(dim=1),
+                     (volume / batch.volume - 1.0).abs(),
                      wrong.square().sum((1, 2)).sqrt() / trace)
 
 
@@ -102,6 +96,7 @@ def fit(network: torch.nn.Module, samples: MlpSamples, *, steps: int, batch: int
         loss = loss_of(errors_of(network, samples.part(rows)))
         optimiser.zero_grad()
         loss.backward()
+        torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
         optimiser.step()
         schedule.step()
         yield loss.detach()

@@ -5,7 +5,8 @@
 
 The paper draws boxes that just touch, at any angle to ±90°. A scene asks for other pairs. Here the
 8,000 patterns are contacts of the scene, folded by the symmetries as model `paper` folds them
-(networks/paper.py). The outputs are the paper's four angles, or x, y and z of the impact point.
+(benchmarks/paper/numpy_model.py). The outputs are the paper's four angles, or x, y and z of the
+impact point.
 """
 from __future__ import annotations
 
@@ -20,18 +21,12 @@ from benchmarks.output import percentiles
 from benchmarks.paper.dataset import INPUTS, OUTPUTS, PAPER_COUNTS, SETS, Patterns, spherical
 from benchmarks.paper.fit import PaperSettings, fit
 from benchmarks.paper.jobs import SHIPPED
+from benchmarks.paper.numpy_model import network_inputs, octant_signs, touching_pairs, turned
 from benchmarks.pose_sets import LOADS, Generator, Pairs, drawn
 from benchmarks.pose_sets import SETS as POSE_SETS
 from benchmarks.weights import save_weights
 from box_contact_ros.models import make_model
-from box_contact_ros.networks.paper import (
-    in_file_name,
-    is_cube,
-    network_inputs,
-    octant_signs,
-    touching_pairs,
-    turned,
-)
+from box_contact_ros.networks.models import in_file_name, is_cube
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix
 

@@ -11,39 +11,40 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from benchmarks import settled
 from benchmarks.pose_sets import (
     CONTAINER,
     CUBE,
     Generator,
     Pairs,
+    Z,
     any_pose,
     laid,
     log_uniform,
+    onto,
     random_sizes,
     stacked,
+    turns,
 )
 from box_contact_ros.core import native
+from box_contact_ros.solver.pose import quaternion_multiply
 
-PIECE = 100_000
-"""Pairs that are made at a time."""
+PIECE = 100_000  # pairs that are made at a time
 
 
 @dataclass(frozen=True, kw_only=True)
 class MlpSamples:
-    """What the chords say of n contacts, and the exact answers, as arrays or as tensors.
+    """What the network reads of n contacts, and the exact answers, as arrays or as tensors.
 
     Coordinates are those of the patch box, −1 to 1, mirrored as `features` are. Volumes are
     relative to that of the patch box.
     """
 
     features: Any  # (n, FEATURES)
-    volume: Any  # (n,) of the body that the chords sum to
+    half: Any  # (n, 3) half extents of the patch box [the smaller box's longest edge]
+    volume: Any  # (n,)
     mean: Any  # (n, 3)
     covariance: Any  # (n, 3, 3)
-    half: Any  # (n, 3) half extents of the patch box [the smaller box's longest edge]
-    true_volume: Any  # (n,)
-    true_mean: Any  # (n, 3)
-    true_covariance: Any  # (n, 3, 3)
 
     def __len__(self) -> int:
         """Return n."""
@@ -68,15 +69,14 @@ def describe(pairs: Pairs) -> tuple[MlpSamples, np.ndarray]:
     """Return the samples of the pairs that touch, and which these are (n,)."""
     exact = pairs.contacts()
     rows = exact.colliding & (exact.volume > 0.0)
-    axes, middle, half, features, volume, mean, covariance = native.mlp_inputs(*pairs.rows(rows))
+    axes, middle, half, features = native.mlp_inputs(*pairs.rows(rows))
     to_box = axes.swapaxes(1, 2)
-    true_covariance = to_box @ exact.covariance[rows] @ axes
+    covariance = to_box @ exact.covariance[rows] @ axes
     return MlpSamples(
-        features=features, volume=volume, mean=mean, covariance=covariance,
-        half=half / pairs.edge[rows, None],
-        true_volume=exact.volume[rows] / (8.0 * half.prod(axis=1)),
-        true_mean=np.einsum('nij,nj->ni', to_box, exact.point[rows] - middle) / half,
-        true_covariance=true_covariance / (half[:, :, None] * half[:, None, :])), rows
+        features=features, half=half / pairs.edge[rows, None],
+        volume=exact.volume[rows] / (8.0 * half.prod(axis=1)),
+        mean=np.einsum('nij,nj->ni', to_box, exact.point[rows] - middle) / half,
+        covariance=covariance / (half[:, :, None] * half[:, None, :])), rows
 
 
 def draw_samples(make: Generator, seed: Sequence[int], n: int, progress: bool = False,
@@ -91,19 +91,37 @@ def draw_samples(make: Generator, seed: Sequence[int], n: int, progress: bool = 
         for start in starts])
 
 
+def nearly_settled(rng: np.random.Generator, n: int) -> Pairs:
+    """Draw recorded pairs of goods at rest, each turned and moved by up to a thousandth."""
+    pairs = settled.touching(learnt=True)
+    pairs = pairs.rows(rng.integers(0, len(pairs.edge), n))
+    little = log_uniform(rng, 1e-8, 1e-3, (2, n)) * (rng.random((2, n)) < 0.5)
+    b = pairs.pose_b.copy()
+    b[:, 3:] = quaternion_multiply(turns(rng.normal(size=(n, 3)), little[0]), b[:, 3:])
+    b[:, :3] += rng.normal(size=(n, 3)) * (little[1] * pairs.edge)[:, None]
+    return pairs._replace(pose_b=b)
+
+
 def mixture(rng: np.random.Generator, n: int) -> Pairs:
     """Draw about n pairs of the kinds that scenes have.
 
     Equal cubes and boxes of random sizes have any pose. Cubes, containers and flat boxes are
-    stacked, tilted by 1e-6 to 0.3 rad. Boxes of random sizes are laid on each other.
+    stacked, tilted by 1e-6 to 0.3 rad. Boxes of random sizes and bars are laid on each other. Goods
+    at rest are taken from recorded scenes.
     """
-    share = n // 16
+    share = n // 18
     cubes, (size_a, size_b), laid_sizes = (np.ones((2 * share, 3)), random_sizes(rng, 3 * share),
                                            random_sizes(rng, 3 * share))
+    bars = np.column_stack([np.ones(share), *log_uniform(rng, 0.03, 0.3, (2, share))])
     parts = [any_pose(rng, cubes, cubes, depths(rng, cubes, cubes)),
              any_pose(rng, size_a, size_b, depths(rng, size_a, size_b)),
              laid(rng, *laid_sizes, log_uniform(rng, 1e-5, 0.1, 3 * share),
-                  depths(rng, *laid_sizes))]
+                  depths(rng, *laid_sizes)),
+             onto(np.column_stack([rng.uniform(-0.3, 0.3, (share, 2)), 0.98 * bars[:, 2]]),
+                  quaternion_multiply(turns((1.0, 0.0, 0.0), log_uniform(rng, 1e-5, 0.1, share)),
+                                      turns(Z, rng.uniform(-np.pi, np.pi, share))),
+                  bars, bars, depths(rng, bars, bars)),
+             nearly_settled(rng, share)]
     for size, yaw in ((CUBE, np.pi), (CONTAINER, 0.2), (CONTAINER, np.pi),
                       ((1.0, 0.5, 0.3), np.pi)):
         parts.append(stacked(rng, size, log_uniform(rng, 1e-6, 0.3, 2 * share),

@@ -36,13 +36,13 @@ from typing import Any
 
 import numpy as np
 
-from box_contact_ros.networks.paper import euler_angles
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 
 from ..pose_sets import CUBE, turns
 from .models import EXPERTS, to_octant
+from .numpy_model import euler_angles
 
 SETS = ('training', 'cross-validation', 'external')
 PAPER_COUNTS = (8000, 5000, 75000)  # patterns per set, with discontinuities

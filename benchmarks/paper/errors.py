@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from box_contact_ros.networks.paper import forward
 from box_contact_ros.networks.weights_file import Network
+
+from .numpy_model import forward
 
 
 def predict(network: Network, inputs: np.ndarray) -> np.ndarray:

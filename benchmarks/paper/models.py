@@ -13,17 +13,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from box_contact_ros.networks.paper import (
+from box_contact_ros.networks.weights_file import load_weights
+from box_contact_ros.resources import resource_path
+
+from .numpy_model import (
     OUTPUTS,
-    Paper,
+    NumpyPaper,
     TouchingPairs,
     directions,
     forward,
     network_inputs,
     octant_signs,
 )
-from box_contact_ros.networks.weights_file import load_weights
-from box_contact_ros.resources import resource_path
 
 EXPERTS = ('vertex', 'edge', 'face')  # of the committee, in the order of the classifier's outputs
 
@@ -54,7 +55,7 @@ def to_octant(offset: np.ndarray, rotation: np.ndarray) -> Folds:
     return Folds(m, network_inputs(m * offset, m[:, :, None] * rotation * n[:, None]))
 
 
-class Committee(Paper):
+class Committee(NumpyPaper):
     """The weighted mean of the experts' directions.
 
     A weight is what the classifier says of the expert's class, 0 where negative. The likeliest

@@ -61,12 +61,15 @@ class ContactSolver(native.PairSolver):
         self._size_fault = getattr(self._model, 'size_fault', lambda a, b: None)
         self._size_a = None if size_a is None else as_size(size_a, 'size_a')
         self._size_b = None if size_b is None else as_size(size_b, 'size_b')
+        answers = self._native
         if self._size_a is not None and self._size_b is not None:
             if fault := self._size_fault(self._size_a[0], self._size_b[0]):
                 raise ValueError(fault)
+            if hasattr(self._model, 'native_for'):
+                answers = self._model.native_for(self._size_a[0], self._size_b[0])
         # Calls are answered in C++, which calls `_call_general` and `_batch_general` for the rest.
         a, b = (None if size is None else tuple(size[0]) for size in (self._size_a, self._size_b))
-        super().__init__(self._native, a, b, margin)
+        super().__init__(answers, a, b, margin)
 
     if TYPE_CHECKING:  # the core, which does it, knows no type of ours
         def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact: ...  # noqa: D102

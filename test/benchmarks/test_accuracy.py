@@ -16,7 +16,7 @@ from benchmarks import accuracy, searched
 from benchmarks.accuracy import CLASSES
 from benchmarks.contestant import ours
 from benchmarks.errors import ContactErrors, contact_errors
-from benchmarks.pose_sets import CUBE, LOADS, SETS, Pairs
+from benchmarks.pose_sets import CUBE, SETS, Pairs
 from box_contact_ros import Contacts, ContactSolver
 
 
@@ -67,7 +67,7 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-P99 = {'point': 1.5, 'volume': 8.0, 'covariance': 9.0}
+P99 = {'point': 4.0, 'volume': 12.0, 'covariance': 18.0}
 """Largest 99th percentile of `mlp` [%]."""
 
 
@@ -76,7 +76,7 @@ def test_quick_run(quick: Path) -> None:
     with (quick / 'accuracy.csv').open() as file:
         rows = [row for row in csv.DictReader(file) if row['part'] == 'all']
     assert [(row['set'], row['quantity']) for row in rows] == [
-        (name, quantity) for name in SETS | LOADS for quantity in ContactErrors._fields]
+        (name, quantity) for name in accuracy.MEASURED for quantity in ContactErrors._fields]
     for row in rows:
         assert float(row['p99']) <= P99[row['quantity']]
 
@@ -95,7 +95,7 @@ def test_searched_for_the_worst(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     errors = contact_errors(found, pairs.contacts(), pairs.edge)
     for quantity, value in worst.items():
         assert value >= 0.999 * getattr(errors, quantity).max()
-        assert value <= {'point': 15.0, 'volume': 60.0, 'covariance': 60.0}[quantity]
+        assert value <= {'point': 20.0, 'volume': 150.0, 'covariance': 150.0}[quantity]
     page = (tmp_path / 'searched.md').read_text('utf-8')
     assert '0.02 minutes on one core: 1 s on each set' in page
 
@@ -127,7 +127,7 @@ def test_a_class_is_measured_like_a_model(tmp_path: Path, monkeypatch: pytest.Mo
                             '--out', str(tmp_path)])
     with (tmp_path / 'accuracy.csv').open() as file:
         rows = [row for row in csv.DictReader(file) if row['part'] == 'all']
-    assert status == 0 and {row['set'] for row in rows} == set(SETS | LOADS)
+    assert status == 0 and {row['set'] for row in rows} == set(accuracy.MEASURED)
     assert {row['quantity'] for row in rows} == {'point'}
     assert float({row['set']: row for row in rows}['tilted stacks']['mean']) > 1.0
 

@@ -12,16 +12,16 @@ import pytest
 from test_paper import touching
 
 from benchmarks.paper.models import Committee, committee, weights_path
+from benchmarks.paper.numpy_model import NumpyPaper
 from benchmarks.weights import save_weights
 from box_contact_ros import ContactSolver
-from box_contact_ros.networks.paper import Paper
 from box_contact_ros.networks.weights_file import WeightsError, load_weights
 from box_contact_ros.resources import resource_path
 
 EXACT = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
 
 
-def solver_of(model: Paper) -> ContactSolver:
+def solver_of(model: NumpyPaper) -> ContactSolver:
     return ContactSolver(poses.CUBE, poses.CUBE, model=model)
 
 
@@ -67,7 +67,7 @@ def test_a_committee_is_the_weighted_mean_of_its_experts(tmp_path: Path) -> None
 
 
 def test_it_is_for_cubes_and_needs_its_networks() -> None:
-    with pytest.raises(ValueError, match='are for two cubes of one size, not for 1 × 2 × 3 m'):
+    with pytest.raises(ValueError, match='is for two cubes of one size, not for 1 × 2 × 3 m'):
         ContactSolver((1, 2, 3), (1, 2, 3), model=committee())
     with pytest.raises(WeightsError, match="has no network 'classifier'"):
         Committee(load_weights(resource_path('weights', 'paper.safetensors')))

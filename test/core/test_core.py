@@ -17,6 +17,7 @@ import tracemalloc
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -29,12 +30,14 @@ from test_extremes import random_network
 import box_contact_ros
 from box_contact_ros import Contact, ContactSolver, make_model
 from box_contact_ros.core import FORCE, instruction_sets, native
-from box_contact_ros.networks.mlp import NETWORK, core_numbers, load_mlp, read_mlp
+from box_contact_ros.networks.models import core_numbers, mlp_numbers, read_mlp
+from box_contact_ros.networks.weights_file import Network
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.contact import FIELDS, Contacts
 
 TESTS = Path(__file__).resolve().parents[1]
 PACKAGE = Path(box_contact_ros.__file__).parent
+MLP_FILE = resource_path('weights', 'mlp.safetensors')
 MODELS = ('exact', 'mlp')
 SETS_HERE = instruction_sets()
 
@@ -174,7 +177,7 @@ def test_a_fused_multiply_add_would_be_found(tmp_path: Path) -> None:
 # --- threads --------------------------------------------------------------------------------------
 
 MIXED = poses.of_all_kinds(900, 3)
-"""6,300 pairs of which some are clipped, and some are left to `exact` by `mlp`."""
+"""6,300 pairs of which some are clipped."""
 MIXED = Pairs(*(part[np.random.default_rng(5).permutation(len(part))] for part in MIXED))
 
 
@@ -182,7 +185,7 @@ MIXED = Pairs(*(part[np.random.default_rng(5).permutation(len(part))] for part i
 @pytest.mark.parametrize('count', [0, 1, 511, 512, 1023, 1024, 1025, 5000])
 def test_threads_change_no_bit_and_no_count(model: str, count: int) -> None:
     pairs = MIXED.first(count)
-    network = core_numbers(load_mlp().networks[NETWORK]) if model == 'mlp' else None
+    network = mlp_numbers(MLP_FILE) if model == 'mlp' else None
     answers, counts = [], []
     for threads in (1, 2, 3, 7):
         solver = native.Exact() if network is None else native.Mlp(network)
@@ -268,8 +271,7 @@ def test_one_solver_in_many_threads(model: str) -> None:
 def single_solvers() -> dict[str, Callable[..., native.PairSolver]]:
     """Return what makes the solver of one pair; the network of `mlp` is that of its file."""
     return {'exact': partial(native.PairSolver, native.Exact()),
-            'mlp': partial(native.PairSolver, read_mlp(
-                resource_path('weights', 'mlp.safetensors')))}
+            'mlp': partial(native.PairSolver, read_mlp(MLP_FILE))}
 
 
 @every_model
@@ -470,8 +472,9 @@ def test_references_and_memory_stay(model: str, traced: None) -> None:
 
 def test_networks_are_freed() -> None:
     """Each model has its own numbers, outside of what Python counts; a solver keeps its model."""
-    numbers = np.zeros(2 + 8 * (8 * (1 + native.FEATURES) + 9 * 65), dtype=np.float32)  # 24 kB
-    numbers[:2] = 8
+    widths = (native.FEATURES, 64, 64, native.OUTPUTS)
+    numbers = core_numbers(Network([(np.zeros((units, inputs)), np.zeros(units))
+                                    for inputs, units in pairwise(widths)]))  # 24 kB
 
     def make() -> native.PairSolver:
         return native.PairSolver(native.Mlp(numbers))

@@ -7,12 +7,16 @@ Model `mlp` has random weights here: what it promises, it does whatever its weig
 """
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import poses
 import pytest
 from poses import Pairs
 
 from box_contact_ros.core import LENGTH_MAX, LENGTH_MIN, native
+from box_contact_ros.networks.models import core_numbers
+from box_contact_ros.networks.weights_file import Network
 from box_contact_ros.solver.contact import FIELDS, Contacts
 
 UNIT = (1.0, 1.0, 1.0)
@@ -24,11 +28,13 @@ nears the rounding of the longest, and points are outside by up to 1e-8 of the l
 
 def random_network(rng: np.random.Generator) -> np.ndarray:
     """Return weights of up to 1 or 1e4, one in eight of them zero, as the core reads them."""
-    most, (first, second) = rng.choice([1.0, 1e4]), rng.integers(1, 4, 2)
-    numbers = rng.uniform(-most, most, 8 * (
-        first * (1 + native.FEATURES) + second * (1 + 8 * first) + 1 + 8 * second))
-    numbers[rng.random(len(numbers)) < 1 / 8] = 0.0
-    return np.concatenate([[first, second], numbers]).astype(np.float32)
+    most, hidden = rng.choice([1.0, 1e4]), rng.integers(1, 25, 2)
+
+    def drawn(*shape: int) -> np.ndarray:
+        return rng.uniform(-most, most, shape) * (rng.random(shape) > 1 / 8)
+
+    return core_numbers(Network([(drawn(units, inputs), drawn(units)) for inputs, units in pairwise(
+        (native.FEATURES, *hidden, native.OUTPUTS))]))
 
 
 def solver(model: str, rng: np.random.Generator) -> native.Exact | native.Mlp:

@@ -372,6 +372,8 @@ def test_normals_within_the_margin() -> None:
     for bad in (np.nan, -1.0, 'far', [1.0]):
         with pytest.raises(ValueError, match='^margin '):
             ContactSolver(poses.CUBE, poses.CUBE, margin=bad)
+    near = ContactSolver(poses.CUBE, poses.CUBE, model=make_model('mlp'), margin=1.5)
+    assert near(poses.IDENTITY, apart).normal.tolist() == [0.0, 0.0, 1.0]
     with pytest.raises(ValueError, match='^margin 1 has no effect on model <.*Paper'):
         ContactSolver(poses.CUBE, poses.CUBE, model=make_model('paper'), margin=1.0)
 

@@ -150,9 +150,11 @@ def bounds_without_an_order() -> None:
 
 def a_network(rng: np.random.Generator | None = None) -> np.ndarray:
     """Return the numbers of a network with eight units in each hidden layer: random, or zeros."""
-    count = 8 * (1 + native.FEATURES) + 8 * 9 + 8 * 9
+    header = [native.FEATURES, 8, 8, native.OUTPUTS, 0, 0]
+    inputs = -(-native.FEATURES // 4) * 4
+    count = 8 * (1 + inputs) + 8 * 9 + 16 * 9
     numbers = np.zeros(count) if rng is None else rng.uniform(-1e4, 1e4, count)
-    return np.concatenate([[1.0, 1.0], numbers]).astype(np.float32)
+    return np.concatenate([header, numbers]).astype(np.float32)
 
 
 def networks_that_no_file_has() -> None:
@@ -161,8 +163,14 @@ def networks_that_no_file_has() -> None:
         network = a_network()
         network[-1] = number
         refused(ValueError, native.Mlp, network)
-    for count in (0, 2, 8):
+    for count in (0, 2, 6, 8):
         refused(ValueError, native.Mlp, np.zeros(count, np.float32))
+    for place in range(6):
+        for number in (-1.0, 0.5, 65.0, 1e4):
+            network = a_network()
+            network[place] = number
+            refused(ValueError, native.Mlp, network)
+    refused(ValueError, native.Paper, a_network())
 
 
 def threads_that_are_none() -> None:

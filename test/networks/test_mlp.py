@@ -17,8 +17,9 @@ from safetensors.numpy import save_file
 
 pytest.importorskip('benchmarks.pose_sets')
 
+from benchmarks import settled
 from benchmarks.errors import contact_errors
-from benchmarks.pose_sets import LOADS, SETS, Pairs
+from benchmarks.pose_sets import LOADS, SETS, Generator, Pairs, at_depth, log_uniform
 from benchmarks.steps import drawn_paths, largest_steps
 from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.core import (
@@ -28,8 +29,9 @@ from box_contact_ros.core import (
     UNITS_MAX,
     native,
 )
-from box_contact_ros.networks.mlp import ACTIVATION, NETWORK, core_numbers, load_mlp
-from box_contact_ros.networks.weights_file import Network, WeightsError
+from box_contact_ros.networks.models import core_numbers, mlp_numbers
+from box_contact_ros.networks.weights_file import Network, WeightsError, load_weights
+from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.contact import FIELDS, Contacts
 from box_contact_ros.solver.pose import rotation_matrix
 
@@ -53,7 +55,8 @@ def aligned(rng: np.random.Generator, n: int) -> tuple[np.ndarray, ...]:
 FAMILIES = {
     'random': poses.random_pairs, 'near-parallel': poses.near_parallel_pairs,
     'flush': poses.flush_pairs, 'equal thickness': poses.equal_thickness, 'ridges': poses.ridges,
-    'cards': poses.cards, 'aligned': aligned, **ALL_SETS}
+    'cards': poses.cards, 'aligned': aligned, **ALL_SETS,
+    'settled': settled.at_rest}
 
 
 def drawn(name: str, n: int = N) -> Pairs:
@@ -90,21 +93,27 @@ def trace(covariance: np.ndarray) -> np.ndarray:
 
 
 def assert_sound(pairs: Pairs, found: Contacts) -> None:
-    """Points and volumes are within the patch box, covariances symmetric and positive definite."""
+    """Points and volumes are within the patch box, covariances symmetric and positive definite.
+
+    The box is that of float32, but for its axis along the normal.
+    """
     rows = found.colliding
     axes, middle, half, *_ = native.mlp_inputs(*pairs.rows(rows))
     assert rows.any() and np.isfinite(found.point[rows]).all()
     reach = np.abs(found.point[rows]).max(axis=1) + pairs.size[rows]
     off = np.abs(np.einsum('nji,nj->ni', axes, found.point[rows] - middle))
-    assert np.all(off <= half + ROUNDING * reach[:, None])
+    size = pairs.size[rows]
+    deep = np.maximum(half[:, 2], -found.separation[rows])
+    inexact = FLOAT_ROUNDING * np.stack([size, size, deep], axis=1)
+    assert np.all(off <= half + inexact + ROUNDING * reach[:, None])
     volume, covariance = found.volume[rows], found.covariance[rows]
     most = np.prod(2.0 * half, axis=1)
-    assert np.all((volume > 0.0) & (volume <= (1.0 + ROUNDING) * most))
+    assert np.all((volume > 0.0) & (volume <= (1.0 + FLOAT_ROUNDING) * most))
+    across = np.einsum('nji,njk,nki->ni', axes, covariance, axes)
+    assert np.all(across <= half**2 + 1e-6 * trace(covariance)[:, None])
     assert np.array_equal(covariance, np.swapaxes(covariance, 1, 2))
     # The covariance is turned in float64, which may lose the least eigenvalue of a sliver.
     assert np.all(np.linalg.eigvalsh(covariance)[:, 0] >= -1e-15 * trace(covariance))
-    across = np.einsum('nji,njk,nki->ni', axes, covariance, axes)
-    assert np.all(across <= half**2 + 1e-6 * trace(covariance)[:, None])
 
 
 # --- what SAT gives -------------------------------------------------------------------------------
@@ -122,9 +131,9 @@ def test_verdict_separation_normal_and_axis_are_those_of_exact(
 
 # --- what holds whatever the network says ---------------------------------------------------------
 
-SHIPPED = core_numbers(load_mlp().networks[NETWORK])
-ROUNDING = 2.0**-44
-"""Of places and volumes, relative."""
+SHIPPED = mlp_numbers(resource_path('weights', 'mlp.safetensors'))
+ROUNDING, FLOAT_ROUNDING = 2.0**-44, 2.0**-21
+"""Of places and volumes, relative; and of axes in float32."""
 
 
 def network(numbers: np.ndarray, hidden: tuple[int, int] = (12, 9)) -> np.ndarray:
@@ -140,7 +149,7 @@ def network(numbers: np.ndarray, hidden: tuple[int, int] = (12, 9)) -> np.ndarra
 
 def garbage(kind: str) -> np.ndarray:
     """Return a network that was not trained."""
-    numbers = np.random.default_rng(4).normal(size=1000)
+    numbers = np.random.default_rng(4).normal(size=2000)
     factor = {'random': 1.0, 'large': 100.0, 'tiny': 1e-40}.get(kind)  # tiny: denormals
     if factor is None:  # as large as a loader believes
         return network((1e4 * np.sign(numbers)).astype(np.float32))
@@ -159,10 +168,11 @@ def test_the_bounds_hold_the_overlap(pairs: Pairs) -> None:
     """The exact centroid is between them, and the exact volume below theirs."""
     truth = pairs.contacts()
     rows = truth.colliding & (truth.separation < -1e-8 * pairs.size)
-    axes, middle, half, *_ = native.mlp_inputs(*pairs.rows(rows))
+    axes, middle, half, _ = native.mlp_inputs(*pairs.rows(rows))
     off = np.einsum('nji,nj->ni', axes, truth.point[rows] - middle)
-    assert np.all(np.abs(off) <= half + 1e-9 * pairs.size[rows, None])
-    assert np.all(truth.volume[rows] <= (1.0 + 1e-6) * np.prod(2.0 * half, axis=1))
+    assert np.all(np.abs(off) <= half + FLOAT_ROUNDING * pairs.size[rows, None])
+    thick = half.min(axis=1) > 1e-4 * pairs.size[rows]  # others are rounded by more than a percent
+    assert np.all((truth.volume[rows] <= 1.01 * np.prod(2.0 * half, axis=1))[thick])
 
 
 def test_the_network_is_really_asked() -> None:
@@ -235,7 +245,7 @@ def test_rows_apart_or_refused_do_not_disturb_neighbours(mlp: ContactSolver) -> 
         assert_same_bits(pairs.contacts(mlp), clean)
 
 
-MOVED = {'point': 2.0, 'volume': 8.0, 'covariance': 10.0}
+MOVED = {'point': 3.0, 'volume': 8.0, 'covariance': 10.0}
 """Differences after a motion [%] of 99 rows in 100. Equal boxes have frames of equal right, and as
 poses round another one of them is chosen: the difference is that of two approximations."""
 
@@ -277,21 +287,61 @@ def test_box_symmetries(mlp: ContactSolver, named_set: tuple[str, Pairs]) -> Non
 
 # --- errors and steps -----------------------------------------------------------------------------
 
-LIMITS = {'point': 1.5, 'volume': 8.0, 'covariance': 9.0}
+LIMITS = {'point': 2.0, 'volume': 12.0, 'covariance': 18.0}
 """99th percentiles of the errors on all sets [%]."""
+HARD_LIMITS = {'stacks': 4.0, 'parcels': 4.0, 'tilted stacks': 4.0}
+"""Those of the point where boxes lie on each other at any yaw."""
 WORST_STEP = 8.0
 """Largest step of the point at a vanishing change of pose [% of the smaller box's longest edge]."""
 
 
-@pytest.mark.parametrize('name', ALL_SETS)
-def test_errors_are_within_the_limits(mlp: ContactSolver, name: str) -> None:
-    """On pairs that nobody has trained on."""
-    pairs = ALL_SETS[name](np.random.default_rng([20270101, list(ALL_SETS).index(name)]), 5 * N)
+def just_touching(name: str) -> Generator:
+    """Return a set with depths of 1e-9 to 1e-6 of the size: float32 knows no place so well."""
+    def draw(rng: np.random.Generator, n: int) -> Pairs:
+        pairs = ALL_SETS[name](rng, n)
+        return at_depth(pairs, pairs.size * log_uniform(rng, 1e-9, 1e-6, len(pairs.size)))
+    return draw
+
+
+MEASURED = {**ALL_SETS, 'settled': settled.at_rest, **{
+    f'{name} that just touch': just_touching(name) for name in ('containers', 'stacks', 'parcels')}}
+
+
+@pytest.fixture(params=MEASURED)
+def measured(request: pytest.FixtureRequest) -> tuple[str, Pairs]:
+    """Return contacts that nobody has trained on."""
+    rng = np.random.default_rng([20270101, list(MEASURED).index(request.param)])
+    pairs = MEASURED[request.param](rng, 5 * N)
+    return request.param, pairs.rows(pairs.contacts().colliding)
+
+
+def test_errors_are_within_the_limits(mlp: ContactSolver, measured: tuple[str, Pairs]) -> None:
+    name, pairs = measured
     errors = contact_errors(pairs.contacts(mlp), pairs.contacts(), pairs.edge)
     for quantity, limit in LIMITS.items():
         found = getattr(errors, quantity)
         print(name, quantity, f'{np.median(found):.3g} {np.percentile(found, 99):.3g}')
+        if quantity == 'point':
+            limit = HARD_LIMITS.get(name, limit)
         assert np.percentile(found, 99) <= limit, quantity
+
+
+def test_the_network_decides(mlp: ContactSolver, measured: tuple[str, Pairs]) -> None:
+    """With its last layer zeroed, the point's 99th percentile is at least four times as large."""
+    _, pairs = measured
+    network = load_weights(resource_path('weights', 'mlp.safetensors')).networks['patch']
+    *hidden, (weight, bias) = network.layers
+    idle = core_numbers(Network([*hidden, (0.0 * weight, 0.0 * bias)]))
+    truth = pairs.contacts()
+    with_it, without = (np.percentile(contact_errors(found, truth, pairs.edge).point, 99)
+                        for found in (pairs.contacts(mlp), with_numbers(pairs, idle)))
+    assert without >= 4.0 * with_it
+
+
+def test_points_are_in_both_boxes(mlp: ContactSolver, measured: tuple[str, Pairs]) -> None:
+    """To a thousandth of the smaller box's longest edge."""
+    _, pairs = measured
+    assert np.all(pairs.beyond(pairs.contacts(mlp).point) <= 1e-3 * pairs.edge)
 
 
 @pytest.mark.parametrize('name', ALL_SETS)
@@ -318,26 +368,30 @@ def test_the_compiled_network_is_the_shipped_file() -> None:
                      with_numbers(pairs, SHIPPED))
 
 
-def written(path: Path, widths: tuple[int, ...] = (FEATURES, 4, 4, OUTPUTS), name: str = NETWORK,
+def written(path: Path, widths: tuple[int, ...] = (FEATURES, 4, 4, OUTPUTS), name: str = 'patch',
             **changes: Any) -> str:
     """Return a weights file with a network of zeros and a card that fits it, but for `changes`."""
     tensors = {f'{name}.{layer}.{part}': np.zeros(shape, np.float32)
                for layer, (inputs, outputs) in enumerate(zip(widths, widths[1:]))
                for part, shape in (('weight', (outputs, inputs)), ('bias', outputs))}
-    card = {'format': NETWORK_FORMAT, 'activation': ACTIVATION, 'architecture': list(widths)}
+    card = {'format': NETWORK_FORMAT, 'activation': 'relu', 'architecture': list(widths)}
     save_file(tensors, path, metadata={'card': json.dumps(card | changes)})
     return str(path)
 
 
-def test_a_network_of_zeros_is_the_body_of_the_chords(tmp_path: Path) -> None:
+def test_a_network_of_zeros_answers_with_the_middle(tmp_path: Path) -> None:
+    """Of the bounds, with the least volume and the least covariance."""
     pairs = drawn('crossed bars')
     found = pairs.contacts(ContactSolver(
         model=make_model('mlp', weights=written(tmp_path / 'zeros'))))
     rows = found.colliding
-    axes, middle, half, _, volume, mean, _ = native.mlp_inputs(*pairs.rows(rows))
-    np.testing.assert_allclose(found.volume[rows], volume * np.prod(2.0 * half, axis=1), rtol=1e-6)
-    np.testing.assert_allclose(
-        found.point[rows], middle + np.einsum('nij,nj->ni', axes, half * mean), atol=1e-6)
+    axes, middle, half, _ = native.mlp_inputs(*pairs.rows(rows))
+    inside = pairs.rows(rows).beyond(middle) < 0.0  # what is not is moved into both boxes
+    assert inside.mean() > 0.5
+    np.testing.assert_allclose(found.volume[rows], 1e-5 * np.prod(2.0 * half, axis=1), rtol=1e-5)
+    np.testing.assert_allclose(found.point[rows][inside], middle[inside], atol=1e-6)
+    shape = axes @ ((1e-3 * half)[..., None]**2 * np.swapaxes(axes, 1, 2))
+    np.testing.assert_allclose(found.covariance[rows], shape, atol=1e-12)
 
 
 @pytest.mark.parametrize('hidden', [(), (8,), (8, 8, 8), (UNITS_MAX + 1, 8)])
@@ -349,8 +403,8 @@ def test_layers_that_the_core_does_not_have_are_refused(tmp_path: Path, hidden: 
 
 
 @pytest.mark.parametrize('change, words', [
-    ({'format': NETWORK_FORMAT - 1}, f'has format 3; this version reads {NETWORK_FORMAT}'),
-    ({'format': '4'}, "has format '4'"), ({'format': True}, 'has format True'),
+    ({'format': NETWORK_FORMAT - 1}, f'has format 4; this version reads {NETWORK_FORMAT}'),
+    ({'format': '5'}, "has format '5'"), ({'format': True}, 'has format True'),
     ({'format': None}, 'has format None'),
     ({'activation': 'softsign'}, "units are 'relu', not 'softsign'"),
     ({'activation': None}, "units are 'relu', not None"),
@@ -365,7 +419,8 @@ def test_weights_with_another_meaning_are_refused(
 
 
 @pytest.mark.parametrize('numbers', [SHIPPED[:-1], SHIPPED[2:], np.zeros(1, np.float32),
-                                     np.r_[np.float32(9), SHIPPED[1:]]])
+                                     np.r_[np.float32(9), SHIPPED[1:]],
+                                     np.r_[SHIPPED[:1], np.float32(65), SHIPPED[2:]]])
 def test_numbers_that_are_no_network_are_refused(numbers: np.ndarray) -> None:
     with pytest.raises(ValueError, match='the network does not fit'):
         native.Mlp(numbers)

@@ -9,8 +9,12 @@ import poses
 import pytest
 
 from box_contact_ros import ContactSolver, make_model
-from box_contact_ros.networks.weights_file import WeightsError
+from box_contact_ros.core import native
+from box_contact_ros.networks.models import PaperWeights, mlp_numbers
+from box_contact_ros.networks.weights_file import WeightsError, load_weights
 from box_contact_ros.resources import resource_path
+
+numpy_model = pytest.importorskip('benchmarks.paper.numpy_model')
 
 EDGE = 2.0
 MODELS = {'cubes': poses.CUBE, 'containers': poses.CONTAINER}
@@ -48,6 +52,35 @@ def test_error_on_touching_boxes():
     assert error.mean() < 0.6
     assert np.degrees(np.arccos(cosine)).mean() < 12.0
     assert np.array_equal(found.separation, truth.separation)
+
+
+@pytest.mark.parametrize('file', ['paper', 'paper-12.192x2.438x2.591',
+                                  'paper-12.192x2.438x2.591-place'])
+def test_it_is_numpys_model(file):
+    """In float64 but for the network: differences of float32, and of angles to 1e-5."""
+    weights = load_weights(resource_path('weights', f'{file}.safetensors'))
+    size = np.array(weights.card['sizes'][0])
+    model = make_model('paper', weights=weights.path)
+    a, b = touching(size, n=10_000, depth=0.01 * size.min())
+    found, wanted = (ContactSolver(size, size, model=one).batch(a, b)
+                     for one in (model, numpy_model.NumpyPaper(weights, size)))
+    for difference in ((found.point - wanted.point) / size.max(), found.normal - wanted.normal):
+        lengths = np.linalg.norm(difference, axis=1)
+        assert np.quantile(lengths, 0.999) < 1e-4 and lengths.max() < 1e-3
+    one, refused = model.solve(a, b, size[None], size[None])
+    assert refused == -1 and np.array_equal(one.point, found.point)
+
+
+def test_garbage_for_weights_stays_finite():
+    """Weights as large as a loader believes: directions stay directions."""
+    weights = load_weights(resource_path('weights', 'paper.safetensors'))
+    numbers = PaperWeights(weights).numbers.copy()
+    numbers[6:] = 1e4 * np.sign(np.random.default_rng(4).normal(size=len(numbers) - 6))
+    a, b = touching(np.array(poses.CUBE), n=1000, depth=0.02)
+    solver = native.PairSolver(native.Paper(numbers), poses.CUBE, poses.CUBE)
+    found = solver.batch(a, b)
+    assert np.isfinite(found.point).all()
+    assert np.abs(np.linalg.norm(found.normal, axis=1) - 1).max() < 1e-12
 
 
 @pytest.mark.parametrize('name', MODELS)
@@ -174,3 +207,7 @@ def test_weights_for_something_else_are_refused():
         ContactSolver(poses.CONTAINER, poses.CONTAINER, model=make_model('paper', weights=cubes))
     with pytest.raises(WeightsError, match='does not exist'):
         make_model('paper', weights='nowhere.safetensors')
+    with pytest.raises(WeightsError, match="no network 'contact' with 6 inputs and 4 or 3 outputs"):
+        make_model('paper', weights=resource_path('weights', 'mlp.safetensors'))
+    with pytest.raises(ValueError, match='the network does not fit'):
+        native.Paper(mlp_numbers(resource_path('weights', 'mlp.safetensors')))

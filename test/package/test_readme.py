@@ -39,7 +39,7 @@ from box_contact_msgs.srv import Check
 from box_contact_ros import PatchForces
 from box_contact_ros.core import DEPTH_FLOOR
 from box_contact_ros.models import most_near
-from box_contact_ros.networks.mlp import NETWORK, load_mlp
+from box_contact_ros.networks.weights_file import load_weights
 from box_contact_ros.node import check, diagnostics, topics
 from box_contact_ros.node.check import Checker
 from box_contact_ros.node.contact_node import PARAMETERS
@@ -408,13 +408,12 @@ def constant(file: str, name: str) -> str:
 
 
 HARD = [len(cases.pairs.pose_a) for cases in hard_poses.load().values()]
-LAYERS = [weights.shape for weights, _ in load_mlp().networks[NETWORK].layers]
+LAYERS = [weights.shape for weights, _ in load_weights(
+    ROOT / 'weights' / 'mlp.safetensors').networks['patch'].layers]
 STEPS = inspect.signature(PatchForces).parameters
-FORCES, CHORDS, AXIS = 'force/block.hpp', 'mlp/chords.hpp', 'separating_axis.hpp'
+FORCES, AXIS = 'force/block.hpp', 'separating_axis.hpp'
 SOFT, LATE, PARALLEL = (constant(file, name) for file, name in (
     (FORCES, 'soft_frequency'), (FORCES, 'late_frequency'), (AXIS, 'parallel')))
-LEVELS = int(constant(CHORDS, 'levels'))
-STRONGEST = 1 + int(constant('mlp/mlp_model.hpp', 'most_exponent'))
 LENGTHS, QUATERNIONS = (
     ' to '.join(constant('poses.hpp', f'{what}_{end}') for end in ('min', 'max'))
     for what in ('length', 'quaternion'))
@@ -438,10 +437,8 @@ LIMITS = {
         f'faster than {constant(FORCES, "push_out_limit")} m/s',
         f'overdue by {constant(FORCES, "overdue_periods")} periods'),
     'explanation/mlp.md': (
-        f'{8 * LEVELS} lines along x', f'reads {LAYERS[0][1]} features',
-        f'two hidden layers of {LAYERS[1][0]} rectified units and {LAYERS[-1][0]} outputs',
-        f'from 1/{STRONGEST} to {STRONGEST}',
-        f'{constant(CHORDS, "least_variance")} of the squared half extents'),
+        f'reads {LAYERS[0][1]} features',
+        f'two hidden layers of {LAYERS[1][0]} rectified units and {LAYERS[-1][0]} outputs'),
     'explanation/separating_axis.md': (
         f'shorter than {PARALLEL} are skipped', f'within {judge.TOLERANCE:g} of the size'),
     'how-to/security.md': (

@@ -161,6 +161,6 @@ def test_the_default_reads_no_file_and_imports_no_other_model():
             'from box_contact_ros import ContactSolver\n'
             'pathlib.Path.open = builtins.open = None\n'
             'ContactSolver(model="mlp")\n'
-            'print({"fcl", "safetensors", "box_contact_ros.networks.paper"} & {*sys.modules})')
+            'print({"fcl", "safetensors", "box_contact_ros.networks.models"} & {*sys.modules})')
     done = python(code)
     assert done.stdout == 'set()\n', done.stderr

@@ -12,11 +12,13 @@ import pytest
 import torch
 
 from benchmarks.errors import contact_errors
-from benchmarks.pose_sets import SETS, Pairs
+from benchmarks.pose_sets import LOADS, SETS, Pairs
 from benchmarks.weights import save_weights
 from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.core import FEATURES, OUTPUTS
-from box_contact_ros.networks.mlp import NETWORK, load_mlp
+from box_contact_ros.networks.models import network_of
+from box_contact_ros.networks.weights_file import load_weights
+from box_contact_ros.resources import resource_path
 from training import __main__ as train
 from training import recipe, samples
 from training.fit import PatchNetwork, errors_of, fit, loss_of, tensors
@@ -24,6 +26,7 @@ from training.samples import MlpSamples, describe
 
 pytestmark = pytest.mark.training
 PAIRS = 20_000
+SHIPPED = load_weights(resource_path('weights', 'mlp.safetensors'))
 
 
 @pytest.fixture(scope='module')
@@ -42,11 +45,12 @@ def test_samples_are_the_exact_overlap(pairs: Pairs, data: MlpSamples) -> None:
     assert len(data) > 0.8 * PAIRS
     for array in vars(data).values():
         assert np.isfinite(array).all() and len(array) == len(data)
-    assert np.abs(data.true_mean).max() < 1.0 and np.all(data.true_volume <= 1.0)
+    thick, pressed = data.half.min(axis=1) > 1e-4, data.half.min(axis=1) < 1e-7
+    assert np.abs(data.mean[~pressed]).max() < 1.01 and np.all(data.volume[thick] <= 1.01)
     edge = pairs.edge[describe(pairs)[1]]
     scale = data.half * edge[:, None]
-    np.testing.assert_allclose(8.0 * scale.prod(axis=1) * data.true_volume, exact.volume, rtol=1e-9)
-    variances = np.einsum('nii,ni->n', data.true_covariance, scale**2)
+    np.testing.assert_allclose(8.0 * scale.prod(axis=1) * data.volume, exact.volume, rtol=1e-9)
+    variances = np.einsum('nii,ni->n', data.covariance, scale**2)
     np.testing.assert_allclose(variances, np.trace(exact.covariance, axis1=1, axis2=2), rtol=1e-6)
 
 
@@ -59,8 +63,8 @@ def test_errors_are_those_of_the_core(pairs: Pairs, tmp_path: Path, hidden: tupl
     with torch.no_grad():
         for parameter in network.parameters():
             parameter.copy_(torch.randn(parameter.shape))
-    save_weights(tmp_path / 'mlp.safetensors', {NETWORK: network.layers()},
-                 {**load_mlp().card, 'architecture': [FEATURES, *hidden, OUTPUTS]})
+    save_weights(tmp_path / 'mlp.safetensors', {'patch': network.layers()},
+                 {**SHIPPED.card, 'architecture': [FEATURES, *hidden, OUTPUTS]})
     solver = ContactSolver(model=make_model('mlp', weights=tmp_path / 'mlp.safetensors'))
     data, rows = describe(pairs)
     asked = pairs.rows(rows)
@@ -68,8 +72,13 @@ def test_errors_are_those_of_the_core(pairs: Pairs, tmp_path: Path, hidden: tupl
     with torch.no_grad():
         errors = errors_of(network, tensors(data))
     assert np.median(expected.volume) > 10.0
-    for of_fit, of_core in zip(errors, expected):
-        np.testing.assert_allclose(100.0 * of_fit.numpy(), of_core, rtol=5e-3, atol=0.02)
+    (fitted, found), *others = ((100.0 * of_fit.numpy(), of_core)
+                                for of_fit, of_core in zip(errors, expected))
+    for of_fit, of_core in others:
+        np.testing.assert_allclose(of_fit, of_core, rtol=5e-3, atol=0.02)
+    # The core moves points into both boxes, which brings them closer to all that is there.
+    assert np.all(found <= 1.005 * fitted + 0.02)
+    assert np.mean(np.abs(found - fitted) < 0.02) > 0.2
 
 
 def test_the_fit_lowers_the_loss_and_follows_the_seed(data: MlpSamples) -> None:
@@ -99,7 +108,8 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_quick_training(quick: Path, data: MlpSamples) -> None:
     """Weights that load, the spread of all seeds, true metrics, an error that has fallen."""
-    weights = load_mlp(str(quick))
+    weights = load_weights(quick)
+    assert network_of(weights, 'mlp').widths[0] == FEATURES
     card: dict[str, Any] = weights.card
     assert [path.name for path in quick.parent.iterdir()] == ['mlp-6-5.safetensors']
     assert card['architecture'] == [FEATURES, 6, 5, OUTPUTS] and card['sizes'] == []
@@ -107,10 +117,10 @@ def test_quick_training(quick: Path, data: MlpSamples) -> None:
     assert len(card['spread']) == recipe.QUICK['networks'] == 2
     assert card['spread'][0] != card['spread'][1]
     assert card['seed'] in (3, 4)  # that of the network which is written
-    assert card['metrics'].keys() == SETS.keys()
+    assert card['metrics'].keys() == {*SETS, *LOADS, 'settled'}
     assert card['metrics'] == recipe.measured(quick, 3, recipe.QUICK['metric_pairs'])
     body, learned = PatchNetwork((6, 5)), PatchNetwork((6, 5))
-    layers = [part for layer in weights.networks[NETWORK].layers for part in layer]
+    layers = [part for layer in weights.networks['patch'].layers for part in layer]
     with torch.no_grad():
         for parameter, zero, array in zip(learned.parameters(), body.parameters(), layers):
             parameter.copy_(torch.from_numpy(array.copy()))
@@ -119,17 +129,17 @@ def test_quick_training(quick: Path, data: MlpSamples) -> None:
     assert loss_of(one) < loss_of(other)
 
 
-def test_other_sizes_go_to_the_benchmarks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_sizes_go_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each under its own name, and the compiled-in weights stay as they are."""
     trained: dict[str, tuple[int, int]] = {}
 
     def train_one(path: Path, *, hidden: tuple[int, int], **_: object) -> dict[str, Any]:
         trained[path.name] = hidden
         assert path.parent == tmp_path
-        return {**load_mlp().card, 'training': {'minutes': 0.0}}
+        return {**SHIPPED.card, 'training': {'minutes': 0.0}}
 
     monkeypatch.setattr(recipe, 'train', train_one)
-    monkeypatch.setattr(train, 'SIZES_FOLDER', tmp_path)
+    monkeypatch.setattr(train.jobs, 'SHIPPED', tmp_path)
     monkeypatch.setattr(train, 'SHIPPED_HEADER', tmp_path / 'unwritten.hpp')
     assert train.main(['mlp', '--sizes']) == 0
     assert train.main(['mlp', '--hidden', '3', '5']) == 0

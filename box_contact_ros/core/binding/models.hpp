@@ -1,7 +1,7 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// Classes `Exact` and `Mlp`: the models of the library as objects. Sizes come with each call.
+// Classes `Exact`, `Mlp` and `Paper`: the models of the library as objects. Sizes come with each call.
 #pragma once
 
 #include <algorithm>
@@ -22,11 +22,11 @@ using detail::Counts;
 using detail::Model;
 
 inline const detail::Kernel* kernel = nullptr;  // of this process
-inline PyTypeObject *exact_type = nullptr, *mlp_type = nullptr;
+inline PyTypeObject *exact_type = nullptr, *mlp_type = nullptr, *paper_type = nullptr;
 
 struct NativeModel {
   Model kind = Model::exact;
-  std::vector<float> network;    // of `Mlp`
+  std::vector<float> network;    // of `Mlp` and `Paper`
   std::atomic<long> clipped{0};  // contacts that took another way than most
 
   detail::Solver solver() const { return {kernel, kind, network.data()}; }
@@ -48,7 +48,8 @@ struct NativeModel {
 using ModelObject = Holder<std::unique_ptr<NativeModel>>;
 
 inline bool is_native_model(PyObject* object) {
-  return Py_IS_TYPE(object, exact_type) || Py_IS_TYPE(object, mlp_type);
+  return Py_IS_TYPE(object, exact_type) || Py_IS_TYPE(object, mlp_type) ||
+         Py_IS_TYPE(object, paper_type);
 }
 
 // Whether a weight is believed: trained ones stay below 1e2, a flipped exponent bit does not.
@@ -62,21 +63,30 @@ inline std::vector<float> read_network(PyObject* object) {
   return {array.numbers, end};
 }
 
-// Whether a model has the network that it needs. A network of `mlp` has the groups of each hidden
-// layer, then groups of eight units: their biases, and their weights for each input (mlp/network.hpp).
+// Whether a model has the network that it needs, in the form of mlp/network.hpp.
 inline bool fits(Model model, const std::vector<float>& network) {
   if (model == Model::exact) return network.empty();
-  constexpr long most = detail::network_units_max / 8;
-  if (network.size() < 2) return false;
-  float first = network[0], second = network[1];
-  if (!(first >= 1.0F && first <= most && second >= 1.0F && second <= most)) return false;
-  long groups = long(first), next = long(second);
-  long units = 8 * (1 + detail::network_features) * groups + 8 * (1 + 8 * groups) * next;
-  return long(network.size()) == 2 + units + 8 * (1 + 8 * next);
+  if (network.size() < detail::network_header) return false;
+  constexpr float most = detail::network_units_max;
+  for (int k = 1; k <= 2; ++k)
+    if (!(network[k] >= 1.0F && network[k] <= most && network[k] == std::floor(network[k])))
+      return false;
+  bool is_mlp = model == Model::mlp;
+  float inputs = is_mlp ? detail::network_features : detail::paper_inputs;
+  float outputs = is_mlp ? detail::network_outputs : detail::paper_outputs;
+  bool fewer = !is_mlp && network[3] == detail::paper_places;
+  if (network[0] != inputs || !(network[3] == outputs || fewer)) return false;
+  for (int k = 4; k <= 5; ++k)
+    if (network[k] != 0.0F && network[k] != 1.0F) return false;
+  long wanted = detail::network_header;
+  for (int k = 0; k < 3; ++k)
+    wanted += (long(network[k + 1]) + 7) / 8 * 8 * (1 + (long(network[k]) + 3) / 4 * 4);
+  return long(network.size()) == wanted;
 }
 
 inline PyObject* make_model(PyTypeObject* type, std::unique_ptr<NativeModel> model) {
-  if (!fits(model->kind, model->network)) fail(PyExc_ValueError, "the network does not fit `Mlp`");
+  if (!fits(model->kind, model->network))
+    fail(PyExc_ValueError, "the network does not fit the model");
   // core/__init__.py goes no further.
   if (!kernel) fail(PyExc_RuntimeError, "the environment names an unknown instruction set");
   return ModelObject::make(type, std::move(model));
@@ -105,10 +115,21 @@ inline PyObject* mlp_new(PyTypeObject* type, PyObject* args, PyObject* keywords)
   return make_model(type, std::move(model));
 }
 
+inline PyObject* paper_new(PyTypeObject* type, PyObject* args, PyObject* keywords) {
+  PyObject* network;
+  static const char* names[] = {"network", nullptr};
+  if (!PyArg_ParseTupleAndKeywords(args, keywords, "O:Paper", const_cast<char**>(names), &network))
+    return nullptr;
+  auto model = std::make_unique<NativeModel>();
+  model->kind = Model::paper;
+  model->network = read_network(network);
+  return make_model(type, std::move(model));
+}
+
 inline PyObject* exact_reduce(PyObject* self, PyObject*) {
   return Py_BuildValue("(O())", Py_TYPE(self));
 }
-inline PyObject* mlp_reduce(PyObject* self, PyObject*) {
+inline PyObject* network_reduce(PyObject* self, PyObject*) {
   const std::vector<float>& network = ModelObject::of(self)->network;
   auto array = make<float>({npy_intp(network.size())});
   std::copy(network.begin(), network.end(), array.numbers);
@@ -146,9 +167,9 @@ inline PyMethodDef exact_methods[] = {
     solve_method(method<model_solve>()),
     {"__reduce__", method<exact_reduce>(), METH_NOARGS, "Pickle nothing."},
     {}};
-inline PyMethodDef mlp_methods[] = {
+inline PyMethodDef network_methods[] = {
     solve_method(method<model_solve>()),
-    {"__reduce__", method<mlp_reduce>(), METH_NOARGS, "Pickle the network."},
+    {"__reduce__", method<network_reduce>(), METH_NOARGS, "Pickle the network."},
     {}};
 inline PyGetSetDef model_attributes[] = {{"clipped", Guarded<model_clipped>::call, nullptr,
                                           "Contacts of `Exact` that were clipped.", nullptr},
@@ -167,12 +188,23 @@ inline PyType_Slot mlp_slots[] = {
                                   "Model `mlp` with the shipped network, or one (n,) float32.")},
     {Py_tp_new, slot<mlp_new>()},
     {Py_tp_dealloc, reinterpret_cast<void*>(ModelObject::dealloc)},
-    {Py_tp_methods, mlp_methods},
+    {Py_tp_methods, network_methods},
+    {Py_tp_getset, model_attributes},
+    {0, nullptr}};
+inline PyType_Slot paper_slots[] = {
+    {Py_tp_doc, const_cast<char*>("Paper(network)\n--\n\n"
+                                  "Model `paper` with a network (n,) float32, for two boxes of the\n"
+                                  "size that it was trained for: `solve` checks no sizes.")},
+    {Py_tp_new, slot<paper_new>()},
+    {Py_tp_dealloc, reinterpret_cast<void*>(ModelObject::dealloc)},
+    {Py_tp_methods, network_methods},
     {Py_tp_getset, model_attributes},
     {0, nullptr}};
 inline PyType_Spec exact_spec = {"box_contact_ros.core._native.Exact", sizeof(ModelObject), 0,
                                  Py_TPFLAGS_DEFAULT | Py_TPFLAGS_IMMUTABLETYPE, exact_slots};
 inline PyType_Spec mlp_spec = {"box_contact_ros.core._native.Mlp", sizeof(ModelObject), 0,
                                Py_TPFLAGS_DEFAULT | Py_TPFLAGS_IMMUTABLETYPE, mlp_slots};
+inline PyType_Spec paper_spec = {"box_contact_ros.core._native.Paper", sizeof(ModelObject), 0,
+                                 Py_TPFLAGS_DEFAULT | Py_TPFLAGS_IMMUTABLETYPE, paper_slots};
 
 }  // namespace box_contact::binding

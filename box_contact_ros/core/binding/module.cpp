@@ -45,10 +45,8 @@ PyMethodDef module_methods[] = {
     {"mlp_inputs", method<mlp_inputs>(), METH_FASTCALL,
      "mlp_inputs(poses_a, poses_b, sizes_a, sizes_b)\n--\n\n"
      "Return what model `mlp` reads of n pairs that touch.\n\n"
-     "axes (n, 3, 3), middle (n, 3), half (n, 3) of the patch box: its axes as columns, mirrored so\n"
-     "that no mean is below 0, common frame [m]. features (n, FEATURES) of the network. volume (n,),\n"
-     "mean (n, 3) and covariance (n, 3, 3) of the body that the chords sum to: coordinates of the\n"
-     "patch box, -1 to 1, and its volume."},
+     "axes (n, 3, 3), middle (n, 3), half (n, 3) of the patch box: its axes as columns, mirrored as\n"
+     "the features are, common frame [m]. features (n, FEATURES) of the network."},
     {"clipped", method<clipped>(), METH_FASTCALL,
      "clipped(poses_a, poses_b, sizes_a, sizes_b)\n--\n\n"
      "Return points, volumes and covariances of n pairs that touch, all by clipping: for tests."},
@@ -76,6 +74,7 @@ PyObject* make_module() {
   contact_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&contact_spec)));
   exact_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&exact_spec)));
   mlp_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&mlp_spec)));
+  paper_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&paper_spec)));
   name_call_general = made(PyUnicode_InternFromString("_call_general"));
   name_batch_general = made(PyUnicode_InternFromString("_batch_general"));
   Owned module(made(PyModule_Create(&module_definition)));
@@ -90,6 +89,7 @@ PyObject* make_module() {
   add("Contact", Py_NewRef(contact_type));
   add("Exact", Py_NewRef(exact_type));
   add("Mlp", Py_NewRef(mlp_type));
+  add("Paper", Py_NewRef(paper_type));
   add("PairSolver", PyType_FromSpec(&solver_spec));
   add("BroadPhase", PyType_FromSpec(&broad_phase_spec));
   add("PatchForces", PyType_FromSpec(&forces_spec));

@@ -69,7 +69,7 @@ inline int solver_init(PyObject* self, PyObject* args, PyObject* keywords) {
     setup->model = ModelObject::of(model).get();
     solver.setup = std::move(setup);
   } else if (model != Py_None) {
-    fail(PyExc_TypeError, "model is an Exact, an Mlp, or None");
+    fail(PyExc_TypeError, "model is an Exact, an Mlp, a Paper, or None");
   }
   solver.is_made = true;
   return 0;
@@ -120,6 +120,8 @@ struct PlainBatch {
     PyObject *key, *value;
     for (Py_ssize_t place = 0; keywords && PyDict_Next(keywords, &place, &key, &value);)
       if (!PyUnicode_Check(key) || !read_keyword(key, value)) return false;
+    bool are_known = rows.sizes_a == setup.size_a && rows.sizes_b == setup.size_b;
+    if (setup.model->kind == Model::paper && !are_known) return false;  // Python checks new sizes
     return rows.sizes_a && rows.sizes_b && by_place == (rows.pairs != nullptr);
   }
 
@@ -191,7 +193,7 @@ inline PyType_Slot solver_slots[] = {
     {Py_tp_doc,
      const_cast<char*>(
          "PairSolver(model, size_a=None, size_b=None, margin=0.0)\n--\n\n"
-         "Solve pairs of boxes by an Exact or an Mlp; model None leaves all to Python.\n\n"
+         "Solve pairs of boxes by an Exact, an Mlp or a Paper; model None leaves all to Python.\n\n"
          "A call with two poses (7,) returns a Contact, and batch(poses_a, poses_b) returns "
          "Contacts. What is no plain array, tuple or list of numbers, and what is refused, goes to "
          "self._call_general(pose_a, pose_b) and self._batch_general(...).")},

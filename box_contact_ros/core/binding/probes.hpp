@@ -26,36 +26,29 @@ void each_query(const PairArrays& pairs, Probe probe) {
   }
 }
 
-// What model `mlp` makes of pairs that touch: the patch box, and the body that the chords sum to.
+// What model `mlp` makes of pairs that touch: the patch box, and what is cut off it.
 inline PyObject* mlp_inputs(PyObject*, PyObject* const* args, Py_ssize_t count) {
   if (count != 4) fail(PyExc_TypeError, "mlp_inputs(poses_a, poses_b, sizes_a, sizes_b)");
   PairArrays pairs(args, Py_None);
   npy_intp n = pairs.count;
   constexpr npy_intp features_count = detail::network_features;
   auto axes = make<double>({n, 3, 3}), middle = make<double>({n, 3}), half = make<double>({n, 3});
-  auto features = make<double>({n, features_count}), volume = make<double>({n});
-  auto mean = make<double>({n, 3}), covariance = make<double>({n, 3, 3});
+  auto features = make<double>({n, features_count});
   each_query(pairs, [&](const Query<double>& q, long row) {
-    mlp::PatchBox<double> box(q);
-    mlp::Chords<float> chords(box);
-    mlp::PlacedBox<double> placed(q.pair, box);
-    float told[features_count];
-    chords.tell(told);
-    std::copy_n(told, features_count, features.numbers + features_count * row);
-    volume.numbers[row] = chords.volume;
-    Sym<double> body;
+    mlp::Patches<double> patches(q);
+    mlp::Cuts<float> cuts(patches.box);
+    std::copy_n(cuts.told, features_count, features.numbers + features_count * row);
+    Triple<double> place = patches.place(patches.box.centre, 0);
+    write(components<double>(point_in_common_frame(q.pair, place)), middle.numbers + 3 * row);
+    Columns<double> common;
     for (int k = 0; k < 3; ++k) {
-      placed.axes[k] = double(chords.flip[k]) * placed.axes[k];
-      middle.numbers[3 * row + k] = placed.middle[k];
-      half.numbers[3 * row + k] = box.half[k];
-      mean.numbers[3 * row + k] = chords.mean[k];
-      body(k, k) = chords.variance[k];
-      body((k + 1) % 3, (k + 2) % 3) = chords.beside[k];
+      auto axis = k == 2 ? q.axis.normal : triple_of_doubles<double>(patches.frame.in_a[k], 0);
+      common[k] = q.pair.axes_a * (double(cuts.flip[k]) * axis);
+      half.numbers[3 * row + k] = patches.meetings[0].unit * patches.box.half[k];
     }
-    write(matrix(placed.axes), axes.numbers + 9 * row);
-    write(matrix(body), covariance.numbers + 9 * row);
+    write(matrix(common), axes.numbers + 9 * row);
   });
-  return pack(&PyTuple_Type, axes, middle, half, features, volume, mean, covariance);
+  return pack(&PyTuple_Type, axes, middle, half, features);
 }
 
 // The moments of pairs that touch, all by clipping.

@@ -5,6 +5,7 @@
 #include "kernel.hpp"
 
 #include "mlp/mlp_model.hpp"
+#include "mlp/paper_model.hpp"
 #include "pair.hpp"
 #include "queue.hpp"
 
@@ -55,11 +56,14 @@ long rows_by(const float* network, const Rows& rows, long begin, long end, const
 
 namespace box_contact::detail {
 
-const Kernel KERNEL = {
-    name,
-    title,
-    lanes,
-    {{pair_by<ExactPointModel>, pair_by<ExactModel>}, {pair_by<MlpPointModel>, pair_by<MlpModel>}},
-    {{rows_by<ExactPointModel>, rows_by<ExactModel>}, {rows_by<MlpPointModel>, rows_by<MlpModel>}}};
+const Kernel KERNEL = {name,
+                       title,
+                       lanes,
+                       {{pair_by<ExactPointModel>, pair_by<ExactModel>},
+                        {pair_by<MlpPointModel>, pair_by<MlpModel>},
+                        {pair_by<PaperModel>, pair_by<PaperModel>}},
+                       {{rows_by<ExactPointModel>, rows_by<ExactModel>},
+                        {rows_by<MlpPointModel>, rows_by<MlpModel>},
+                        {rows_by<PaperModel>, rows_by<PaperModel>}}};
 
 }  // namespace box_contact::detail

@@ -13,8 +13,13 @@ namespace box_contact::detail {
 
 // The network of model `mlp`: the features of the overlap that it reads, its outputs, and the most units
 // of a hidden layer. `network_format` counts changes of what features and outputs mean.
-constexpr int network_format = 4, network_features = 21, network_outputs = 7,
+constexpr int network_format = 5, network_features = 19, network_outputs = 10,
               network_units_max = 64;
+// The same of model `paper`: four angles, or the three coordinates of a place.
+constexpr int paper_inputs = 6, paper_outputs = 4, paper_places = 3;
+// Numbers before the weights of a network: inputs, units of both hidden layers, outputs, whether the
+// hidden units are tanh or rectified, and whether lengths are in half edges of cubes or in metres.
+constexpr int network_header = 6;
 
 // A step of 0 gives all rows the same sizes, one of 3 each row its own.
 struct Rows {
@@ -46,8 +51,8 @@ struct Counts {
   void operator+=(const Counts& part) { clipped += part.clipped; }
 };
 
-enum class Model { exact, mlp };
-constexpr int model_count = 2;
+enum class Model { exact, mlp, paper };
+constexpr int model_count = 3;
 
 // Whether a function finds point and volume alone, or all moments.
 enum class Finds { point, patch };

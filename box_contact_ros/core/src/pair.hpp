@@ -43,7 +43,7 @@ BC_INLINE bool solve_pair(const Model& model, const detail::PairNumbers& pair, d
   contact.axis = q.pair.swapped ? swapped_axis(q.axis.axis) : q.axis.axis;
   const Triple<double> unknown = uniform(not_a_number);
   using Found = typename Model::template Found<double>;
-  if (!q.touching || std::is_same_v<Found, PointAndVolume<double>>)
+  if (!q.touching || !std::is_same_v<Found, Moments<double>>)
     for (double(&row)[3] : contact.covariance) store(unknown, row);
   if (!q.touching) {
     store(unknown, contact.point);
@@ -59,6 +59,7 @@ BC_INLINE bool solve_pair(const Model& model, const detail::PairNumbers& pair, d
   Found overlap;
   model.solve(q, overlap, counts);  // a pair alone is left to nobody
   store(overlap, contact);
+  if constexpr (has_normal<Found>) store(triple(overlap.normal), contact.normal);
   return true;
 }
 

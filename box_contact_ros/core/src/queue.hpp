@@ -16,10 +16,6 @@ namespace box_contact::BOX_CONTACT_SET {
 // cache. Eight of eight pairs have 32 kB.
 constexpr int blocks_at_once = 8;
 
-BC_INLINE bool want_overlap(const Results& results) {
-  return results.point || results.volume || results.covariance;
-}
-
 // Pairs side by side, and their rows.
 template <class T>
 struct Block {
@@ -51,6 +47,13 @@ struct Block {
   }
 };
 
+// Whether a model solves two blocks at once: it has `solve_two(query, other, found, other_found)` and
+// leaves no pair.
+template <class T, class Model, class = void>
+constexpr bool takes_two = false;
+template <class T, class Model>
+constexpr bool takes_two<T, Model, std::void_t<decltype(&Model::template solve_two<T>)>> = true;
+
 // The overlaps of a batch.
 template <class T, class Model>
 class Queue {
@@ -69,23 +72,46 @@ class Queue {
     for (; touching; touching &= touching - 1)
       if (waiting_.take(block, __builtin_ctz(touching))) solve_waiting();
   }
+  // The memory of the blocks that were added is about to be used anew.
+  BC_INLINE void keep() {
+    if (first_ && first_ != &kept_) {
+      kept_ = *first_;
+      first_ = &kept_;
+    }
+  }
   BC_INLINE void finish() {
     if (waiting_.count) solve_waiting();
-    if (left_.count) solve_left();
+    if constexpr (!takes_two<T, Model>)
+      if (left_.count) solve_left();
+    if (first_) solve_two(*first_, *first_);
   }
 
  private:
   BC_INLINE void solve(const Block<T>& block) {
-    typename Model::template Found<T> found{};
-    unsigned left = model_.solve(block.query, found, counts_),
-             touching = bits(block.query.touching);
-    write_overlaps<T>(found, touching & ~left, block.rows, results_);
-    for (left &= touching; left; left &= left - 1)
-      if (left_.take(block, __builtin_ctz(left))) solve_left();
+    if constexpr (takes_two<T, Model>) {
+      if (first_) solve_two(*first_, block);
+      first_ = first_ ? nullptr : &block;
+    } else {
+      typename Model::template Found<T> found{};
+      unsigned left = model_.solve(block.query, found, counts_),
+               touching = bits(block.query.touching);
+      write_overlaps<T>(found, touching & ~left, block.rows, results_);
+      for (left &= touching; left; left &= left - 1)
+        if (left_.take(block, __builtin_ctz(left))) solve_left();
+    }
+  }
+  BC_INLINE void solve_two(const Block<T>& one, const Block<T>& other) {
+    if constexpr (takes_two<T, Model>) {
+      typename Model::template Found<T> found, other_found;
+      model_.solve_two(one.query, other.query, found, other_found);
+      write_overlaps<T>(found, bits(one.query.touching), one.rows, results_);
+      write_overlaps<T>(other_found, bits(other.query.touching), other.rows, results_);
+    }
   }
   BC_INLINE void solve_waiting() {
     waiting_.fill();
     solve(waiting_);
+    keep();
     waiting_.count = 0;
   }
   [[gnu::noinline]] void solve_left() {
@@ -99,8 +125,10 @@ class Queue {
   const Model& model_;
   const Results& results_;
   Counts& counts_;
-  Block<T> waiting_;  // for others, to fill a block
-  Block<T> left_;     // by the model, for others of their kind
+  Block<T> waiting_;                 // for others, to fill a block
+  Block<T> left_;                    // by the model, for others of their kind
+  const Block<T>* first_ = nullptr;  // of two that a model solves at once, and waits for the second
+  Block<T> kept_;                    // it, where its memory is used anew
 };
 
 // A row alone. No model leaves it.
@@ -109,12 +137,13 @@ template <class Model>
                                         const Results& results, Counts& counts) {
   Query<double> query;
   query_rows(rows, row, row + 1, query);
+  long refused = write_query(query, row, row + 1, results);
   if (query.touching && want_overlap(results)) {
     typename Model::template Found<double> found;
     model.solve(query, found, counts);
     write_overlaps<double>(found, 1, {row}, results);
   }
-  return write_query(query, row, row + 1, results);
+  return refused;
 }
 
 // Solve rows `begin` to `end`. Returns the first row whose poses or sizes are refused, or −1. Such
@@ -145,6 +174,7 @@ template <class T, class Model>
       }
       if (!want_overlap(results)) continue;
       for (int n = 0; n < count; ++n) queue.add(blocks[n], only_block);
+      queue.keep();
     }
     queue.finish();
   }

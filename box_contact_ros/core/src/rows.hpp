@@ -15,6 +15,10 @@ using detail::Counts;
 using detail::Results;
 using detail::Rows;
 
+BC_INLINE bool want_overlap(const Results& results) {
+  return results.point || results.volume || results.covariance;
+}
+
 // The numbers of row `row`: places of the poses and sizes of its boxes.
 struct RowPlaces {
   const double *pose_a, *pose_b, *size_a, *size_b;
@@ -125,6 +129,8 @@ template <class T, class Found>
     for (int i = 0; i < width<T>; ++i) places[i] = array + (numbers * rows[i] + from);
     store_rows(places, chosen, x);
   };
+  if constexpr (has_normal<Found>)
+    if (results.normal) store(results.normal, 3, 0, found.normal.v);
   if (results.point) store(results.point, 3, 0, overlap.centroid.v);
   if (results.volume) {
     T volume[1] = {overlap.volume};

@@ -48,7 +48,7 @@ typedef enum bc_status {
 
 typedef enum bc_model {
   BC_EXACT = 0, /* the exact moments of the overlap */
-  BC_MLP = 1    /* the moments by a multilayer perceptron, at constant cost */
+  BC_MLP = 1    /* the moments by a multilayer perceptron, with an error */
 } bc_model;
 
 /* What is computed of the overlap, beside its centroid. */

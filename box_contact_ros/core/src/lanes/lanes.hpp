@@ -96,6 +96,8 @@ BC_INLINE T min(T a, T b) {
 #if defined(__AVX512F__)
   if constexpr (std::is_same_v<T, Lanes<double, 8>>)
     return (T)_mm512_maskz_min_pd(0xff, (__m512d)a, (__m512d)b);
+  if constexpr (std::is_same_v<T, Lanes<float, 16>>)
+    return (T)_mm512_maskz_min_ps(0xffff, (__m512)a, (__m512)b);
 #endif
 #if defined(__AVX__)
   if constexpr (std::is_same_v<T, Lanes<double, 4>>)
@@ -105,6 +107,9 @@ BC_INLINE T min(T a, T b) {
 #if defined(__SSE2__)
   if constexpr (std::is_same_v<T, Lanes<double, 2>>) return (T)_mm_min_pd((__m128d)a, (__m128d)b);
   if constexpr (std::is_same_v<T, Lanes<float, 4>>) return (T)_mm_min_ps((__m128)a, (__m128)b);
+  // Else a branch: of a number and a constant, g++ makes one.
+  if constexpr (std::is_same_v<T, float>)
+    return _mm_cvtss_f32(_mm_min_ss(_mm_set_ss(a), _mm_set_ss(b)));
 #endif
   return a < b ? a : b;
 }
@@ -113,6 +118,8 @@ BC_INLINE T max(T a, T b) {
 #if defined(__AVX512F__)
   if constexpr (std::is_same_v<T, Lanes<double, 8>>)
     return (T)_mm512_maskz_max_pd(0xff, (__m512d)a, (__m512d)b);
+  if constexpr (std::is_same_v<T, Lanes<float, 16>>)
+    return (T)_mm512_maskz_max_ps(0xffff, (__m512)a, (__m512)b);
 #endif
 #if defined(__AVX__)
   if constexpr (std::is_same_v<T, Lanes<double, 4>>)
@@ -122,6 +129,9 @@ BC_INLINE T max(T a, T b) {
 #if defined(__SSE2__)
   if constexpr (std::is_same_v<T, Lanes<double, 2>>) return (T)_mm_max_pd((__m128d)a, (__m128d)b);
   if constexpr (std::is_same_v<T, Lanes<float, 4>>) return (T)_mm_max_ps((__m128)a, (__m128)b);
+  // Else a branch: of a number and a constant, g++ makes one.
+  if constexpr (std::is_same_v<T, float>)
+    return _mm_cvtss_f32(_mm_max_ss(_mm_set_ss(a), _mm_set_ss(b)));
 #endif
   return a > b ? a : b;
 }
@@ -148,6 +158,8 @@ BC_INLINE T sqrt(T x) {
 #if defined(__AVX512F__)
   } else if constexpr (std::is_same_v<T, Lanes<double, 8>>) {
     return (T)_mm512_mask_sqrt_pd((__m512d)x, 0xff, (__m512d)x);
+  } else if constexpr (std::is_same_v<T, Lanes<float, 16>>) {
+    return (T)_mm512_mask_sqrt_ps((__m512)x, 0xffff, (__m512)x);
 #endif
 #if defined(__AVX__)
   } else if constexpr (std::is_same_v<T, Lanes<double, 4>>) {

@@ -32,7 +32,7 @@ const Kernel* chosen_kernel();
 struct Solver {
   const Kernel* kernel;
   Model model;
-  const float* network;  // of model `mlp`
+  const float* network;  // of models `mlp` and `paper`
 
   // Solve rows `begin` to `end` in this thread. Returns the first row that is refused, or −1.
   long solve(const Rows& rows, long begin, long end, const Results& results,

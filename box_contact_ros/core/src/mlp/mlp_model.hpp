@@ -1,83 +1,126 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// Model `mlp`: SAT, chords of the overlap, and a multilayer perceptron that corrects what they sum to.
+// Model `mlp`: SAT, and a multilayer perceptron that decides the answer from what the half-spaces of
+// both boxes cut off the patch box (patch_box.hpp).
 //
-// All pairs take the same instructions, whatever their poses. The patch box (patch_box.hpp) holds A∩B.
-// 48 chords in it give volume, centroid and covariance of a body close to A∩B (chords.hpp). The network
-// has seven outputs. Each is the exponent of a factor, from 1/4 to 4:
-//
-//   centroid: of the odds u / (1 − u), with u from 0 to 1 the place between the bounds of a coordinate
-//   volume: of the body's volume, up to that of the patch box
-//   covariance: of the body's deviation along each axis, up to half of the patch box's extent
-//
-// So whatever the weights are, the point is within the bounds of A∩B, the volume is positive and not
-// above that of the bounds, and the covariance is positive definite.
+// All pairs take the same instructions, whatever their poses. The network has ten outputs, in the
+// coordinates of the patch box, from −1 to 1: the centroid, the volume, and a triangular root of the
+// covariance. Whatever the weights are, the point is within the bounds of A∩B, the volume is positive
+// and not above that of the bounds, and the covariance is positive definite.
 #pragma once
 
-#include "../overlap/moments.hpp"
-#include "chords.hpp"
+#include "../overlap/exact.hpp"
 #include "network.hpp"
+#include "patch_box.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
-
 namespace mlp {
 
-static_assert(features == network_features, "what the chords tell is what the network reads");
+static_assert(features == detail::network_features, "what the cuts tell is what the network reads");
 
-// Largest exponent of a factor.
-constexpr float most_exponent = 3.0F;
-// Least distance of the centroid from the bounds [of the extent].
-constexpr float least_margin = 1e-3F;
+// Least volume [of the patch box's], and least standard deviation along an axis [half extents].
+constexpr float least_volume = 1e-5F, least_deviation = 1e-3F;
+// Largest entry of the covariance's root [half extents]: a convex body has no more, and three of them
+// make no variance above 1.
+constexpr float most_deviation = 0.577350269F;
+// The point is moved into either box in turn, so many times, and half of the way farther: with no more
+// than the way itself, what is left outside of the other box is 60 times as large.
+constexpr int moves_inwards = 2;
+constexpr float way_inwards = 1.5F;
 
-// A factor from 1/4 to 4, smooth and increasing, by one division.
+// What the network says of an overlap.
 template <class F>
-BC_INLINE F factor(F exponent) {
-  F x = min(splat<F>(most_exponent), abs(exponent)) + 1.0F;
-  return select<F>(exponent < 0.0F, 1.0F / x, x);
-}
+struct Overlap {
+  F point[3];  // −1 to 1 between the bounds
+  F volume;    // of the patch box's
+  F root[6];   // lower triangle L of the covariance L Lᵀ: xx, yy, zz, yx, zx, zy [half extents]
 
-// Volume, centroid and covariance of a body in the coordinates of the patch box.
-template <class F>
-struct Body {
-  F volume, mean[3], variance[3], beside[3];
-
-  BC_INLINE Body(const Chords<F>& chords, const F (&answers)[8]) {
-    F deviation[3];
+  BC_INLINE Overlap(const Network& network, const Cuts<F>& cuts) {
+    F said[up_to_fours(detail::network_outputs)];
+    answer(network, cuts.told, said);
+    auto within = [](F x, float least, float most) {
+      return min<F>(splat<F>(most), max<F>(splat<F>(least), x));
+    };
     for (int i = 0; i < 3; ++i) {
-      F place = min(0.5F + 0.5F * chords.mean[i], splat<F>(1.0F - least_margin));
-      F odds = place * factor<F>(answers[i]);
-      mean[i] = chords.flip[i] * (2.0F * (odds / (odds + (1.0F - place))) - 1.0F);
-      F most = 1.0F / sqrt(chords.variance[i]);
-      deviation[i] = min(factor<F>(answers[4 + i]), most);
+      int j = i == 2 ? 1 : 0, k = i == 0 ? 1 : 2;  // of yx, zx, zy
+      point[i] = cuts.flip[i] * within(said[i], -1.0F, 1.0F);
+      root[i] = within(said[4 + i], least_deviation, most_deviation);
+      root[3 + i] =
+          (cuts.flip[j] * cuts.flip[k]) * within(said[7 + i], -most_deviation, most_deviation);
     }
-    volume = min(chords.volume * factor<F>(answers[3]), splat<F>(1.0F));
+    volume = within(said[3] * said[3], least_volume, 1.0F);
+  }
+  // Move a point that is outside of a box inwards, within the bounds.
+  BC_INLINE void move_into(const Slabs<F>& slabs, const F (&by_half2)[3]) {
+    Triple<F> at =
+        (point[0] * slabs.share[0] + point[1] * slabs.share[1]) + point[2] * slabs.share[2];
+    Triple<F> off = min(slabs.plus, max(-slabs.minus, at)) - at;
     for (int i = 0; i < 3; ++i) {
-      int j = (i + 1) % 3, k = (i + 2) % 3;
-      variance[i] = (deviation[i] * deviation[i]) * chords.variance[i];
-      beside[i] = (deviation[j] * deviation[k]) *
-                  ((chords.flip[j] * chords.flip[k]) * chords.beside[i]);
+      F moved = point[i] + (way_inwards * by_half2[i]) * dot(slabs.share[i], off);
+      point[i] = min<F>(splat<F>(1.0F), max<F>(splat<F>(-1.0F), moved));
     }
   }
 };
 
-// The patch box in the common frame.
+// The patch boxes of one pair, or of two blocks of pairs.
 template <class T>
-struct PlacedBox {
-  Columns<T> axes;
-  Triple<T> middle;  // [m]
+struct Patches {
+  using F = Floats<T>;
+  const Query<T>* queries[together<T>];
+  Meeting<T> meetings[together<T>];
+  Frame<F> frame;
+  Origin<T> origins[together<T>];
+  PatchBox<F> box;
 
-  BC_INLINE PlacedBox(const Pair<T>& pair, const PatchBox<T>& box) {
-    Columns<T> axes_p = select<T>(box.p_is_b, pair.axes_b, pair.axes_a);
-    middle = select(box.p_is_b, pair.origin_b, pair.origin_a);
-    for (int i = 0; i < 3; ++i) {
-      axes[i] = axes_p * box.axes[i];
-      middle = middle + box.middle[i] * axes[i];
-    }
-    // B is what is pressed.
-    middle = middle + select<T>(box.p_is_b, box.pressed, T{}) * axes[2];
+  template <class... Queries>
+  BC_INLINE explicit Patches(const Queries&... of)
+      : queries{&of...}, meetings{Meeting<T>(of)...}, frame(queries, meetings), box(located()) {}
+
+  // A place in A's frame, from its coordinates along x, y and z about the origin [unit].
+  BC_INLINE Triple<T> place(const F (&from_origin)[3], int block) const {
+    const Meeting<T>& meeting = meetings[block];
+    Triple<F> beside = from_origin[0] * frame.in_a[0] + from_origin[1] * frame.in_a[1];
+    // Axes of float32 are not at right angles to the last digit: z comes from the normal.
+    Triple<T> across = triple_of_doubles<T>(beside, block);
+    T along = doubles<T>(from_origin[2], block) - dot(across, meeting.normal);
+    return (meeting.corner + origins[block].from_a) +
+           meeting.unit * (across + along * meeting.normal);
+  }
+
+ private:
+  BC_INLINE PatchBox<F> located() {
+    for (int n = 0; n < together<T>; ++n)
+      origins[n] = {*queries[n], meetings[n], doubles<T>(frame.p_is_b, n),
+                    triple_of_doubles<T>(frame.along_edge, n)};
+    auto length = [&](auto get) {
+      return triple_of_floats<T>([&](int n) { return meetings[n].by_unit * get(origins[n]); });
+    };
+    return {frame, length([](const Origin<T>& origin) { return origin.from_a; }),
+            length([](const Origin<T>& origin) { return origin.from_b; }),
+            floats<T>([&](int n) { return meetings[n].by_unit * origins[n].top; })};
   }
 };
+
+// The covariance L Lᵀ of a root L, in the common frame.
+template <class T>
+BC_INLINE Sym<T> covariance(const Patches<T>& patches, const Overlap<Floats<T>>& overlap,
+                            int block) {
+  using F = Floats<T>;
+  Triple<F> axis[3];
+  for (int i = 0; i < 3; ++i) axis[i] = patches.box.half[i] * patches.frame.in_a[i];
+  const F(&root)[6] = overlap.root;
+  Triple<F> columns[3] = {(root[0] * axis[0] + root[3] * axis[1]) + root[4] * axis[2],
+                          root[1] * axis[1] + root[5] * axis[2], root[2] * axis[2]};
+  Triple<T> c[3];
+  for (int i = 0; i < 3; ++i)
+    c[i] = patches.meetings[block].unit *
+           (patches.queries[block]->pair.axes_a * triple_of_doubles<T>(columns[i], block));
+  // Products of floats are exact in float64, so no eigenvalue is below 0 but for the last digit.
+  Triple<T> squares = (c[0] * c[0] + c[1] * c[1]) + c[2] * c[2];
+  Triple<T> beside = (c[0] * rotated(c[0]) + c[1] * rotated(c[1])) + c[2] * rotated(c[2]);
+  return {{squares[0], squares[1], squares[2], beside[1], beside[2], beside[0]}};
+}
 
 }  // namespace mlp
 
@@ -89,36 +132,47 @@ struct MlpModelOf {
   template <class T>
   using Found = FoundOf<T>;
 
-  template <class T>
-  [[gnu::noinline]] unsigned solve(const Query<T>& query, Found<T>& found, detail::Counts&) const {
-    using F = Floats<T>;
-    mlp::PatchBox<T> box(query);
-    mlp::Chords<F> chords(box);
-    F told[network_features], answers[8];
-    chords.tell(told);
-    mlp::answer(network, told, answers);
-    mlp::Body<F> body(chords, answers);
-
-    mlp::PlacedBox<T> placed(query.pair, box);
-    const T(&half)[3] = box.half;
-    Triple<T> point = placed.middle;
-    for (int i = 0; i < 3; ++i)
-      point = point + (half[i] * to_doubles<T>(body.mean[i])) * placed.axes[i];
-    found.volume = (8.0 * ((half[0] * half[1]) * half[2])) * to_doubles<T>(body.volume);
-    found.centroid = components<T>(point);
-    if constexpr (std::is_same_v<FoundOf<T>, Moments<T>>) {
-      Sym<T> covariance;
-      for (int i = 0; i < 3; ++i) {
-        int j = (i + 1) % 3, k = (i + 2) % 3;
-        covariance(i, i) = (half[i] * half[i]) * to_doubles<T>(body.variance[i]);
-        covariance(j, k) = (half[j] * half[k]) * to_doubles<T>(body.beside[i]);
-      }
-      found.covariance = rotated(placed.axes, covariance);
-    }
+  BC_INLINE unsigned solve(const Query<double>& query, Found<double>& found,
+                           detail::Counts&) const {
+    Found<double>* all[1] = {&found};
+    solve_all<double>(all, query);
     return 0;
   }
+  // Two blocks of pairs at once.
   template <class T>
-  void solve_left(const Query<T>&, Found<T>&, detail::Counts&) const {}  // nothing is left
+  BC_INLINE void solve_two(const Query<T>& query, const Query<T>& other, Found<T>& found,
+                           Found<T>& other_found) const {
+    Found<T>* all[2] = {&found, &other_found};
+    solve_all<T>(all, query, other);
+  }
+
+ private:
+  template <class T, class... Queries>
+  [[gnu::noinline]] void solve_all(Found<T>* const (&found)[together<T>],
+                                   const Queries&... queries) const {
+    using F = Floats<T>;
+    mlp::Patches<T> patches(queries...);
+    const mlp::PatchBox<F>& box = patches.box;
+    mlp::Cuts<F> cuts(box);
+    mlp::Overlap<F> overlap(network, cuts);
+    F by_half2[3], from_origin[3];
+    for (int i = 0; i < 3; ++i) by_half2[i] = 1.0F / (box.half[i] * box.half[i]);
+    for (int n = 0; n < mlp::moves_inwards; ++n) {
+      overlap.move_into(box.a, by_half2);
+      overlap.move_into(box.b, by_half2);
+    }
+    for (int i = 0; i < 3; ++i) from_origin[i] = box.centre[i] + box.half[i] * overlap.point[i];
+    F volume = (8.0F * ((box.half[0] * box.half[1]) * box.half[2])) * overlap.volume;
+    for (int n = 0; n < together<T>; ++n) {
+      const Query<T>& query = *patches.queries[n];
+      T unit = patches.meetings[n].unit, unit3 = (unit * unit) * unit;
+      found[n]->centroid =
+          components<T>(point_in_common_frame(query.pair, patches.place(from_origin, n)));
+      found[n]->volume = unit3 * doubles<T>(volume, n);
+      if constexpr (std::is_same_v<FoundOf<T>, Moments<T>>)
+        found[n]->covariance = mlp::covariance(patches, overlap, n);
+    }
+  }
 };
 
 using MlpModel = MlpModelOf<Moments>;

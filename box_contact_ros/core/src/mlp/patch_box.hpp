@@ -2,220 +2,395 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The patch box: a cuboid around A∩B in which every overlap looks alike, whatever the sizes and the
-// depth are.
+// depth are; and the cuts, what the half-spaces of both boxes take off it.
 //
 // Its z axis is SAT's normal, so faces and pairs of edges are described alike. P is the box that has
 // less within the depth, Q the other. The x axis is along the edge of P that has most of it across z.
 // The bounds hold A∩B:
 //
-// 1. Along z they are the ends of the two boxes on the axis, which are `depth` apart.
-// 2. What P has beyond the lowest point of Q reaches at most depth / |n_k| along P's axis k. The
-//    same holds for Q. These two cuboids bound x and y.
-// 3. Each of the six slabs |a · u| of both boxes then bounds each coordinate by the bounds of the
-//    other two (Benhamou and others 1999, hull consistency).
+// 1. Along z they are the ends of the two boxes on the axis. The ends in each other are `depth` apart.
+// 2. What A has beyond the lowest point of B reaches at most depth / |n_k| along A's axis k, from the
+//    corner of A that is deepest in B. The same holds for B. These two cuboids bound x and y.
+// 3. Each of the six slabs of both boxes then bounds y, and then x, by the bounds of the other two
+//    (Benhamou and others 1999, hull consistency).
 //
-// In its coordinates u, −1 to 1, each slab is −minus ≤ a · u ≤ plus, with Σ|a_i| = 1. Places are
-// computed in float64; a, plus and minus have no unit, and are float32 from here on.
+// All of it is float32, in a unit of about the size. So that boxes that just touch keep their digits,
+// places are measured from an origin near the patch, which float64 finds in both boxes' frames.
 #pragma once
 
+#include "../lanes/floats.hpp"
 #include "../minimum_depth.hpp"
 #include "../query.hpp"
+#include "network.hpp"
 
-namespace box_contact::BOX_CONTACT_SET {
+namespace box_contact::BOX_CONTACT_SET::mlp {
 
-// Lanes of float32 for the pairs of T.
-template <class T>
-using Floats = typename std::conditional_t<is_scalar<T>, NumberOf<float>,
-                                           LanesOf<float, is_scalar<T> ? 2 : width<T>>>::type;
+// Least component of a unit vector by which is divided; the product of three is a float.
+constexpr float least_component = 1e-12F;
+// Component of the normal below which either end of a box is as deep as the other, to a thousandth of
+// the least depth.
+constexpr double level = 1e-12;
 
-template <class T>
-BC_INLINE Floats<T> to_floats(const T& x) {
-  if constexpr (is_scalar<T>) {
-    return float(x);
-  } else {
-    return __builtin_convertvector(x, Floats<T>);
-  }
-}
-template <class T>
-BC_INLINE T to_doubles(const Floats<T>& x) {
-  if constexpr (is_scalar<T>) {
-    return x;
-  } else {
-    return __builtin_convertvector(x, T);
-  }
-}
-template <class T>
-BC_INLINE Triple<T> triple_to_doubles(const Triple<Floats<T>>& x) {
-  return triple(Vec<T>{to_doubles<T>(x[0]), to_doubles<T>(x[1]), to_doubles<T>(x[2])});
-}
-template <class T>
-BC_INLINE Triple<Floats<T>> triple_to_floats(const Triple<T>& x) {
-  return triple(Vec<Floats<T>>{to_floats<T>(x[0]), to_floats<T>(x[1]), to_floats<T>(x[2])});
-}
-
-namespace mlp {
-
-// Least half extent of the patch box [of the size]: below the extents of what is pressed.
-constexpr double least_extent = 1e-3 * depth_floor;
-// Least component of a unit vector by which is divided.
-constexpr float least_component = 1e-30F;
-// A half, and more than what rounding to float32 takes off.
-constexpr double half_of_rounding = 0.500001;
-// Rounding of a place [of the size].
-constexpr double place_slack = 1e-14;
-// Where slabs end that do not meet the patch box [of its half width in their direction].
-constexpr float beyond = 4.0F;
-// Least share of a slab's width along an axis by which is divided [of the size].
-constexpr double least_share = 1e-30;
-
-template <class T>
-BC_INLINE Triple<T> cross_product(const Triple<T>& a, const Triple<T>& b) {
+template <class F>
+BC_INLINE Triple<F> cross_product(const Triple<F>& a, const Triple<F>& b) {
   return rotated(a) * rotated_back(b) - rotated_back(a) * rotated(b);
 }
-
-// A unit vector along the axis of the largest number.
-template <class T>
-BC_INLINE Triple<T> axis_of_largest(const Triple<T>& x) {
-  T second = splat<T>(1.0), third = splat<T>(2.0);
-  T place = select<T>(x[1] > x[0], second, T{});
-  place = select<T>(x[2] > max<T>(x[0], x[1]), third, place);
-  return choose(is_at<T>(place), uniform(splat<T>(1.0)), Triple<T>{});
+// The inverses of three numbers by one division.
+template <class F>
+BC_INLINE Triple<F> inverses(const Triple<F>& x) {
+  Triple<F> beside = rotated(x) * rotated_back(x);
+  return (1.0F / (x[0] * beside[0])) * beside;
+}
+template <class F>
+BC_INLINE F least_of(const Triple<F>& x) {
+  return min<F>(min<F>(x[0], x[1]), x[2]);
+}
+template <class F>
+BC_INLINE F most_of(const Triple<F>& x) {
+  return max<F>(max<F>(x[0], x[1]), x[2]);
 }
 
-template <class T>
-struct PatchBox {
-  using F = Floats<T>;
-  Mask<T> p_is_b;
-  Triple<T> axes[3];      // x, y and z in P's frame; z from P to Q
-  T middle[3], half[3];   // of the bounds, from P's centre [m]
-  T pressed;              // by how far Q is moved against z [m]
-  Triple<F> share[2][3];  // a_i of the slabs of P and Q
-  Triple<F> plus[2], minus[2];
+// The place of the largest of three numbers. No processor predicts which: a pair alone has an index.
+template <class F, bool = is_scalar<F>>
+struct LargestOf {
+  Mask<F> first, second;
 
-  BC_INLINE explicit PatchBox(const Query<T>& query) {
-    const Pair<T>& pair = query.pair;
-    T least_depth = depth_floor * pair.size;
-    T depth = max(-query.axis.separation, least_depth);
-    pressed = max(least_depth + query.axis.separation, T{});
-
-    Triple<T> normal_a = query.axis.normal, normal_b = pair.a_in_b * normal_a;
-    Triple<T> reach_a = reach(pair.half_a, normal_a, depth);
-    Triple<T> reach_b = reach(pair.half_b, normal_b, depth);
-    p_is_b = (reach_b[0] * reach_b[1]) * reach_b[2] < (reach_a[0] * reach_a[1]) * reach_a[2];
-    Triple<T> half_p = select(p_is_b, pair.half_b, pair.half_a);
-    Triple<T> half_q = select(p_is_b, pair.half_a, pair.half_b);
-    Triple<T> reach_p = select(p_is_b, reach_b, reach_a);
-    Triple<T> reach_q = select(p_is_b, reach_a, reach_b);
-    Triple<T> offset = select(p_is_b, -pair.offset_b, pair.offset_a);
-    Columns<T> to_q = select<T>(p_is_b, pair.b_in_a, pair.a_in_b);
-    Triple<T> z = select(p_is_b, -normal_b, normal_a), z_q = select(p_is_b, -normal_a, normal_b);
-
-    Triple<T> across = uniform(splat<T>(1.0)) - z * z;
-    Triple<T> edge = axis_of_largest<T>(reach_p * across);
-    T along_z = dot(edge, z);
-    axes[0] = (1.0 / sqrt(1.0 - along_z * along_z)) * (edge - along_z * z);
-    axes[1] = cross_product<T>(z, axes[0]);
-    axes[2] = z;
-    Triple<T> x_q = to_q * axes[0], axes_q[3] = {x_q, cross_product<T>(z_q, x_q), z_q};
-    T centre[3] = {dot(offset, axes[0]), dot(offset, axes[1]), dot(offset, z) - pressed};
-
-    Triple<T> middle_p = towards(axes[2], half_p - reach_p);
-    Triple<T> middle_q = -towards(axes_q[2], half_q - reach_q);
-    for (int i = 0; i < 3; ++i) {
-      Triple<T> width_p = i < 2 ? reach_p : half_p, width_q = i < 2 ? reach_q : half_q;
-      T from_p = i < 2 ? dot(middle_p, axes[i]) : T{}, reach_of_p = dot(width_p, abs(axes[i]));
-      T from_q = i < 2 ? centre[i] + dot(middle_q, axes_q[i]) : centre[i];
-      T reach_of_q = dot(width_q, abs(axes_q[i]));
-      T low = max(from_p - reach_of_p, from_q - reach_of_q);
-      T high = min<T>(from_p + reach_of_p, from_q + reach_of_q);
-      middle[i] = 0.5 * (low + high);
-      half[i] = max(0.5 * (high - low), least_extent * pair.size);
-    }
-    T from_centre[3];
-    for (int i = 0; i < 3; ++i) from_centre[i] = middle[i] - centre[i];
-    Slabs slabs[2] = {Slabs(axes, half_p, middle, half), Slabs(axes_q, half_q, from_centre, half)};
-    tighten(slabs, pair.size);
+  BC_INLINE explicit LargestOf(const Triple<F>& x)
+      : first(x[0] >= max<F>(x[1], x[2])), second(x[1] >= x[2]) {}
+  BC_INLINE F of(const Triple<F>& x) const {
+    return select<F>(first, x[0], select<F>(second, x[1], x[2]));
   }
-
- private:
-  // Half of what a box has within the depth, along its axes [m].
-  BC_INLINE static Triple<T> reach(const Triple<T>& half, const Triple<T>& normal, T depth) {
-    Triple<F> one = uniform(splat<F>(1.0F)), least = uniform(splat<F>(least_component));
-    Triple<F> by_slope = one / max(abs(triple_to_floats<T>(normal)), least);
-    return min(half, (half_of_rounding * depth) * triple_to_doubles<T>(by_slope));
+  BC_INLINE Triple<F> column(const Columns<F>& m) const {
+    return select(first, m[0], select(second, m[1], m[2]));
   }
-  BC_INLINE static Triple<T> towards(const Triple<T>& direction, const Triple<T>& x) {
-    return choose(direction >= Triple<T>{}, x, -x);
+  BC_INLINE Triple<F> axis() const {
+    F one = splat<F>(1.0F), not_first = select<F>(first, F{}, one);
+    F is_second = select<F>(second, not_first, F{});
+    return {one - not_first, is_second, not_first - is_second};
   }
+};
+template <class F>
+struct LargestOf<F, true> {
+  int place;
 
-  // A slab of a box along its own axes, in metres: −minus ≤ Σ a_i u_i ≤ plus.
-  struct Slabs {
-    Triple<T> a[3], plus, minus;
-
-    BC_INLINE Slabs(const Triple<T> (&along)[3], const Triple<T>& box_half, const T (&from)[3],
-                    const T (&half)[3]) {
-      Triple<T> at{};
-      for (int i = 0; i < 3; ++i) {
-        at = at + from[i] * along[i];
-        a[i] = half[i] * along[i];
-      }
-      plus = box_half - at;
-      minus = box_half + at;
-    }
-    // How far the bounds of coordinate i may reach up and down.
-    BC_INLINE void bound(int i, T least, T& up, T& down) const {
-      Triple<T> rest = abs(a[(i + 1) % 3]) + abs(a[(i + 2) % 3]);
-      Triple<T> width = max(abs(a[i]), uniform(least)), others = rotated(width);
-      Triple<T> beside = others * rotated_back(width);
-      Triple<T> by_width = (1.0 / (width[0] * beside[0])) * beside;  // three by one division
-      auto forwards = a[i] >= Triple<T>{};
-      Triple<T> above = by_width * (rest + choose(forwards, plus, minus));
-      Triple<T> below = by_width * (rest + choose(forwards, minus, plus));
-      up = min<T>(up, -largest(-above));
-      down = min<T>(down, -largest(-below));
-    }
-  };
-
-  // Move the bounds of y, then those of x, to where slabs end. Move the slabs into the coordinates of
-  // the new bounds. Faces of P that meet in the edge along x bound y, whatever x is.
-  BC_INLINE void tighten(Slabs (&slabs)[2], T size) {
-    for (int i = 1; i >= 0; --i) {
-      T up = splat<T>(1.0), down = up;
-      for (const Slabs& of_box : slabs) of_box.bound(i, least_share * size, up, down);
-      // Boxes that touch along several axes may have no overlap at all: no bound leaves the others.
-      up = max(up, splat<T>(-1.0));
-      down = max(down, splat<T>(-1.0));
-      T shift = 0.5 * (up - down), least_scale = least_extent * size / half[i];
-      T scale = max(0.5 * (up + down), least_scale);
-      middle[i] = middle[i] + half[i] * shift;
-      half[i] = half[i] * scale;
-      for (Slabs& of_box : slabs) {
-        Triple<T> moved = shift * of_box.a[i];
-        of_box.plus = of_box.plus - moved;
-        of_box.minus = of_box.minus + moved;
-        of_box.a[i] = scale * of_box.a[i];
-      }
-    }
-    T by_size = 1.0 / size;
-    for (int box = 0; box < 2; ++box) narrow(box, slabs[box], by_size);
+  BC_INLINE explicit LargestOf(const Triple<F>& x)
+      : place((2 - int(x[1] >= x[2])) * int(x[0] < max<F>(x[1], x[2]))) {}
+  BC_INLINE F of(const Triple<F>& x) const {
+    F numbers[4];
+    std::memcpy(numbers, &x, sizeof numbers);
+    return numbers[place];
   }
-
-  // The slabs of a box without a unit, in float32.
-  BC_INLINE void narrow(int box, const Slabs& slabs, T by_size) {
-    Triple<F> width{}, most = uniform(splat<F>(beyond));
-    for (int i = 0; i < 3; ++i) {
-      share[box][i] = triple_to_floats<T>(by_size * slabs.a[i]);
-      width = width + abs(share[box][i]);
-    }
-    Triple<F> by_width = uniform(splat<F>(1.0F)) / width;
-    for (int i = 0; i < 3; ++i) share[box][i] = by_width * share[box][i];
-    auto scaled = [&](const Triple<T>& x) {
-      return min(by_width * triple_to_floats<T>(by_size * x + splat<T>(place_slack)), most);
-    };
-    plus[box] = scaled(slabs.plus);
-    minus[box] = scaled(slabs.minus);
+  BC_INLINE Triple<F> column(const Columns<F>& m) const { return m[place]; }
+  BC_INLINE Triple<F> axis() const {
+    static constexpr F axes[3][4] = {{1}, {0, 1}, {0, 0, 1, 1}};
+    Triple<F> found;
+    std::memcpy(&found, axes[place], sizeof found);
+    return found;
   }
 };
 
-}  // namespace mlp
-}  // namespace box_contact::BOX_CONTACT_SET
+// A power of two that is up to twice below x, or its inverse: nothing is rounded in such a unit.
+template <class T>
+BC_INLINE T power_of_two(T x, bool inverse) {
+  using Bits = std::conditional_t<is_scalar<T>, int64_t, Mask<T>>;
+  constexpr int64_t exponent = 0x7ff0000000000000, of_product = 0x7fe0000000000000;
+  Bits bits;
+  std::memcpy(&bits, &x, sizeof x);
+  bits = bits & exponent;
+  if (inverse) bits = of_product - bits;
+  std::memcpy(&x, &bits, sizeof x);
+  return x;
+}
+
+// Where two boxes meet, in float64 and in A's frame.
+template <class T>
+struct Meeting {
+  Triple<T> normal, normal_b;  // from A to B, in the frame of either box
+  Triple<T> corner, corner_b;  // of A, deepest in B, from A's centre; of B in A, in B's frame [m]
+  Triple<T> gap;               // from there to the corner of B that is deepest in A [m]
+  T depth, least;              // of the boxes, pressed to the least where they hardly overlap [m]
+  T unit, by_unit;             // about the size [m], and its inverse
+
+  Meeting() = default;
+  BC_INLINE explicit Meeting(const Query<T>& query) {
+    const Pair<T>& pair = query.pair;
+    least = depth_floor * pair.size;
+    T pressed = max(least + query.axis.separation, T{});
+    normal = query.axis.normal;
+    normal_b = pair.a_in_b * normal;
+    corner = towards(normal, pair.offset_a, pair.half_a);
+    corner_b = -towards(normal_b, pair.offset_b, pair.half_b);
+    gap = pair.offset_a + pair.b_in_a * corner_b - corner - pressed * normal;
+    depth = max(-query.axis.separation, least);
+    unit = power_of_two(pair.size, false);
+    by_unit = power_of_two(pair.size, true);
+  }
+
+ private:
+  // Along axes that are level, towards the other box.
+  BC_INLINE static Triple<T> towards(const Triple<T>& normal, const Triple<T>& other,
+                                     const Triple<T>& half) {
+    Triple<T> zero{}, way = choose(abs(normal) > uniform(splat<T>(level)), normal, other);
+    return choose(way >= zero, half, -half);
+  }
+};
+
+// The axes of the patch box, and what of either box may be in it. Lengths are in units.
+template <class F>
+struct Frame {
+  Triple<F> in_a[3], in_b[3];  // x, y and z in the frame of either box
+  Triple<F> half_a, half_b;    // half extents of the boxes
+  Triple<F> reach_a, reach_b;  // half of what a box has within the depth, along its axes
+  Flags<F> a_up, b_up;         // directions of A's and of B's axes along the normal
+  F depth, least, p_is_b;      // p_is_b: 0 or 1
+  Triple<F> along_edge;        // from P's corner along its edge to near Q, in A's frame
+
+  template <class T>
+  BC_INLINE Frame(const Query<T>* const (&queries)[together<T>],
+                  const Meeting<T> (&meetings)[together<T>]) {
+    auto length = [&](auto get) {
+      return triple_of_floats<T>([&](int n) { return meetings[n].by_unit * get(n); });
+    };
+    Triple<F> normal_a = triple_of_floats<T>([&](int n) { return meetings[n].normal; });
+    Triple<F> normal_b = triple_of_floats<T>([&](int n) { return meetings[n].normal_b; });
+    Triple<F> corner_a = length([&](int n) { return meetings[n].corner; });
+    Triple<F> corner_b = length([&](int n) { return meetings[n].corner_b; });
+    half_a = abs(corner_a);
+    half_b = abs(corner_b);
+    a_up = corner_a >= Triple<F>{};
+    b_up = -corner_b > Triple<F>{};
+    depth = floats<T>([&](int n) { return meetings[n].by_unit * meetings[n].depth; });
+    least = floats<T>([&](int n) { return meetings[n].by_unit * meetings[n].least; });
+    Triple<F> gap = length([&](int n) { return meetings[n].gap; });
+    Columns<F> b_in_a;
+    for (int k = 0; k < 3; ++k)
+      b_in_a[k] = triple_of_floats<T>([&](int n) { return queries[n]->pair.b_in_a[k]; });
+    find(normal_a, normal_b, gap, b_in_a);
+  }
+
+ private:
+  BC_INLINE Triple<F> reach(const Triple<F>& half, const Triple<F>& normal) {
+    Triple<F> steep = max(abs(normal), uniform(splat<F>(least_component)));
+    return min(half, (0.5F * depth) * inverses<F>(steep));
+  }
+  BC_INLINE void find(const Triple<F>& normal_a, const Triple<F>& normal_b, const Triple<F>& gap,
+                      const Columns<F>& b_in_a) {
+    Triple<F> zero{}, one = uniform(splat<F>(1.0F));
+    reach_a = reach(half_a, normal_a);
+    reach_b = reach(half_b, normal_b);
+    auto is_b = (reach_b[0] * reach_b[1]) * reach_b[2] < (reach_a[0] * reach_a[1]) * reach_a[2];
+    p_is_b = either<F>(is_b, splat<F>(1.0F), F{});
+    Triple<F> across_a = reach_a * (one - normal_a * normal_a);
+    Triple<F> across_b = reach_b * (one - normal_b * normal_b);
+    Triple<F> across_p = select(is_b, across_b, across_a),
+              across_q = select(is_b, across_a, across_b);
+    LargestOf<F> edge(across_p);
+    Triple<F> normal_p = select(is_b, normal_b, normal_a);
+    F along = edge.of(normal_p);
+    F by = 1.0F / sqrt(max(1.0F - along * along, splat<F>(least_component)));
+    Triple<F> edge_p = edge.axis();
+    Triple<F> edge_a = select(is_b, edge.column(b_in_a), edge_p);
+    Triple<F> edge_b = select(is_b, edge_p, edge.column(transpose(b_in_a)));
+    in_a[2] = normal_a;
+    in_b[2] = normal_b;
+    in_a[0] = by * (edge_a - along * normal_a);
+    in_b[0] = by * (edge_b - along * normal_b);
+    in_a[1] = cross_product<F>(in_a[2], in_a[0]);
+    in_b[1] = cross_product<F>(in_b[2], in_b[0]);
+
+    // Of two edges that cross, the place on P's that is closest to Q's.
+    Triple<F> gap_b = transpose(b_in_a) * gap;
+    Triple<F> from_q = select(is_b, gap, -gap_b), edge_q = select(is_b, edge_a, edge_b);
+    auto is_edge = across_q >= uniform(most_of<F>(across_q));
+    Triple<F> across = choose(is_edge, zero, edge_q);
+    F place = -dot(across, from_q) / max<F>(dot(across, across), splat<F>(least_component));
+    F inwards = edge.of(select(is_b, choose(b_up, one, -one), choose(a_up, -one, one)));
+    F farthest = 2.0F * edge.of(select(is_b, reach_b, reach_a));
+    place = min<F>(farthest, max<F>(inwards * place, F{}));
+    along_edge = (inwards * place) * edge_a;
+  }
+};
+
+// The origin near the patch, from the corners of both boxes, in float64.
+template <class T>
+struct Origin {
+  Triple<T> from_a, from_b;  // from A's corner in A's frame, and from B's in B's [m]
+  T top;                     // of A along the normal, from the origin [m]
+
+  Origin() = default;
+  BC_INLINE Origin(const Query<T>& query, const Meeting<T>& meeting, T p_is_b,
+                   const Triple<T>& along_edge) {
+    from_a = p_is_b * meeting.gap + meeting.unit * along_edge;
+    from_b = query.pair.a_in_b * (from_a - meeting.gap);
+    top = -dot(meeting.normal, from_a);
+  }
+};
+
+// Half-spaces of a box: −minus ≤ Σ share_i u_i ≤ plus for u from −1 to 1, one slab for each axis of the
+// box. `plus` is the side of the corner that is deepest in the other box. Lengths are in units.
+template <class F>
+struct Slabs {
+  Triple<F> share[3], plus, minus;
+
+  Slabs() = default;
+  // corner: from the origin, in the box's frame.
+  BC_INLINE Slabs(const Triple<F> (&axes)[3], const Flags<F>& up, bool is_a, const Triple<F>& half,
+                  const Triple<F>& corner) {
+    auto towards = [&](const Triple<F>& x) { return is_a ? choose(up, x, -x) : choose(up, -x, x); };
+    for (int i = 0; i < 3; ++i) share[i] = towards(axes[i]);
+    plus = towards(corner);
+    minus = 2.0F * half - plus;
+  }
+  // Go on from a place on axis i.
+  BC_INLINE void move(int i, F place) {
+    Triple<F> moved = place * share[i];
+    plus = plus - moved;
+    minus = minus + moved;
+  }
+  BC_INLINE Slabs moved(int i, F place) const {
+    Slabs there = *this;
+    there.move(i, place);
+    return there;
+  }
+  // Reduce how far coordinate i may be above and below, where the others have half extents `half`.
+  BC_INLINE void bound(int i, const F (&half)[3], F& above, F& below) const {
+    int j = (i + 1) % 3, k = (i + 2) % 3;
+    Triple<F> rest = half[j] * abs(share[j]) + half[k] * abs(share[k]);
+    Triple<F> by_share = inverses<F>(max(abs(share[i]), uniform(splat<F>(least_component))));
+    auto forwards = share[i] >= Triple<F>{};
+    above = min<F>(above, least_of<F>(by_share * (rest + choose(forwards, plus, minus))));
+    below = min<F>(below, least_of<F>(by_share * (rest + choose(forwards, minus, plus))));
+  }
+  // Grow on both sides along axis i.
+  BC_INLINE void grow(int i, F more) {
+    Triple<F> grown = more * abs(share[i]);
+    plus = plus + grown;
+    minus = minus + grown;
+  }
+};
+
+template <class F>
+struct PatchBox {
+  F centre[3], half[3];  // along x, y and z, from the origin [unit]
+  Slabs<F> a, b;
+
+  // from_a, from_b, top: of `Origin`.
+  BC_INLINE PatchBox(const Frame<F>& frame, const Triple<F>& from_a, const Triple<F>& from_b, F top)
+      : a(frame.in_a, frame.a_up, true, frame.half_a, -from_a),
+        b(frame.in_b, frame.b_up, false, frame.half_b, -from_b) {
+    // Beyond the far end of a box that is less thick than the depth there is no overlap.
+    auto beyond = [&](const Triple<F>& box_half, const Triple<F>& normal) {
+      return max<F>(frame.depth - 2.0F * dot(box_half, abs(normal)), F{});
+    };
+    F above_b = beyond(frame.half_b, frame.in_b[2]), below_a = beyond(frame.half_a, frame.in_a[2]);
+    F half_depth = 0.5F * max<F>((frame.depth - above_b) - below_a, frame.least);
+    Triple<F> into_a = choose(frame.a_up, -frame.reach_a, frame.reach_a) - from_a;
+    Triple<F> into_b = choose(frame.b_up, frame.reach_b, -frame.reach_b) - from_b;
+    for (int i = 0; i < 2; ++i) {
+      F at_a = dot(into_a, frame.in_a[i]), reach_a = dot(frame.reach_a, abs(frame.in_a[i]));
+      F at_b = dot(into_b, frame.in_b[i]), reach_b = dot(frame.reach_b, abs(frame.in_b[i]));
+      F low = max<F>(at_a - reach_a, at_b - reach_b), high = min<F>(at_a + reach_a, at_b + reach_b);
+      centre[i] = 0.5F * (low + high);
+      half[i] = max<F>(0.5F * (high - low), frame.least);
+    }
+    centre[2] = (top - above_b) - half_depth;
+    half[2] = half_depth;
+    for (Slabs<F>* slabs : {&a, &b}) slabs->move(2, centre[2]), slabs->move(1, centre[1]);
+    // Faces of P that meet in the edge along x bound y, whatever x is.
+    F above = half[1], below = above;
+    bound(1, a.moved(0, centre[0]), b.moved(0, centre[0]), frame.least, above, below);
+    F shift = 0.5F * (above - below);
+    centre[1] = centre[1] + shift;
+    half[1] = 0.5F * max<F>(above + below, frame.least);
+    for (Slabs<F>* slabs : {&a, &b}) slabs->move(1, shift);
+    // x from the origin: edges that cross meet there, and the middle of the edges may be far.
+    above = half[0] + centre[0], below = half[0] - centre[0];
+    bound(0, a, b, frame.least, above, below);
+    centre[0] = 0.5F * (above - below);
+    half[0] = 0.5F * max<F>(above + below, frame.least);
+    for (Slabs<F>* slabs : {&a, &b}) {
+      slabs->move(0, centre[0]);
+      for (int i = 0; i < 3; ++i) slabs->share[i] = half[i] * slabs->share[i];
+    }
+  }
+
+ private:
+  // Reduce how far coordinate i may be above and below. Boxes that touch along several axes have no
+  // overlap: B grows as far as the overlap lacks of the least width.
+  BC_INLINE void bound(int i, const Slabs<F>& of_a, const Slabs<F>& of_b, F least, F& above,
+                       F& below) {
+    F above_b = above, below_b = below, least_above = -below, least_below = -above;
+    of_a.bound(i, half, above, below);
+    of_b.bound(i, half, above_b, below_b);
+    above = max<F>(above, least_above), above_b = max<F>(above_b, least_above);
+    below = max<F>(below, least_below), below_b = max<F>(below_b, least_below);
+    F lacking = max<F>(least - (min<F>(above, above_b) + min<F>(below, below_b)), F{});
+    b.grow(i, lacking);
+    above = min<F>(above, above_b + lacking);
+    below = min<F>(below, below_b + lacking);
+  }
+};
+
+// What the half-spaces of both boxes cut off the patch box, as its network reads it.
+//
+// A half-space cuts the box [−1, 1]³ to a depth c along a, with Σ|a_i| = 1. Per slab there are two,
+// c⁺ and c⁻. The features, of all six slabs of both boxes alike:
+//
+//   0–2: Σ (c⁺ − c⁻) a       3, 4: Σ c, Σ c²       5–7, 8–10: Σ of (c⁺ − c⁻)² a aᵀ, xx yy zz, xy xz yz
+//   11–18: how deep the corners of the box are cut off, +++ ++− +−+ +−− −++ −+− −−+ −−−
+//
+// Axes are mirrored so that 0–2 are not above 0.
+constexpr int features = 19;
+
+template <class F>
+struct Cuts {
+  F flip[3], told[up_to_fours(features)];
+
+  BC_INLINE explicit Cuts(const PatchBox<F>& box) {
+    for (F& number : told) number = F{};
+    Slabs<F> slabs[2] = {box.a, box.b};
+    Triple<F> one = uniform(splat<F>(1.0F)), whole = uniform(splat<F>(2.0F)), zero{};
+    Triple<F> depth[2], pull[2][3];
+    for (int n = 0; n < 2; ++n) {
+      Triple<F>(&share)[3] = slabs[n].share;
+      Triple<F> scale = inverses<F>((abs(share[0]) + abs(share[1])) + abs(share[2]));
+      for (int i = 0; i < 3; ++i) share[i] = scale * share[i];
+      slabs[n].plus = scale * slabs[n].plus;
+      slabs[n].minus = scale * slabs[n].minus;
+      auto cut = [&](const Triple<F>& side) { return min(whole, max(one - side, zero)); };
+      Triple<F> above = cut(slabs[n].plus), below = cut(slabs[n].minus);
+      depth[n] = above + below;
+      for (int i = 0; i < 3; ++i) pull[n][i] = (above - below) * share[i];
+    }
+    auto add = [](const Triple<F>& x, const Triple<F>& y) { return sum(x + y); };
+    auto add_products = [&](int i, int j) {
+      return add(pull[0][i] * pull[0][j], pull[1][i] * pull[1][j]);
+    };
+    for (int i = 0; i < 3; ++i) {
+      F all = add(pull[0][i], pull[1][i]);
+      flip[i] = either<F>(all > F{}, splat<F>(-1.0F), splat<F>(1.0F));
+      told[i] = flip[i] * all;
+      told[5 + i] = add_products(i, i);
+    }
+    told[3] = add(depth[0], depth[1]);
+    told[4] = add(depth[0] * depth[0], depth[1] * depth[1]);
+    told[8] = flip[0] * flip[1] * add_products(0, 1);
+    told[9] = flip[0] * flip[2] * add_products(0, 2);
+    told[10] = flip[1] * flip[2] * add_products(1, 2);
+    for (const Slabs<F>& of_box : slabs) {
+      Triple<F> a[3];
+      for (int i = 0; i < 3; ++i) a[i] = flip[i] * of_box.share[i];
+      Triple<F> along = a[0] + a[1], against = a[0] - a[1];
+      Triple<F> corners[4] = {along + a[2], along - a[2], against + a[2], against - a[2]};
+      for (int i = 0; i < 4; ++i) {
+        Triple<F> here = max(corners[i] - of_box.plus, -corners[i] - of_box.minus);
+        Triple<F> there = max(-corners[i] - of_box.plus, corners[i] - of_box.minus);
+        told[11 + i] = max(told[11 + i], most_of<F>(here));
+        told[18 - i] = max(told[18 - i], most_of<F>(there));
+      }
+    }
+    for (int i = 11; i < features; ++i) told[i] = min(told[i], splat<F>(2.0F));
+  }
+};
+
+}  // namespace box_contact::BOX_CONTACT_SET::mlp

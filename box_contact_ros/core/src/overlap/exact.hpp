@@ -166,6 +166,9 @@ template <class T, class Found>
 //   solve(query, found, counts): fills `found` for the pairs that touch, with the centroid in the
 //     common frame. It returns the bits of those that it leaves; it leaves no pair alone.
 //   solve_left(query, found, counts): the same for pairs that were left, side by side.
+//
+// A model that leaves none may have solve_two(query, other, found, other_found) in their place, for two
+// blocks of pairs at once; `solve` is then for a pair alone.
 
 // Model `exact`. `FoundOf`: Moments, or PointAndVolume. It leaves few pairs of W that have two planes
 // across an axis.

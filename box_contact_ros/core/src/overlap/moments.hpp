@@ -94,6 +94,12 @@ struct Moments : PointAndVolume<T> {
   Sym<T> covariance;  // second central moments by the volume, common frame [m²]
 };
 
+// Whether a model finds a normal of its own, from the caller's A, common frame.
+template <class Found, class = void>
+constexpr bool has_normal = false;
+template <class Found>
+constexpr bool has_normal<Found, std::void_t<decltype(Found::normal)>> = true;
+
 template <class T, class N>
 BC_INLINE void set_lane(PointAndVolume<T>& found, int i, const PointAndVolume<N>& value) {
   set_lane(found.volume, i, value.volume);

@@ -1,0 +1,190 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// Model `paper`: contact point and normal of two equal boxes by the source paper's network.
+//
+// 1. The box whose face wins the separating-axis test is the first box; of edges it is the caller's A.
+//    The boxes are moved apart along the normal until they touch: the network knows touching boxes only.
+// 2. `fold`: symmetries bring the pair into the network's domain, t ≥ 0 and roll, pitch and yaw from
+//    −π/2 to π/2. A box stays the same when an axis changes its sign, and the whole pair may be
+//    reflected. Let t be the second box's offset and R its orientation, in the first box's frame:
+//    t' = M t, R' = M R N, det M · det N = 1, with M and N of signs that the pose alone tells. Points and
+//    directions of the contact go back by M.
+// 3. The network: offset, roll, pitch and yaw → azimuth and elevation of the impact point, seen from the
+//    first box's centre, and of the normal. Or → x, y and z of the point; the normal is then SAT's.
+// 4. The point is where that direction leaves the first box. It goes to the middle of the depth.
+#pragma once
+
+#include "../overlap/exact.hpp"
+#include "network.hpp"
+
+namespace box_contact::BOX_CONTACT_SET {
+namespace paper {
+
+constexpr float pi = 3.14159265F, half_pi = 1.57079633F;
+constexpr float least = 1e-30F;  // number by which is divided
+
+template <class F>
+BC_INLINE F sign(F x) {
+  return either<F>(x >= F{}, splat<F>(1.0F), splat<F>(-1.0F));
+}
+// atan2(y, x) for x not below 0, to 1e-5 (Hastings 1955).
+template <class F>
+BC_INLINE F angle(F y, F x) {
+  F a = abs(y), small = min<F>(a, x), large = max<F>(max<F>(a, x), splat<F>(least));
+  F r = small / large, z = r * r;
+  F found = -0.11643287F + z * (0.05265332F - 0.01172120F * z);
+  found = r * (0.99997726F + z * (-0.33262347F + z * (0.19354346F + z * found)));
+  found = either<F>(a > x, half_pi - found, found);
+  return either<F>(y < F{}, -found, found);
+}
+// Of −π/2 to π/2, to 3e-7.
+template <class F>
+BC_INLINE F sine(F x) {
+  F z = x * x, found = 0.00833217F + z * (-0.00019515F + z * 0.0000025F);
+  return x + x * (z * (-0.16666654F + z * found));
+}
+// A unit vector; the azimuth runs from x towards y, the elevation towards z [rad].
+template <class F>
+BC_INLINE Vec<F> direction(F azimuth, F elevation) {
+  auto sine_and_cosine = [](F x, F& s, F& c) {
+    constexpr float rounded = 12582912.0F;  // 1.5 · 2²³: sums with it are whole
+    x = x - 2.0F * pi * ((x * (0.5F / pi) + rounded) - rounded);
+    F a = abs(x), up = sine<F>(either<F>(a > half_pi, pi - a, a));
+    s = either<F>(x < F{}, -up, up);
+    c = sine<F>(half_pi - a);
+  };
+  F sa, ca, se, ce;
+  sine_and_cosine(azimuth, sa, ca);
+  sine_and_cosine(elevation, se, ce);
+  return {ce * ca, ce * sa, se};
+}
+
+// A pair that touches, in the first box's frame and unit.
+template <class T>
+struct Touching {
+  Mask<T> first_is_b;
+  Triple<T> normal;     // from the first to the second box
+  Triple<T> offset;     // t of the second box
+  Columns<T> rotation;  // R, the second box's axes
+  Triple<T> half;       // half extents of either box
+  T unit;               // [m]
+
+  Touching() = default;
+  BC_INLINE Touching(const Query<T>& q, bool in_half_edges) {
+    const Pair<T>& pair = q.pair;
+    T axis = T(q.axis.axis);
+    constexpr double first_edge = first_edge_axis;
+    first_is_b = ((axis >= 3.0) & (axis < first_edge)) | ((axis >= first_edge) & pair.swapped);
+    unit = in_half_edges ? T(pair.half_a[0]) : splat<T>(1.0);
+    T by_unit = 1.0 / unit;
+    normal = select(first_is_b, -(pair.a_in_b * q.axis.normal), q.axis.normal);
+    Triple<T> apart = select(first_is_b, -pair.offset_b, pair.offset_a);
+    offset = by_unit * (apart - q.axis.separation * normal);
+    half = by_unit * select(first_is_b, pair.half_b, pair.half_a);
+    rotation = select<T>(first_is_b, pair.a_in_b, pair.b_in_a);
+  }
+};
+
+// What the network reads of a pair, and what it says.
+template <class F>
+struct Impact {
+  Vec<F> point, normal;  // first box's frame and unit
+
+  BC_INLINE Impact(const Network& network, const Vec<F>& t, const Vec<F> (&r)[3],
+                   const Vec<F>& half) {
+    F m[3], told[up_to_fours(detail::paper_inputs)], said[up_to_fours(detail::paper_outputs)];
+    for (int i = 0; i < 3; ++i) m[i] = sign(t[i]), told[i] = abs(t[i]);
+    // r: columns of R. Cosines of yaw and of roll are not below 0.
+    F nx = sign<F>(m[0] * r[0][0]), nz = sign<F>(m[2] * r[2][2]);
+    F ny = ((m[0] * m[1]) * m[2]) * (nx * nz), sine_of_pitch = -(m[2] * r[0][2] * nx);
+    F cosine2 = max<F>(1.0F - sine_of_pitch * sine_of_pitch, F{});
+    told[3] = angle<F>(m[2] * r[1][2] * ny, abs(r[2][2]));
+    told[4] = angle<F>(sine_of_pitch, sqrt(cosine2));
+    told[5] = angle<F>(m[1] * r[0][1] * nx, abs(r[0][0]));
+    told[6] = told[7] = F{};
+    answer(network, told, said);
+    if (network.outputs == detail::paper_places) {  // the point, in half of the longest edge
+      F longest = max<F>(max<F>(half[0], half[1]), half[2]);
+      for (int i = 0; i < 3; ++i) point[i] = longest * (m[i] * said[i]), normal[i] = F{};
+      return;
+    }
+    Vec<F> way = direction<F>(said[0], said[1]);
+    F farthest =
+        max<F>(max<F>(abs(way[0]) / half[0], abs(way[1]) / half[1]), abs(way[2]) / half[2]);
+    normal = direction<F>(said[2], said[3]);
+    for (int i = 0; i < 3; ++i) point[i] = m[i] * way[i] / farthest, normal[i] = m[i] * normal[i];
+  }
+};
+
+}  // namespace paper
+
+// What the paper's network finds.
+template <class T>
+struct PointAndNormal : PointAndVolume<T> {
+  Vec<T> normal;  // from the caller's A, common frame
+};
+
+struct PaperModel {
+  Network network;
+
+  template <class T>
+  using Found = PointAndNormal<T>;
+
+  BC_INLINE unsigned solve(const Query<double>& query, Found<double>& found,
+                           detail::Counts&) const {
+    Found<double>* all[1] = {&found};
+    solve_all<double>(all, query);
+    return 0;
+  }
+  template <class T>
+  BC_INLINE void solve_two(const Query<T>& query, const Query<T>& other, Found<T>& found,
+                           Found<T>& other_found) const {
+    Found<T>* all[2] = {&found, &other_found};
+    solve_all<T>(all, query, other);
+  }
+
+ private:
+  template <class T, class... Queries>
+  [[gnu::noinline]] void solve_all(Found<T>* const (&found)[together<T>],
+                                   const Queries&... of) const {
+    using F = Floats<T>;
+    const Query<T>* queries[] = {&of...};
+    paper::Touching<T> pairs[] = {paper::Touching<T>(of, network.in_half_edges)...};
+    auto vector = [&](auto get) {
+      auto number = [&](int k) { return floats<T>([&](int n) { return T(get(pairs[n])[k]); }); };
+      return Vec<F>{number(0), number(1), number(2)};
+    };
+    Vec<F> columns[3];
+    for (int k = 0; k < 3; ++k)
+      columns[k] = vector([k](const auto& pair) { return pair.rotation[k]; });
+    paper::Impact<F> impact(network, vector([](const auto& pair) { return pair.offset; }), columns,
+                            vector([](const auto& pair) { return pair.half; }));
+    for (int n = 0; n < together<T>; ++n) {
+      auto doubled = [&](const Vec<F>& x) {
+        return triple(Vec<T>{doubles<T>(x[0], n), doubles<T>(x[1], n), doubles<T>(x[2], n)});
+      };
+      place(*queries[n], pairs[n], doubled(impact.point), doubled(impact.normal), *found[n]);
+    }
+  }
+  // To the common frame.
+  template <class T>
+  BC_INLINE void place(const Query<T>& q, const paper::Touching<T>& touching,
+                       const Triple<T>& point, const Triple<T>& said, Found<T>& found) const {
+    const Pair<T>& pair = q.pair;
+    Columns<T> axes = select<T>(touching.first_is_b, pair.axes_b, pair.axes_a);
+    Triple<T> origin = select(touching.first_is_b, pair.origin_b, pair.origin_a);
+    Triple<T> at = touching.unit * point + (0.5 * q.axis.separation) * touching.normal;
+    T by_length = 1.0 / sqrt(dot(said, said));  // of float32, 1 to seven digits
+    bool is_place = network.outputs == detail::paper_places;
+    Triple<T> normal = axes * (is_place ? touching.normal : by_length * said);
+    Triple<T> zero{};
+    // Zeros keep no sign on a swap.
+    normal = select(Mask<T>(touching.first_is_b ^ pair.swapped), zero - normal, zero + normal);
+    found.centroid = components<T>(origin + axes * at);
+    found.volume = splat<T>(not_a_number);
+    found.normal = components<T>(normal);
+  }
+};
+
+}  // namespace box_contact::BOX_CONTACT_SET
