@@ -234,7 +234,7 @@ class Pairing(ABC):
         return 0
 
     def stamps(self, box: str) -> np.ndarray:
-        """Return the stamps (n,) [ns] of a box, or of its body, as far as they are remembered."""
+        """Return an array (n,) of the stamps [ns] of a box or its body, as far as remembered."""
         state = self._boxes.get(self._scene.mover(box))
         return np.array(state.taken if state else (), dtype=np.int64)
 

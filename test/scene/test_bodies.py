@@ -146,8 +146,8 @@ def test_a_rotation_moves_what_is_beside():
     assert pose[3:] / np.linalg.norm(pose[3:]) == pytest.approx([0.5, 0.5, 0.5, 0.5])
 
 
-BODIES = Scene({'a': Box(UNIT), 'b1': Box(UNIT, body='b'), 'b2': Box(UNIT, (1, 0, 0, 0, 0, 0, 1),
-                                                                    body='b')},
+BODIES = Scene({'a': Box(UNIT), 'b1': Box(UNIT, body='b'),
+                'b2': Box(UNIT, (1, 0, 0, 0, 0, 0, 1), body='b')},
                patterns=(('a', 'b'),), bodies={'b': Frame()})
 
 
