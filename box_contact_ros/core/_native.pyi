@@ -92,6 +92,10 @@ class PatchForces:
              volume: ArrayLike, covariance: ArrayLike, poses: ArrayLike,
              friction: ArrayLike | None, surface: ArrayLike | None, stiffness: ArrayLike | None,
              age: float, period: float, /) -> bool: ...
+    def hold_own(self, pairs: np.ndarray, friction: np.ndarray | None, surface: np.ndarray | None,
+                 stiffness: np.ndarray | None, /) -> None: ...
+    def set_boxes(self, sizes: np.ndarray, body: np.ndarray | None, poses: np.ndarray | None, /,
+                  ) -> None: ...
     def advance(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
                 outside: ArrayLike | None, /,
                 ) -> Any: ...  # a tuple of arrays, or None

@@ -10,7 +10,7 @@ wrenches that move them. One load on fixed boxes is a scene like any other.
 It is a face of code in libbox_contact; docs/explanation/force.md describes the method, sequential
 impulses (Catto, 2005).
 
-Conventions: those of `pose`; SI units. A pose (7,) is that of a body's box, as the solver takes it.
+Conventions: those of `pose`; SI units. A pose (7,) is that of a body: of its box, if it has one.
 A velocity (6,) is linear [m/s], of the centre of mass, then angular [rad/s]. A wrench (6,) is a
 force [N], then a torque [N m] about the centre of mass. All in the common frame.
 """
@@ -38,11 +38,11 @@ _MOST = 2**31 - 1  # an int of C
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
-    """A body of one box.
+    """A body.
 
     mass     [kg]; 0: no force moves it, but it may move by its velocity
-    inertia  principal moments (3,) about the box's own axes through the centre of mass [kg m²]
-    centre   of mass (3,), in the box's own frame [m]
+    inertia  principal moments (3,) about the body's own axes through the centre of mass [kg m²]
+    centre   of mass (3,), in the body's own frame [m]
 
     Raises ValueError, with field and value, for a mass outside 1e-50 to 1e50 kg, moments of inertia
     that no body has, and a centre that is not finite.
@@ -80,10 +80,9 @@ class Body:
 class Motion(NamedTuple):
     """What a step leads to: a row for each body.
 
-    poses       (n, 7), at the end of the step
-    velocities  (n, 6), at its end
-    wrenches    (n, 6), of contacts: their mean over the step, with what pushes overlaps out; for a
-                simulator that moves the bodies by itself, instead of poses and velocities
+    poses (n, 7) and velocities (n, 6): at the end of the step. wrenches (n, 6): of contacts, their
+    mean over the step, with what pushes overlaps out; for a simulator that moves the bodies by
+    itself.
     """
 
     poses: np.ndarray
@@ -117,10 +116,10 @@ class Loads(NamedTuple):
 class PatchForces:
     """The forces of patches on all bodies, a physics step at a time, by sequential impulses.
 
-    Bodies are known by their places 0 to n − 1, those of the boxes of a `SceneSolver` or of rows of
-    `ContactSolver.batch`. Poses (n, 7) are those of boxes, `x y z qx qy qz qw`. Velocities (n, 6)
-    are linear, of the centre of mass, then angular. Wrenches (n, 6) are a force, then a torque
-    about the centre of mass. All are in the common frame.
+    Bodies are known by their places 0 to n − 1, and so are boxes. Unless `set_boxes` says
+    otherwise, box k is body k. Poses (n, 7) are those of bodies, `x y z qx qy qz qw`. Velocities
+    (n, 6) are linear, of the centre of mass, then angular. Wrenches (n, 6) are a force, then a
+    torque about the centre of mass. All are in the common frame.
 
     To take a body out of the middle, put the last one in its place, `forget` both, and
     `set_bodies` without the last.
@@ -146,22 +145,44 @@ class PatchForces:
         """Change masses, add bodies at the end, or drop bodies there with their patches."""
         self._native.set_bodies(*_columns(bodies))
 
-    def hold(self, pairs: ArrayLike, contacts: Contacts, poses: ArrayLike, *,
+    def set_boxes(self, sizes: ArrayLike, *, body: ArrayLike | None = None,
+                  poses: ArrayLike | None = None) -> None:
+        """Say which boxes the bodies have; pairs are then of boxes, and poses of bodies.
+
+        sizes: full extents (m, 3) [m]. body: of each box (m,); None: box k is body k. poses: of the
+        boxes (m, 7) in the frames of their bodies; None: those frames. Patches of boxes that stay
+        with their body stay; pairs without contacts are forgotten.
+        ValueError: names the field and its value.
+        """
+        self._native.set_boxes(_as_rows(sizes, 'sizes', 3),
+                               None if body is None else as_wholes(body, 'body'),
+                               None if poses is None else _as_rows(poses, 'poses', 7))
+
+    def hold(self, pairs: ArrayLike, contacts: Contacts | None = None,
+             poses: ArrayLike | None = None, *,
              friction: ArrayLike | None = None, surface_velocity: ArrayLike | None = None,
              stiffness: ArrayLike | None = None, age: float = 0.0,
              period: float = 0.0) -> None:
-        """Take the contacts of pairs of bodies (k, 2), asked for at `poses`; forget other pairs.
+        """Take the contacts of pairs of boxes (k, 2), asked for at `poses`; forget other pairs.
 
+        Without contacts, they are one's own: `exact` solves the pairs at the start of each
+        `advance`. That needs `set_boxes`, and no poses, age or period.
         A contact whose separation is NaN is stale: the patch of its pair stays.
         friction: μ (k,). surface_velocity: of B's surface relative to A's (k, 3) [m/s], plus that
         of the bodies, as of a belt. stiffness: (k,) [N/m]; 0 is as stiff as step and answers bear.
         age: how long ago the answer was asked for [s]. period: from one question to the next [s];
-        0 is the time since the answer before.
+        0 is the least of the last intervals between answers.
         ValueError: names field and value, such as a contact without a patch, or a pair that comes
         twice; nothing changes then.
         """
+        if contacts is None:
+            self._native.hold_own(as_pairs(pairs, 'pairs'), *_columns_of_pairs(
+                friction, surface_velocity, stiffness))
+            return
         if not isinstance(contacts, Contacts):
             raise ValueError(f'contacts must be Contacts, not {short_repr(contacts)}')
+        if poses is None:
+            raise ValueError('poses must be those of the question, not None')
         times = as_number(age, 'age'), as_number(period, 'period')
         if self._native.hold(pairs, contacts.separation, contacts.normal, contacts.point,
                              contacts.volume, contacts.covariance, poses, friction,
@@ -172,9 +193,7 @@ class PatchForces:
             _as_rows(contacts.normal, 'normal', 3), _as_rows(contacts.point, 'point', 3),
             _as_rows(contacts.volume, 'volume'), _as_rows(contacts.covariance, 'covariance', 3, 3),
             _as_rows(poses, 'poses', 7),
-            None if friction is None else _as_rows(friction, 'friction'),
-            None if surface_velocity is None else _as_rows(surface_velocity, 'surface_velocity', 3),
-            None if stiffness is None else _as_rows(stiffness, 'stiffness'), *times)
+            *_columns_of_pairs(friction, surface_velocity, stiffness), *times)
 
     def advance(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
                 wrenches: ArrayLike | None = None) -> Motion:
@@ -233,6 +252,15 @@ def _columns(bodies: Sequence[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray
     return (np.array([body.mass for body in bodies], dtype=float).reshape(n),
             np.array([body.inertia for body in bodies], dtype=float).reshape(n, 3),
             np.array([body.centre for body in bodies], dtype=float).reshape(n, 3))
+
+
+def _columns_of_pairs(friction: ArrayLike | None, surface_velocity: ArrayLike | None,
+                      stiffness: ArrayLike | None,
+                      ) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
+    """Return what pairs may have of their own, checked."""
+    return (None if friction is None else _as_rows(friction, 'friction'),
+            None if surface_velocity is None else _as_rows(surface_velocity, 'surface_velocity', 3),
+            None if stiffness is None else _as_rows(stiffness, 'stiffness'))
 
 
 def _as_rows(value: ArrayLike, name: str, *shape: int) -> np.ndarray:

@@ -104,15 +104,12 @@ void print_tower() {
   }
   constexpr int rows = count - 1;
   double separation[rows], normal[3 * rows], point[3 * rows], volume[rows], covariance[9 * rows];
-  box_contact::Patches answer{};
-  answer.size = sizeof answer, answer.count = rows, answer.pairs = pairs.data();
-  answer.separation = separation, answer.normal = normal, answer.point = point;
-  answer.volume = volume, answer.covariance = covariance;
+  const box_contact::Rows asked{poses, poses, sizes, sizes, pairs};
+  const box_contact::Results found{nullptr, separation, normal, point, volume, covariance};
   box_contact::PatchForces forces(bodies);
   for (int step = 0; step < 400; ++step) {
-    box_contact::collide({poses, poses, sizes, sizes, pairs},
-                         {nullptr, separation, normal, point, volume, covariance});
-    forces.hold(answer, poses);
+    box_contact::collide(asked, found);
+    forces.hold({asked, found}, poses);
     forces.advance(h, poses, velocities, weights);
   }
   for (int k = 0; k < count; ++k) {

@@ -39,15 +39,11 @@ int main() {
       asked[0] = poses[0], asked[1] = poses[1];
     }
     if (step % 5 == 2) {
-      Patches answer{};
-      answer.size = sizeof answer;
-      answer.count = 1;
-      answer.pairs = pair;
-      answer.separation = &contact.separation;
-      answer.normal = contact.normal;
-      answer.point = contact.point;
-      answer.volume = &contact.volume;
-      answer.covariance = contact.covariance[0];
+      Results found;
+      found.separation = &contact.separation, found.normal = contact.normal;
+      found.point = contact.point, found.volume = &contact.volume;
+      found.covariance = contact.covariance[0];
+      Patches answer(pair, found);
       answer.age = 0.002;
       forces.hold(answer, asked);
     }

@@ -83,6 +83,7 @@ def test_null_pointers(library: CLibrary) -> None:
     pose, contact, rows = (c_double * 7)(0, 0, 0, 0, 0, 0, 1), (c_double * 64)(), Rows()
     rows.size, results = ctypes.sizeof(Rows), Results(ctypes.sizeof(Results))
     answer = (c_int64 * 13)(13 * 8)  # a bc_patches without rows
+    body_box = (c_double * 11)(0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1)
     step, motion = c_double(0.001), (c_int64 * 4)(4 * 8)  # a bc_motion that wants nothing
     made, wrench, box = c_void_p(), (c_double * 6)(), (c_double * 10)(*[0.0] * 6, *[1.0] * 4)
     calls: list[tuple[Callable[..., int], list[object], set[int]]] = [
@@ -93,7 +94,8 @@ def test_null_pointers(library: CLibrary) -> None:
         (library.bc_patch_forces_copy, [library.forces, byref(made)], {0, 1}),
         (library.bc_patch_forces_set_bodies,
          [library.forces, (c_double * 7)(1, 1, 1, 1), c_int64(1)], {0, 1}),
-        (library.bc_patch_forces_hold, [library.forces, answer, pose], {0, 1, 2}),
+        (library.bc_patch_forces_hold, [library.forces, answer, pose], {0, 1}),
+        (library.bc_patch_forces_set_boxes, [library.forces, body_box, c_int64(1)], {0, 1}),
         (library.bc_patch_forces_advance,
          [library.forces, step, pose, wrench, None, motion], {0, 2, 3, 5}),
         (library.bc_patch_forces_forget,

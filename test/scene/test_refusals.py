@@ -38,6 +38,8 @@ SOLVER = ContactSolver(UNIT, UNIT)
 BODY = Body.of_box(UNIT, 1.0)
 FORCES = PatchForces([BODY, BODY])
 CONTACTS = SOLVER.batch(POSES[:1], POSES[1:])
+BOXED = PatchForces([BODY, BODY])
+BOXED.set_boxes([UNIT, UNIT])
 BOXES = {name: Box(UNIT) for name in 'ab'}
 FIXED = {name: Box(UNIT, POSE) for name in 'ab'}
 PAIR = Pair.between('a', 'b')
@@ -112,10 +114,23 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: PatchForces.from_bytes(b'text'), 'state', '4 bytes'),
 
     (lambda: hold([(0.0, 1.0)]), 'pairs', '(0.0, 1.0)'),
-    (lambda: hold([(0, 2)]), 'pairs[0]', 'no body 2'),
+    (lambda: hold([(0, 2)]), 'pairs[0]', 'no box 2'),
     (lambda: hold([(1, 1)]), 'pairs[0]', 'body 1'),
     (lambda: hold([(0, 1), (1, 0)], Contacts.of([*CONTACTS, *CONTACTS])), 'pairs', 'twice'),
-    (lambda: hold(contacts=None), 'contacts', 'None'),
+    (lambda: hold(contacts=None), 'contacts', 'set_boxes'),
+    (lambda: hold(contacts=5), 'contacts', '5'),
+    (lambda: hold(poses=None), 'poses', 'None'),
+    (lambda: FORCES.set_boxes([UNIT], body=[2]), 'body[0]', '2'),
+    (lambda: FORCES.set_boxes([UNIT], body=['a']), 'body', "['a']"),
+    (lambda: FORCES.set_boxes([UNIT], body=[0, 1]), 'body', '(2,)'),
+    (lambda: FORCES.set_boxes([(1, 2, -1)]), 'sizes[0]', '(1, 2, -1)'),
+    (lambda: FORCES.set_boxes([UNIT], poses=[(0,) * 7]), 'poses[0]', '(0, 0, 0, 0)'),
+    (lambda: FORCES.set_boxes([UNIT] * 3), 'body[2]', '2'),
+    (lambda: BOXED.set_bodies([BODY]), 'bodies', 'body 1'),
+    (lambda: BOXED.hold([(0, 2)]), 'pairs[0]', '2'),
+    (lambda: BOXED.hold([(0, 1), (1, 0)]), 'pairs', 'twice'),
+    (lambda: BOXED.hold([(0, 1)], friction=[-1.0]), 'friction[0]', '-1'),
+    (lambda: BOXED.hold([(0, 1)], friction=[1.0, 1.0]), 'friction', '(2,)'),
     (lambda: hold(poses=POSES[:1]), 'poses', '(1, 7)'),
     (lambda: hold(poses=POSES * [1, 1, 1, 0, 0, 0, 0]), 'poses[0]', '(0, 0, 0, 0)'),
     (lambda: hold(field='normal', value=(0, 0, 2)), 'normal[0]', '(0, 0, 2)'),
@@ -255,9 +270,10 @@ def test_the_limits_themselves_are_accepted() -> None:
 def test_a_saved_state_keeps_the_limits() -> None:
     """Each number of a state replaced by NaN, by minus 1e200 and by zero: refused, or harmless."""
     forces = PatchForces([BODY, BODY])
-    forces.hold([(0, 1)], CONTACTS, POSES)
+    forces.set_boxes([UNIT, UNIT])
+    forces.hold([(0, 1)])
     forces.advance(0.01, POSES, STILL)
-    state, head = bytes(forces), 4 * 8
+    state, head = bytes(forces), 6 * 8
     refused = 0
     for at in range(head, len(state), 8):
         for number in (NAN, -1e200, 0.0):

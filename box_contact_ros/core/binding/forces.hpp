@@ -99,6 +99,41 @@ inline PyObject* forces_hold(PyObject* self, PyObject* const* args, Py_ssize_t c
   Py_RETURN_TRUE;
 }
 
+inline PyObject* forces_hold_own(PyObject* self, PyObject* const* args, Py_ssize_t count) {
+  if (count != 4) fail(PyExc_TypeError, "hold_own(pairs, friction, surface, stiffness)");
+  auto pairs = read<int64_t>(args[0], "pairs", {any_length, 2});
+  npy_intp n = pairs.length(0);
+  auto friction = read_given<double>(args[1], "friction", {n});
+  auto surface = read_given<double>(args[2], "surface_velocity", {n, 3});
+  auto stiffness = read_given<double>(args[3], "stiffness", {n});
+  bc_patches asked{};
+  asked.size = sizeof asked;
+  asked.count = int64_t(n);
+  asked.pairs = pairs.numbers;
+  asked.friction = friction.numbers;
+  asked.surface = surface.numbers;
+  asked.stiffness = stiffness.numbers;
+  check(bc_patch_forces_hold(forces_of(self), &asked, nullptr));
+  Py_RETURN_NONE;
+}
+
+inline PyObject* forces_set_boxes(PyObject* self, PyObject* const* args, Py_ssize_t count) {
+  if (count != 3) fail(PyExc_TypeError, "set_boxes(sizes, body, poses)");
+  auto sizes = read<double>(args[0], "sizes", {any_length, 3});
+  npy_intp n = sizes.length(0);
+  auto body = read_given<int64_t>(args[1], "body", {n});
+  auto poses = read_given<double>(args[2], "poses", {n, 7});
+  std::vector<bc_body_box> boxes(size_t(n), bc_body_box{0, {{{0, 0, 0}, {0, 0, 0, 1}}, {}}});
+  for (npy_intp k = 0; k < n; ++k) {
+    bc_body_box& box = boxes[size_t(k)];
+    box.body = body.object ? body.numbers[k] : int64_t(k);
+    std::memcpy(&box.box.size, sizes.numbers + 3 * k, sizeof box.box.size);
+    if (poses.object) std::memcpy(&box.box.pose, poses.numbers + 7 * k, sizeof box.box.pose);
+  }
+  check(bc_patch_forces_set_boxes(forces_of(self), boxes.data(), int64_t(n)));
+  Py_RETURN_NONE;
+}
+
 // An array of the numbers of structs.
 template <class Struct>
 Struct* rows_of(const Array<double>& array) {
@@ -183,6 +218,12 @@ inline PyMethodDef forces_methods[] = {
      "hold(pairs, separation, normal, point, volume, covariance, poses, friction, surface, "
      "stiffness, age, period)\n--\n\nTake the arrays of an answer; None for the last three.\n\n"
      "Return False, and change nothing, where one is no plain array."},
+    {"hold_own", method<forces_hold_own>(), METH_FASTCALL,
+     "hold_own(pairs, friction, surface, stiffness)\n--\n\nTake pairs whose contacts are solved at "
+     "each advance; None for the last three."},
+    {"set_boxes", method<forces_set_boxes>(), METH_FASTCALL,
+     "set_boxes(sizes, body, poses)\n--\n\nChange the boxes: (m, 3), (m,), (m, 7); None for the last "
+     "two."},
     {"advance", method<forces_advance>(), METH_FASTCALL,
      "advance(dt, poses, velocities, outside)\n--\n\nReturn poses (n, 7), velocities and wrenches "
      "(n, 6).\n\nReturn None, and change nothing, where one is no plain array."},

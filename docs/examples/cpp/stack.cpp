@@ -42,29 +42,13 @@ int main() {
   for (std::size_t b = 1; b < count; ++b)
     for (std::size_t a = 0; a < b; ++a) pairs.insert(pairs.end(), {std::int64_t(a), std::int64_t(b)});
 
-  const std::size_t rows = pairs.size() / 2;
-  std::vector<double> separation(rows), normal(3 * rows), point(3 * rows), volume(rows),
-      covariance(9 * rows);
-  Results results;
-  results.separation = separation.data();
-  results.normal = normal.data();
-  results.point = point.data();
-  results.volume = volume.data();
-  results.covariance = covariance.data();
-  const Patches answer{sizeof(Patches),  std::int64_t(rows), pairs.data(),
-                       separation.data(), normal.data(),     point.data(),
-                       volume.data(),     covariance.data(), nullptr,
-                       nullptr,           nullptr,           0.0,              0.0};
   PatchForces forces(bodies);
-  const auto ask = [&] {
-    collide({poses, poses, sizes, sizes, Span<const std::int64_t>(pairs)}, results);
-    forces.hold(answer, poses);
-  };
-  for (int tick = 0; tick < 3000; ++tick) {
-    ask();
-    forces.advance(step, poses, velocities, weights);
-  }
-  ask();
+  std::vector<BodyBox> boxes;
+  for (std::size_t i = 0; i < count; ++i)
+    boxes.push_back({std::int64_t(i), {{{0, 0, 0}, {0, 0, 0, 1}}, sizes[i]}});
+  forces.set_boxes(boxes);
+  forces.hold(Patches(pairs));  // the library solves these pairs at each step
+  for (int tick = 0; tick < 3000; ++tick) forces.advance(step, poses, velocities, weights);
   forces.wrenches(step, poses, velocities, weights, wrenches);
 
   double top = 0;  // of what is below [m]

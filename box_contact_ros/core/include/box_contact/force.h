@@ -15,8 +15,9 @@
  *   bc_motion motion = {sizeof(bc_motion), poses, velocities, NULL};
  *   bc_patch_forces_advance(forces, 0.001, poses, velocities, weights, &motion);
  *
- * A body is known by its place, 0 to count − 1. Its pose is that of its box, as the solver takes it.
- * Velocities and wrenches are in the common frame, at and about the centre of mass.
+ * A body is known by its place, 0 to count − 1, and so is a box. Unless bc_patch_forces_set_boxes says
+ * otherwise, box k is body k, and the body's frame is that of the box. Velocities are linear, then
+ * angular. They and wrenches are in the common frame, at and about the centre of mass.
  * docs/explanation/force.md has the equations. One thread at a time may use an object.
  * `bc_patch_forces_hold` allocates no memory once as many pairs have been held, and
  * `bc_patch_forces_advance` by one thread none at all. The bits are the same on all instruction sets,
@@ -33,10 +34,15 @@ extern "C" {
 
 typedef struct bc_body {
   double mass;       /* 1e-50 to 1e50 kg; 0: no force moves it, but it may move by its velocity */
-  double inertia[3]; /* about the box's own axes, through the centre of mass: 1e-50 to 1e50 kg m²,
+  double inertia[3]; /* about the body's own axes, through the centre of mass: 1e-50 to 1e50 kg m²,
                         or 0 without a mass; none exceeds the sum of the two others */
-  double centre[3];  /* of mass, in the box's own frame, up to 1e50 m */
+  double centre[3];  /* of mass, in the body's own frame, up to 1e50 m */
 } bc_body;
+
+typedef struct bc_body_box {
+  int64_t body;
+  bc_box box; /* its pose is in the body's frame */
+} bc_body_box;
 
 typedef struct bc_velocity {
   double linear[3];  /* of the centre of mass, up to 1e50 m/s */
@@ -49,12 +55,14 @@ typedef struct bc_wrench {
 } bc_wrench;
 
 /* An answer: rows of pairs, as bc_collide_rows gives them. Rows without volume are passed over. A row
- * whose separation is NaN is stale: the patch that is held for its pair stays. */
+ * whose separation is NaN is stale: the patch that is held for its pair stays. With `separation` NULL,
+ * contacts are one's own: model `exact` solves the pairs at the start of each advance. Then friction,
+ * surface and stiffness are read alone. */
 typedef struct bc_patches {
   size_t size; /* sizeof(bc_patches) */
   int64_t count;
-  const int64_t* pairs;     /* (count, 2): the bodies of boxes A and B */
-  const double* separation; /* [m] */
+  const int64_t* pairs;     /* (count, 2): boxes A and B, of two bodies */
+  const double* separation; /* [m]; NULL: contacts of one's own */
   const double* normal;     /* (count, 3), from A to B, of length 1 ± 1e-6 */
   const double* point;      /* (count, 3) [m] */
   const double* volume;     /* [m³] */
@@ -114,12 +122,18 @@ BC_API int64_t bc_patch_forces_bodies(const bc_patch_forces* forces); /* how man
 /* Change masses, add bodies at the end, or drop bodies there with their patches. */
 BC_API bc_status bc_patch_forces_set_bodies(bc_patch_forces* forces, const bc_body* bodies,
                                             int64_t count);
+/* Say which boxes the bodies have: pairs are then of boxes, and poses of bodies. Patches of boxes that
+ * stay with their body stay; pairs of contacts of one's own are forgotten. 0 boxes: box k is body k. */
+BC_API bc_status bc_patch_forces_set_boxes(bc_patch_forces* forces, const bc_body_box* boxes,
+                                           int64_t count);
+
 /* Forget the patches of bodies, which were put elsewhere, or all patches. */
 BC_API bc_status bc_patch_forces_forget(bc_patch_forces* forces, const int64_t* bodies,
                                         int64_t count);
 BC_API void bc_patch_forces_reset(bc_patch_forces* forces);
 
-/* Take an answer, asked for at `poses` (one for each body). Pairs that are left out are forgotten.
+/* Take an answer, asked for at `poses` (one for each body; not read for contacts of one's own, which
+ * need set_boxes). Pairs that are left out are forgotten.
  * BC_BAD_ARGUMENT, and nothing changes, for numbers beyond the limits above, a contact without a patch
  * and a pair that comes twice. */
 BC_API bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches* answer,

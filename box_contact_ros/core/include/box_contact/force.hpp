@@ -24,13 +24,30 @@ namespace box_contact {
 
 using Velocity = bc_velocity;  // of the centre of mass [m/s], [rad/s], common frame
 using Wrench = bc_wrench;      // force [N], and torque [N m] about the centre of mass, common frame
-using Patches = bc_patches;    // an answer
 using Load = bc_load;          // what the contact of two boxes carried
+using BodyBox = bc_body_box;   // a body, and a box in its frame
+
+// An answer: pairs of boxes, and what `collide` gave for them. Without `results`, contacts are one's
+// own: `PatchForces` solves the pairs at the start of each advance.
+struct Patches {
+  Span<const std::int64_t> pairs;  // two boxes a row
+  Results results;                 // separation, normal, point, volume and covariance
+  Span<const double> friction{};   // Coulomb's μ of each pair
+  Span<const double> surface{};    // velocity of B's surface relative to A's, three numbers a row [m/s]
+  Span<const double> stiffness{};  // of each pair [N/m]; 0: as stiff as step and answers bear
+  double age = 0.0;                // since the answer was asked for [s]
+  double period = 0.0;             // from one question to the next [s]; 0: by the last answers
+
+  explicit Patches(Span<const std::int64_t> pairs, const Results& results = {})
+      : pairs(pairs), results(results) {}
+  Patches(const Rows& rows, const Results& results)
+      : Patches(rows.pairs.value_or(Span<const std::int64_t>()), results) {}
+};
 
 struct Body {
   double mass;        // [kg]; 0: no force moves it
-  double inertia[3];  // about the box's own axes, through the centre of mass [kg m²]
-  double centre[3] = {0.0, 0.0, 0.0};  // of mass, in the box's own frame [m]
+  double inertia[3];  // about the body's own axes, through the centre of mass [kg m²]
+  double centre[3] = {0.0, 0.0, 0.0};  // of mass, in the body's own frame [m]
 };
 
 // The forces of patches on all bodies. A copy has the same patches and impulses.
@@ -73,10 +90,26 @@ class PatchForces {
   }
   void reset() { bc_patch_forces_reset(forces_.get()); }
 
-  // Take an answer, asked for at `poses`; pairs that are left out are forgotten.
-  void hold(const Patches& answer, Span<const Pose> poses) {
-    check_count(poses.size());
-    detail::check(bc_patch_forces_hold(forces_.get(), &answer, poses.data()));
+  // Say which boxes the bodies have: pairs are then of boxes, and poses of bodies.
+  void set_boxes(Span<const BodyBox> boxes) {
+    detail::check(bc_patch_forces_set_boxes(forces_.get(), boxes.data(), std::int64_t(boxes.size())));
+  }
+
+  // Take an answer, asked for at `poses`; pairs that are left out are forgotten. Contacts of one's own
+  // need set_boxes, and no poses.
+  void hold(const Patches& answer, Span<const Pose> poses = {}) {
+    const Results& found = answer.results;
+    if (found.separation) check_count(poses.size());
+    const std::size_t count = answer.pairs.size() / 2;
+    check_column(answer.friction, count);
+    check_column(answer.surface, 3 * count);
+    check_column(answer.stiffness, count);
+    const bc_patches plain{sizeof(bc_patches),      std::int64_t(count), answer.pairs.data(),
+                           found.separation,        found.normal,        found.point,
+                           found.volume,            found.covariance,    answer.friction.data(),
+                           answer.surface.data(),   answer.stiffness.data(), answer.age,
+                           answer.period};
+    detail::check(bc_patch_forces_hold(forces_.get(), &plain, poses.data()));
   }
 
   // Move the bodies for `dt` [s]; `outside` are all wrenches but those of contacts, or none.
@@ -121,6 +154,10 @@ class PatchForces {
   void check_count(std::size_t count) const {
     if (std::int64_t(count) != bc_patch_forces_bodies(forces_.get()))
       detail::raise(BC_BAD_ARGUMENT, "a row is needed for each body");
+  }
+  static void check_column(Span<const double> column, std::size_t count) {
+    if (column.size() && column.size() != count)
+      detail::raise(BC_BAD_ARGUMENT, "a number is needed for each pair");
   }
   void advance(double dt, Span<const Pose> poses, Span<const Velocity> velocities,
                Span<const Wrench> outside, const bc_motion& motion) {

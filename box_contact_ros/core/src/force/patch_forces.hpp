@@ -55,6 +55,35 @@ class PatchForces {
     }
   };
   enum class Held { all, pair_twice, no_patch };
+  // The boxes of pairs that are solved at the start of each advance.
+  struct Own {
+    std::vector<int64_t> pairs;  // (n, 2)
+    std::vector<double> friction, surface, stiffness;
+    std::vector<double> separation, normal, point, volume, covariance;  // of the last advance
+
+    size_t count() const { return friction.size(); }
+    void resize(size_t n) {
+      pairs.resize(2 * n);
+      for (auto* column : {&friction, &stiffness, &separation, &volume}) column->resize(n);
+      for (auto* column : {&surface, &normal, &point}) column->resize(3 * n);
+      covariance.resize(9 * n);
+    }
+    bc_patches answer() const {
+      return {sizeof(bc_patches),
+              int64_t(count()),
+              pairs.data(),
+              separation.data(),
+              normal.data(),
+              point.data(),
+              volume.data(),
+              covariance.data(),
+              friction.data(),
+              surface.data(),
+              stiffness.data(),
+              0.0,
+              0.0};
+    }
+  };
 
   PatchForces(std::vector<Body> bodies, const Options& options)
       : bodies_(std::move(bodies)), options_(options), before_(bodies_.size()) {
@@ -64,6 +93,12 @@ class PatchForces {
   const std::vector<Body>& bodies() const { return bodies_; }
   const std::vector<Load>& loads() const { return loads_; }
   double load_time() const { return clock_.advance; }
+  int threads() const { return options_.threads; }
+  int64_t box_count() const { return int64_t(boxes_.empty() ? bodies_.size() : boxes_.size()); }
+  int64_t body_of(int64_t box) const { return boxes_.empty() ? box : boxes_[size_t(box)].body; }
+  // With sizes: without them box k is body k, and nobody knows its size.
+  const std::vector<bc_body_box>& boxes() const { return boxes_; }
+  const std::vector<bc_size>& sizes() const { return sizes_; }
 
   // Change masses, add bodies at the end, or drop bodies there with their patches.
   void set_bodies(std::vector<Body> bodies) {
@@ -71,8 +106,15 @@ class PatchForces {
     before_.resize(bodies_.size());
     auto count = int32_t(bodies_.size());
     drop([this, count](const Patch& patch) {
-      return std::max(patch.a, patch.b) >= count || !moves(patch.a, patch.b);
+      return !is_of_boxes(patch) || std::max(patch.a, patch.b) >= count || !moves(patch.a, patch.b);
     });
+  }
+  // Change which boxes the bodies have. Patches of boxes that stay with their body stay.
+  void set_boxes(std::vector<bc_body_box> boxes) {
+    boxes_ = std::move(boxes);
+    own_.resize(0);
+    read_sizes();
+    drop([this](const Patch& patch) { return !is_of_boxes(patch); });
   }
   // Forget the patches of bodies.
   void forget(const int64_t* bodies, int64_t count) {
@@ -98,6 +140,7 @@ class PatchForces {
   Held hold(const bc_patches& answer, const bc_pose* poses) {
     Held held = take(answer, poses);
     if (held != Held::all) return held;
+    own_.resize(0);
     if (clock_.since > 0.0) {
       std::copy_backward(clock_.intervals, clock_.intervals + intervals_kept - 1,
                          clock_.intervals + intervals_kept);
@@ -108,6 +151,43 @@ class PatchForces {
     clock_.since = 0.0;
     return held;
   }
+
+  // Take pairs whose contacts are solved at the start of each advance. Impulses stay.
+  Held hold_own(const bc_patches& asked) {
+    keys_.clear();
+    for (int64_t k = 0; k < asked.count; ++k) {
+      auto a = int32_t(asked.pairs[2 * k]), b = int32_t(asked.pairs[2 * k + 1]);
+      keys_.push_back(std::minmax(a, b));
+    }
+    std::sort(keys_.begin(), keys_.end());
+    if (std::adjacent_find(keys_.begin(), keys_.end()) != keys_.end()) return Held::pair_twice;
+    auto n = size_t(asked.count);
+    own_.resize(n);
+    std::copy_n(asked.pairs, 2 * n, own_.pairs.begin());
+    auto copy = [](const double* from, std::vector<double>& to, double otherwise) {
+      if (from)
+        std::copy_n(from, to.size(), to.begin());
+      else
+        std::fill(to.begin(), to.end(), otherwise);
+    };
+    copy(asked.friction, own_.friction, options_.friction);
+    copy(asked.surface, own_.surface, 0.0);
+    copy(asked.stiffness, own_.stiffness, 0.0);
+    clock_.since = -1.0;
+    clock_.period = clock_.late = 0.0;
+    make_room(n);
+    if (n == 0) drop([](const Patch&) { return true; });
+    return Held::all;
+  }
+  Own& own() { return own_; }
+  // The poses of all boxes with the bodies at `poses`.
+  const bc_pose* place_boxes(const bc_pose* poses) {
+    for (size_t k = 0; k < boxes_.size(); ++k)
+      box_poses_[k] = in_common_frame(poses[boxes_[k].body], boxes_[k].box.pose);
+    return box_poses_.data();
+  }
+  // Take what was solved for the pairs with the bodies at `poses`.
+  Held take_own(const bc_pose* poses) { return take(own_.answer(), poses); }
 
   // From poses, velocities and outside wrenches at the start of a step `dt` to poses and velocities at
   // its end. Or to the mean wrenches of contacts, with those that push overlaps out.
@@ -139,24 +219,37 @@ class PatchForces {
     visit(self.before_.data(), self.before_.size());
     visit(self.patches_.data(), self.patches_.size());
     visit(self.loads_.data(), self.loads_.size());
+    visit(self.boxes_.data(), self.boxes_.size());
+    visit(self.own_.pairs.data(), self.own_.pairs.size());
+    for (auto column : {&Own::friction, &Own::surface, &Own::stiffness})
+      visit((self.own_.*column).data(), (self.own_.*column).size());
   }
-  // How many rows there are: bodies, patches, loads.
-  using RowCounts = std::array<int64_t, 3>;
+  // How many rows there are: bodies, patches, loads, boxes, pairs.
+  using RowCounts = std::array<int64_t, 5>;
   RowCounts row_counts() const {
-    return {int64_t(bodies_.size()), int64_t(patches_.size()), int64_t(loads_.size())};
+    auto count = [](const auto& rows) { return int64_t(rows.size()); };
+    return {count(bodies_), count(patches_), count(loads_), count(boxes_), int64_t(own_.count())};
   }
   void make_rows(const RowCounts& counts) {
     bodies_.resize(size_t(counts[0]));
     before_.resize(size_t(counts[0]));
     patches_.resize(size_t(counts[1]));
     loads_.resize(size_t(counts[2]));
+    boxes_.resize(size_t(counts[3]));
+    own_.resize(size_t(counts[4]));
   }
   // Whether the state is one that calls may have made. Then it can go on.
   bool restore() {
-    auto of_bodies = [this](const Patch& patch) {
-      auto is_body = [this](int32_t body) { return body >= 0 && size_t(body) < bodies_.size(); };
-      return is_body(patch.a) && is_body(patch.b) && patch.a == patch.box_a &&
-             patch.b == patch.box_b && patch.a < patch.b && moves(patch.a, patch.b);
+    auto of_boxes = [this](const Patch& patch) {
+      return is_of_boxes(patch) && patch.a != patch.b && moves(patch.a, patch.b);
+    };
+    auto is_box = [this](const bc_body_box& box) {
+      const double *p = box.box.pose.position, *q = box.box.pose.quaternion,
+                   *size = box.box.size.extent;
+      double norm = (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]);
+      return 0 <= box.body && box.body < int64_t(bodies_.size()) &&
+             pose_valid<double>(triple(vector_at(p)), norm) &&
+             size_valid<double>(triple(vector_at(size)));
     };
     auto out_of_order = [](const Patch& p, const Patch& q) { return p.pair() >= q.pair(); };
     auto is_sound = [](const auto& each) { return each.is_sound(); };
@@ -164,10 +257,18 @@ class PatchForces {
       return std::all_of(rows.begin(), rows.end(), holds);
     };
     if (!(options_.is_sound() && clock_.is_sound() && all(bodies_, is_sound) &&
-          all(before_, is_sound) && all(patches_, of_bodies) && all(patches_, is_sound) &&
-          all(loads_, is_sound) &&
+          all(before_, is_sound) && all(boxes_, is_box) && all(patches_, of_boxes) &&
+          all(patches_, is_sound) && all(loads_, is_sound) &&
           std::adjacent_find(patches_.begin(), patches_.end(), out_of_order) == patches_.end()))
       return false;
+    auto is_place = [this](int64_t box) { return 0 <= box && box < int64_t(boxes_.size()); };
+    auto is_speed = [](double speed) { return std::fabs(speed) <= speed_max; };
+    if (!(all(own_.pairs, is_place) && all(own_.friction, is_amount) &&
+          all(own_.surface, is_speed) && all(own_.stiffness, is_amount)))
+      return false;
+    for (size_t k = 0; k < own_.count(); ++k)
+      if (body_of(own_.pairs[2 * k]) == body_of(own_.pairs[2 * k + 1])) return false;
+    read_sizes();
     islands_.group(bodies_, patches_);
     return true;
   }
@@ -211,6 +312,22 @@ class PatchForces {
     SubStep first, later;
   };
 
+  void read_sizes() {
+    sizes_.clear();
+    for (const bc_body_box& box : boxes_) sizes_.push_back(box.box.size);
+    box_poses_.resize(boxes_.size());
+  }
+  bool is_of_boxes(const Patch& patch) const {
+    return 0 <= patch.box_a && patch.box_a < patch.box_b && patch.box_b < box_count() &&
+           body_of(patch.box_a) == patch.a && body_of(patch.box_b) == patch.b && patch.a >= 0 &&
+           patch.b >= 0 && size_t(std::max(patch.a, patch.b)) < bodies_.size();
+  }
+  void make_room(size_t patches) {
+    patches_.reserve(patches);
+    next_.reserve(patches);
+    loads_.reserve(patches);
+    islands_.make_room(bodies_.size(), patches);
+  }
   bool moves(int32_t a, int32_t b) const {
     return bodies_[size_t(a)].is_free() || bodies_[size_t(b)].is_free();
   }
@@ -226,8 +343,8 @@ class PatchForces {
     for (int64_t k = 0; k < answer.count; ++k) {
       bool is_stale = answer.separation[k] != answer.separation[k];
       if (!is_stale && !(answer.volume[k] > 0.0)) continue;
-      auto a = int32_t(answer.pairs[2 * k]), b = int32_t(answer.pairs[2 * k + 1]);
-      if (!moves(a, b)) continue;
+      const int64_t* boxes = answer.pairs + 2 * k;
+      if (!moves(int32_t(body_of(boxes[0])), int32_t(body_of(boxes[1])))) continue;
       next_.push_back(read(answer, k, is_stale, poses));
       if (!is_stale && !next_.back().has_area()) return Held::no_patch;
     }
@@ -248,8 +365,10 @@ class PatchForces {
     auto a = int32_t(answer.pairs[2 * k]), b = int32_t(answer.pairs[2 * k + 1]);
     double sign = a < b ? 1.0 : -1.0;
     Patch patch{};
-    patch.box_a = patch.a = std::min(a, b);
-    patch.box_b = patch.b = std::max(a, b);
+    patch.box_a = std::min(a, b);
+    patch.box_b = std::max(a, b);
+    patch.a = int32_t(body_of(patch.box_a));
+    patch.b = int32_t(body_of(patch.box_b));
     patch.age = is_stale ? -1.0 : 0.0;
     if (is_stale) return patch;
     patch.asked_a = placed_at(poses[patch.a], bodies_[size_t(patch.a)].centre);
@@ -486,7 +605,13 @@ class PatchForces {
   std::vector<Ended> before_;          // of the bodies
   std::vector<Patch> patches_, next_;  // by pair
   std::vector<Load> loads_;            // of the last advance, by pair
+  std::vector<bc_body_box> boxes_;     // none: box k is body k
+  Own own_;
+  // Memory that calls use again.
   Islands islands_;
+  std::vector<bc_size> sizes_;
+  std::vector<bc_pose> box_poses_;
+  std::vector<BoxPair> keys_;
 };
 
 }  // namespace box_contact::BOX_CONTACT_SET::force

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "../force/patch_forces.hpp"
+#include "batch.hpp"
 #include "refusals.hpp"
 
 namespace box_contact::detail {
@@ -111,14 +112,15 @@ bc_status check_patch(const bc_patches& answer, size_t k) {
   return BC_OK;
 }
 
-bc_status check_row(const bc_patches& answer, size_t k, int64_t count) {
-  const int64_t* bodies = answer.pairs + 2 * k;
+bc_status check_row(const bc_patches& answer, size_t k, const PatchForces& self) {
+  const int64_t* boxes = answer.pairs + 2 * k;
   for (int side = 0; side < 2; ++side)
-    if (bodies[side] < 0 || bodies[side] >= count)
-      return fail(BC_BAD_ARGUMENT, "pairs[%zu] is (%lld, %lld): there is no body %lld", k,
-                  (long long)bodies[0], (long long)bodies[1], (long long)bodies[side]);
-  if (bodies[0] == bodies[1])
-    return fail(BC_BAD_ARGUMENT, "pairs[%zu]: both boxes are body %lld", k, (long long)bodies[0]);
+    if (boxes[side] < 0 || boxes[side] >= self.box_count())
+      return fail(BC_BAD_ARGUMENT, "pairs[%zu] is (%lld, %lld): there is no box %lld", k,
+                  (long long)boxes[0], (long long)boxes[1], (long long)boxes[side]);
+  if (self.body_of(boxes[0]) == self.body_of(boxes[1]))
+    return fail(BC_BAD_ARGUMENT, "pairs[%zu]: both boxes are of body %lld", k,
+                (long long)self.body_of(boxes[0]));
   using Column = std::pair<const char*, const double*>;
   for (auto [field, column] :
        {Column{"friction", answer.friction}, {"stiffness", answer.stiffness}})
@@ -129,6 +131,7 @@ bc_status check_row(const bc_patches& answer, size_t k, int64_t count) {
     if (bc_status status =
             check_within("surface_velocity", k, answer.surface + 3 * k, 3, force::speed_max))
       return status;
+  if (!answer.separation) return BC_OK;
   bool is_left_out = answer.separation[k] != answer.separation[k] || answer.volume[k] == 0.0;
   return is_left_out ? BC_OK : check_patch(answer, k);
 }
@@ -146,19 +149,74 @@ bc_status check_options(const bc_force_options& all) {
   return BC_OK;
 }
 
-bc_status check_answer(const bc_patches& all, size_t bodies, const bc_pose* poses) {
+bc_status check_answer(const bc_patches& all, const PatchForces& self, const bc_pose* poses) {
   if (all.count < 0)
     return fail(BC_BAD_ARGUMENT, "count must be 0 or more, not %lld", (long long)all.count);
   if (!force::is_amount(all.age))
     return fail(BC_BAD_ARGUMENT, "age must be within 0 and 1e50 s, not %g", all.age);
   if (!force::is_amount(all.period))
     return fail(BC_BAD_ARGUMENT, "period must be within 0 and 1e50 s, not %g", all.period);
-  if (all.count > 0 &&
-      !(all.pairs && all.separation && all.normal && all.point && all.volume && all.covariance))
+  bool is_answer = all.separation && all.normal && all.point && all.volume && all.covariance;
+  if (all.count > 0 && !(all.pairs && (is_answer || !all.separation)))
     return refuse_null("an array of the answer");
-  if (bc_status status = check_poses(bodies, poses)) return status;
+  if (all.count > 0 && !all.separation && self.boxes().empty())
+    return fail(BC_BAD_ARGUMENT, "contacts are needed, or sizes: set_boxes gives these");
+  if (all.separation)
+    if (bc_status status = check_poses(self.bodies().size(), poses)) return status;
   for (size_t k = 0; k < size_t(all.count); ++k)
-    if (bc_status status = check_row(all, k, int64_t(bodies))) return status;
+    if (bc_status status = check_row(all, k, self)) return status;
+  return BC_OK;
+}
+
+bc_status explain(PatchForces::Held held) {
+  switch (held) {
+    case PatchForces::Held::pair_twice:
+      return fail(BC_BAD_ARGUMENT, "pairs: a pair of boxes comes twice");
+    case PatchForces::Held::no_patch:
+      return fail(BC_BAD_ARGUMENT, "covariance: a patch has no area, or volume / area no number");
+    case PatchForces::Held::all:
+      break;
+  }
+  return BC_OK;
+}
+
+// Solve the contacts of one's own, and take them.
+bc_status solve_own(PatchForces& self, const bc_pose* poses) {
+  const Kernel* kernel = chosen_kernel();
+  if (!kernel) return fail(BC_BAD_ENVIRONMENT, "BOX_CONTACT_INSTRUCTION_SET is unknown");
+  auto* numbers = reinterpret_cast<const double*>(self.place_boxes(poses));
+  auto* sizes = reinterpret_cast<const double*>(self.sizes().data());
+  PatchForces::Own& own = self.own();
+  Rows rows{numbers, numbers, sizes, sizes, 3, 3, own.pairs.data(), long(self.box_count())};
+  Results results{nullptr,           own.separation.data(), own.normal.data(), own.point.data(),
+                  own.volume.data(), own.covariance.data(), nullptr,           0.0};
+  Counts counts{};
+  long refused = solve_rows({kernel, Model::exact, nullptr}, rows, long(own.count()), results,
+                            self.threads(), counts);
+  if (refused >= 0)
+    return fail(BC_BAD_POSE, "pairs[%ld]: a box is beyond 1e50 m", refused);
+  return explain(self.take_own(poses));
+}
+
+bc_status read_boxes(const bc_body_box* given, int64_t count, size_t bodies,
+                     std::vector<bc_body_box>& boxes) {
+  if (!given && count > 0) return refuse_null("boxes");
+  if (count < 0 || count > INT32_MAX)
+    return fail(BC_BAD_ARGUMENT, "count must be that of boxes, below 2^31, not %lld",
+                (long long)count);
+  boxes.assign(given, given + count);
+  for (size_t k = 0; k < boxes.size(); ++k) {
+    const bc_box& box = boxes[k].box;
+    const double *pose = box.pose.position, *size = box.size.extent;
+    char field[32];
+    std::snprintf(field, sizeof field, "poses[%zu]", k);
+    if (boxes[k].body < 0 || size_t(boxes[k].body) >= bodies)
+      return fail(BC_BAD_ARGUMENT, "body[%zu]: there is no body %lld", k, (long long)boxes[k].body);
+    if (!pose_is_valid(pose)) return refuse_pose(field, pose);
+    if (!size_valid<double>(triple(force::vector_at(size))))
+      return fail(BC_BAD_SIZE, "sizes[%zu] (%g, %g, %g) is not within 1e-50 to 1e50 m", k, size[0],
+                  size[1], size[2]);
+  }
   return BC_OK;
 }
 
@@ -226,7 +284,23 @@ bc_status bc_patch_forces_set_bodies(bc_patch_forces* forces, const bc_body* bod
     if (!forces) return refuse_null("forces");
     std::vector<Body> read;
     if (bc_status status = read_bodies(bodies, count, read)) return status;
+    for (const bc_body_box& box : forces_of(forces).boxes())
+      if (box.body >= count)
+        return fail(BC_BAD_ARGUMENT, "bodies: a box is of body %lld, so there must be more than %lld",
+                    (long long)box.body, (long long)count);
     forces_of(forces).set_bodies(std::move(read));
+    return BC_OK;
+  });
+}
+
+bc_status bc_patch_forces_set_boxes(bc_patch_forces* forces, const bc_body_box* boxes,
+                                    int64_t count) {
+  return guarded([&] {
+    if (!forces) return refuse_null("forces");
+    std::vector<bc_body_box> read;
+    size_t bodies = forces_of(forces).bodies().size();
+    if (bc_status status = read_boxes(boxes, count, bodies, read)) return status;
+    forces_of(forces).set_boxes(std::move(read));
     return BC_OK;
   });
 }
@@ -251,21 +325,13 @@ void bc_patch_forces_reset(bc_patch_forces* forces) {
 bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches* answer,
                                const bc_pose* poses) {
   return guarded([&] {
-    if (!forces || !answer || !poses)
-      return refuse_null(!forces ? "forces" : !answer ? "answer" : "poses");
+    if (!forces || !answer) return refuse_null(forces ? "answer" : "forces");
     bc_patches all{};
     if (!read(answer, all)) return fail(BC_BAD_ABI, "answer.size is unknown");
-    if (bc_status status = check_answer(all, forces_of(forces).bodies().size(), poses))
-      return status;
-    switch (forces_of(forces).hold(all, poses)) {
-      case PatchForces::Held::pair_twice:
-        return fail(BC_BAD_ARGUMENT, "pairs: a pair of bodies comes twice");
-      case PatchForces::Held::no_patch:
-        return fail(BC_BAD_ARGUMENT, "covariance: a patch has no area, or volume / area no number");
-      case PatchForces::Held::all:
-        break;
-    }
-    return BC_OK;
+    if (all.separation && !poses) return refuse_null("poses");
+    PatchForces& self = forces_of(forces);
+    if (bc_status status = check_answer(all, self, poses)) return status;
+    return explain(all.separation ? self.hold(all, poses) : self.hold_own(all));
   });
 }
 
@@ -279,7 +345,10 @@ bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, const bc_p
     if (!read(motion, all)) return fail(BC_BAD_ABI, "motion.size is unknown");
     size_t bodies = forces_of(forces).bodies().size();
     if (bc_status status = check_step(dt, bodies, poses, velocities, outside)) return status;
-    forces_of(forces).advance(dt, poses, velocities, outside, all);
+    PatchForces& self = forces_of(forces);
+    if (self.own().count() > 0)
+      if (bc_status status = solve_own(self, poses)) return status;
+    self.advance(dt, poses, velocities, outside, all);
     return BC_OK;
   });
 }

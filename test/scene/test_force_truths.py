@@ -1,0 +1,298 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Forces of contacts that are solved at each step: statics, impacts, bodies of several boxes."""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from box_contact_ros import Body, ContactSolver, PatchForces
+from box_contact_ros.scene.forces import FRICTION, GRAVITY
+from box_contact_ros.solver.pose import rotation_matrix
+
+STEP = 0.001  # [s]
+FIXED = Body(mass=0.0, inertia=np.zeros(3))
+FLOOR = (60.0, 60.0, 1.0), 0.0, (0.0, 0.0, -0.5)
+"""A row of `World`, its top at z = 0."""
+CONTAINER = (12.192, 2.438, 2.591)
+
+
+def turned(axis: Sequence[float], angle: float) -> np.ndarray:
+    return np.append(math.sin(0.5 * angle) * np.array(axis, float), math.cos(0.5 * angle))
+
+
+class World:
+    """Bodies of one box each, under gravity, by contacts of their own at each step.
+
+    A row is a size, a mass (0: fixed), a position and perhaps a quaternion and a centre of mass.
+    """
+
+    def __init__(self, *rows: tuple, **options) -> None:
+        self.size = np.array([row[0] for row in rows], float)
+        self.mass = np.array([row[1] for row in rows], float)
+        self.poses = np.array([[*row[2], *(row[3] if len(row) > 3 else (0, 0, 0, 1))]
+                               for row in rows], float)
+        self.velocities = np.zeros((len(rows), 6))
+        self.outside = np.zeros((len(rows), 6))
+        self.outside[:, 2] = -GRAVITY * self.mass
+        self.bodies = [
+            Body(mass=mass, inertia=Body.of_box(size, mass).inertia,
+                 centre=row[4] if len(row) > 4 else (0, 0, 0)) if mass else FIXED
+            for row, size, mass in zip(rows, self.size, self.mass)]
+        self.forces = PatchForces(self.bodies, **options)
+        self.forces.set_boxes(self.size)
+        n = len(rows)
+        self.forces.hold([(a, b) for a in range(n) for b in range(a + 1, n)
+                          if self.mass[a] or self.mass[b]])
+
+    def step(self, dt: float = STEP) -> World:
+        self.poses, self.velocities, self.wrenches = self.forces.advance(
+            dt, self.poses, self.velocities, self.outside)
+        return self
+
+    def run(self, seconds: float) -> World:
+        for _ in range(round(seconds / STEP)):
+            self.step()
+        return self
+
+
+# --- contacts of one's own ------------------------------------------------------------------------
+
+
+def askew(count: int = 5) -> tuple[tuple, ...]:
+    return (FLOOR, *(((1.0, 1.0, 1.0), 100.0, (0.05 * (k % 3), 0.03 * k, k + 0.502),
+                      turned((0, 0, 1), 0.1 * k)) for k in range(count)))
+
+
+def test_own_contacts_have_the_bits_of_answers_at_each_step() -> None:
+    own, held = World(*askew()), World(*askew())
+    pairs = np.array([(a, b) for a in range(6) for b in range(a + 1, 6)])
+    for _ in range(200):
+        held.forces.hold(pairs, ContactSolver().batch(held.poses, sizes=held.size, pairs=pairs),
+                         held.poses)
+        held.step()
+        own.step()
+    assert own.poses.tobytes() == held.poses.tobytes()
+
+
+def test_a_late_list_of_pairs_does_no_harm() -> None:
+    """A list at 50 Hz, 5 ms late, one of 20 lost, that has all pairs: impulses stay."""
+    world, same = World(*askew()), World(*askew())
+    pairs = [(k, k + 1) for k in range(5)]
+    for tick in range(300):
+        if tick % 20 == 5 and tick // 20 != 7:
+            world.forces.hold(pairs)
+        world.step()
+        same.step()
+    assert world.poses.tobytes() == same.poses.tobytes()
+
+
+def test_a_state_has_boxes_and_pairs() -> None:
+    world = World(*askew()).run(0.1)
+    twin = World(*askew())
+    twin.forces = PatchForces.from_bytes(bytes(world.forces))
+    twin.poses, twin.velocities = world.poses, world.velocities
+    world.run(0.1), twin.run(0.1)
+    assert world.poses.tobytes() == twin.poses.tobytes()
+    assert bytes(world.forces) == bytes(twin.forces)
+
+
+def test_threads_change_no_bit() -> None:
+    places = [(k % 20 - 10, k // 20 % 10 - 5, 0.26 + 0.52 * (k // 200)) for k in range(400)]
+    rows = [FLOOR, *(((0.5, 0.5, 0.5), 50.0, place, turned((1, 1, 0), 0.01 * (k % 7)))
+                     for k, place in enumerate(places))]
+    found = []
+    for threads in (1, 2, 5):
+        world = World(*rows, threads=threads)
+        world.forces.hold([(0, k) for k in range(1, 201)] + [(k, k + 200) for k in range(1, 201)])
+        found.append(world.run(0.1).poses.tobytes())
+    assert len(set(found)) == 1
+
+
+# --- loads ----------------------------------------------------------------------------------------
+
+
+def given(world: World) -> np.ndarray:
+    """Return the forces (n, 3) that bodies get by the loads."""
+    loads, total = world.forces.loads(), np.zeros((len(world.mass), 3))
+    normals = np.cross(loads.corners[:, 0] - loads.corners[:, 1],
+                       loads.corners[:, 1] - loads.corners[:, 2])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    upward = np.sign(normals[:, 2:])  # all boxes here lie on the box of the lower number
+    force = loads.pressing[:, None] * upward * normals + loads.friction
+    np.add.at(total, loads.pairs[:, 1], force)
+    np.subtract.at(total, loads.pairs[:, 0], np.array(force))
+    return total
+
+
+def test_loads_change_the_momentum() -> None:
+    """Change of linear momentum = dt · (outside + Σ loads), in each step of a landing."""
+    world = World(*askew())
+    for _ in range(300):
+        before = world.velocities
+        world.step()
+        change = world.mass[1:, None] * (world.velocities - before)[1:, :3]
+        expected = STEP * (world.outside[1:, :3] + given(world)[1:])
+        assert np.abs(change - expected).max() <= 1e-12 * 100.0
+    assert world.poses[-1, 2] == pytest.approx(4.5, abs=1e-3)
+
+
+def test_wrenches_at_rest_are_the_loads() -> None:
+    world = World(*askew()).run(2.0)
+    assert given(world)[1:] == pytest.approx(world.wrenches[1:, :3], abs=1e-9 * 500 * GRAVITY)
+    assert given(world)[1:] == pytest.approx(-world.outside[1:, :3], abs=1e-6 * GRAVITY)
+    assert given(world)[0] == pytest.approx([0, 0, -500.0 * GRAVITY], abs=1e-6 * GRAVITY)
+
+
+def test_corner_loads_are_those_of_statics() -> None:
+    """Of a container whose centre of mass is at 0.3 of the half length, -0.2 of the half width."""
+    half = 0.5 * np.array(CONTAINER)
+    centre = 0.3 * half[0], -0.2 * half[1], -0.1
+    world = World(FLOOR, (CONTAINER, 20_000.0, (0, 0, half[2]), (0, 0, 0, 1), centre)).run(0.5)
+    loads, weight = world.forces.loads(), 20_000.0 * GRAVITY
+    assert loads.pairs.tolist() == [[0, 1]]
+    assert loads.pressing == pytest.approx([weight], rel=1e-6)
+    assert loads.centre[0, :2] == pytest.approx(centre[:2], abs=1e-6 * half[0])
+    for corner, load in zip(loads.corners[0], loads.corner_loads[0]):
+        assert np.abs(corner[:2]) == pytest.approx(half[:2], rel=1e-6)
+        x, y = np.sign(corner[:2])
+        assert load == pytest.approx(0.25 * weight * (1 + 0.3 * x) * (1 - 0.2 * y), rel=1e-6)
+
+
+def test_nothing_presses_before_the_landing() -> None:
+    world = World(FLOOR, ((1.0, 1.0, 1.0), 10.0, (0, 0, 0.501))).step()
+    assert len(world.forces.loads().pairs) == 0
+    world.run(0.02)
+    assert (world.forces.loads().corner_loads >= 0.0).all()
+
+
+# --- bodies of several boxes ----------------------------------------------------------------------
+
+
+def test_two_feet_stand_on_a_floor() -> None:
+    """A table of 100 kg. Its feet carry the weight, and its middle is between them."""
+    forces = PatchForces([FIXED, Body(mass=100.0, inertia=(30.0, 30.0, 30.0), centre=(0, 0, 0.3))])
+    forces.set_boxes([FLOOR[0], (0.2, 1.0, 0.4), (0.2, 1.0, 0.4), (1.4, 1.0, 0.1)],
+                     body=[0, 1, 1, 1],
+                     poses=[(0, 0, 0, 0, 0, 0, 1), (-0.6, 0, 0.2, 0, 0, 0, 1),
+                            (0.6, 0, 0.2, 0, 0, 0, 1), (0, 0, 0.45, 0, 0, 0, 1)])
+    forces.hold([(0, 1), (0, 2), (0, 3)])
+    poses = np.array([[*FLOOR[2], 0, 0, 0, 1], [0, 0, 0.002, 0, 0, 0, 1]])
+    velocities, outside = np.zeros((2, 2, 6))
+    outside[1, 2] = -100.0 * GRAVITY
+    for _ in range(500):
+        poses, velocities, _ = forces.advance(STEP, poses, velocities, outside)
+    assert poses[1] == pytest.approx([0, 0, 0, 0, 0, 0, 1], abs=1e-5)
+    assert np.abs(velocities).max() < 1e-9
+    loads = forces.loads()
+    assert loads.pairs.tolist() == [[0, 1], [0, 2]]
+    assert loads.pressing.sum() == pytest.approx(100.0 * GRAVITY, rel=1e-6)
+    assert abs(loads.pressing @ loads.centre[:, 0]) < 1e-5 * GRAVITY
+    with pytest.raises(ValueError, match=r'pairs\[0\]: both boxes are of body 1'):
+        forces.hold([(1, 3)])
+
+
+def test_two_boxes_land_as_one() -> None:
+    """A container of two boxes, one upon the other, and one box of the same mass and shape."""
+    half = np.array(CONTAINER) * (1, 1, 0.5)
+    lower, upper = ((0, 0, z * CONTAINER[2], 0, 0, 0, 1) for z in (-0.25, 0.25))
+    found = []
+    for boxes in ([(CONTAINER, (0, 0, 0, 0, 0, 0, 1))], [(half, lower), (half, upper)]):
+        forces = PatchForces([FIXED, Body.of_box(CONTAINER, 20_000.0)])
+        n = len(boxes)
+        forces.set_boxes([FLOOR[0], *(size for size, _ in boxes)], body=[0] + [1] * n,
+                         poses=[(0, 0, 0, 0, 0, 0, 1), *(pose for _, pose in boxes)])
+        forces.hold([(0, k + 1) for k in range(n)])
+        poses = np.array([[*FLOOR[2], 0, 0, 0, 1], [0, 0, 1.38, 0.01, 0.005, 0.1, 1]])
+        velocities, outside = np.zeros((2, 2, 6))
+        outside[1, 2] = -20_000.0 * GRAVITY
+        for _ in range(1000):
+            poses, velocities, _ = forces.advance(STEP, poses, velocities, outside)
+        found.append(poses[1])
+        assert poses[1, 2] == pytest.approx(0.5 * CONTAINER[2], abs=1e-4)
+    assert found[0] == pytest.approx(found[1], abs=1e-9)
+
+
+# --- heavy on light -------------------------------------------------------------------------------
+
+
+def test_a_cube_of_8000_times_the_mass_rests_on_four() -> None:
+    """Of 20 m, on four of 1 m: less than 2 mm deep."""
+    corners = [(x, y, 0.5) for x in (-9.0, 9.0) for y in (-9.0, 9.0)]
+    world = World(FLOOR, *(((1.0, 1.0, 1.0), 1000.0, corner) for corner in corners),
+                  ((20.0, 20.0, 20.0), 8e6, (0, 0, 11.0)))
+    deepest = 0.0
+    for _ in range(3000):
+        world.step()
+        deepest = max(deepest, 11.0 - world.poses[5, 2], *(0.5 - world.poses[1:5, 2]))
+    assert deepest < 2e-3
+    assert np.abs(world.velocities).max() < 1e-6
+
+
+def test_containers_rest_on_loose_twist_locks() -> None:
+    """25 t on four locks of 5 kg, which lie on another: less than 2 mm deep."""
+    lock, height = (0.12, 0.08, 0.03), CONTAINER[2]
+    corners = [(x, y) for x in (-5.9, 5.9) for y in (-1.1, 1.1)]
+    world = World(FLOOR, (CONTAINER, 25_000.0, (0, 0, 0.5 * height)),
+                  *((lock, 5.0, (*corner, height + 0.015)) for corner in corners),
+                  (CONTAINER, 25_000.0, (0, 0, 1.5 * height + 0.03)))
+    deepest = 0.0
+    for _ in range(3000):
+        world.step()
+        deepest = max(deepest, 1.5 * height + 0.03 - world.poses[-1, 2])
+    assert deepest < 2e-3
+    assert np.abs(world.velocities).max() < 1e-6
+
+
+# --- analytic truths ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(('share', 'tips'), [(0.98, False), (1.17, True)])
+def test_the_angle_at_which_a_box_tips(share: float, tips: bool) -> None:
+    """A box of 1 × 1 × 3 m on a slope tips beyond tan = 1/3, with friction enough.
+
+    It may stay up to 1.15 times that: the rectangle of a wedge reaches so far beyond the rim.
+    """
+    angle = math.atan(share / 3.0)
+    turn = turned((0, 1, 0), angle)
+    up = rotation_matrix(turn)[:, 2]
+    world = World(((20.0, 20.0, 1.0), 0.0, -0.5 * up, turn),
+                  ((1.0, 1.0, 3.0), 100.0, 1.5 * up, turn))
+    world.run(3.0)
+    leaning = math.acos(min(1.0, rotation_matrix(world.poses[1, 3:])[:, 2] @ up))
+    assert (leaning > 0.1) == tips
+    assert tips or leaning < 1e-3
+
+
+def test_the_way_of_a_sliding_box() -> None:
+    """v² / (2·μ·g), from 2 m/s."""
+    world = World(FLOOR, ((1.0, 1.0, 0.2), 10.0, (0, 0, 0.1)))
+    world.run(0.05).velocities[1, 0] = 2.0
+    world.run(1.0)
+    assert world.poses[1, 0] == pytest.approx(2.0**2 / (2 * FRICTION * GRAVITY), rel=1e-3)
+    assert np.abs(world.velocities).max() < 1e-9
+
+
+def test_the_time_to_stop_of_a_spinning_box() -> None:
+    """I·ω / (μ·m·g·r) on its square face: r = 0.3826·a, times 0.966 as for real overlaps."""
+    world = World(FLOOR, ((1.0, 1.0, 0.2), 10.0, (0, 0, 0.1)))
+    world.run(0.05).velocities[1, 5] = 3.0
+    expected = 10.0 / 6.0 * 3.0 / (FRICTION * 10.0 * GRAVITY * 0.3826 * 0.966)
+    world.run(expected - 0.01)
+    assert world.velocities[1, 5] > 0.01
+    world.run(0.02)
+    assert abs(world.velocities[1, 5]) < 1e-6
+
+
+def test_the_impact_of_two_equal_boxes() -> None:
+    """They go on together at half the speed, in free space."""
+    world = World(((1.0, 1.0, 1.0), 10.0, (0, 0, 0)), ((1.0, 1.0, 1.0), 10.0, (1.05, 0, 0)))
+    world.outside[:] = 0.0
+    world.velocities[0, 0] = 1.0
+    world.run(0.3)
+    assert world.velocities[:, 0] == pytest.approx([0.5, 0.5], abs=1e-9)
+    assert world.poses[1, 0] - world.poses[0, 0] == pytest.approx(1.0, abs=1e-3)
