@@ -3,5 +3,6 @@
 
 """The crane in MuJoCo, its node, and the demo."""
 
-CRANE_WRENCH = 'crane/wrench'
-"""Topic of the force of the contacts on the crane's load. The view shows it, without MuJoCo."""
+CRANE_WRENCH, CRANE_ROPES = 'crane/wrench', 'crane/ropes'
+"""Topics of the force of the contacts on the crane's load, and of its ropes, as a marker of lines.
+The view shows both, without MuJoCo."""

@@ -157,6 +157,13 @@ class Crane:
         tensions[self.data.efc_id[rows]] = self.data.efc_force[rows]
         return tensions
 
+    @property
+    def ropes(self) -> np.ndarray:
+        """Return the ends (4, 2, 3) of the ropes, at the trolley and at the load [m], as above."""
+        ends = [self.data.site(f'{end}_{rope}').xpos for rope in range(len(_CORNERS))
+                for end in ('hold', 'corner')]
+        return np.reshape(ends, (-1, 2, 3))
+
     def step(self, wrench: Callable[[float], np.ndarray] | None = None) -> None:
         """Advance one tick, under a wrench that may change from one physics step to the next.
 

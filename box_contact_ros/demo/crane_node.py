@@ -22,10 +22,12 @@ from itertools import count
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped, Vector3, WrenchStamped
+from geometry_msgs.msg import Point, PoseStamped, Vector3, WrenchStamped
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker
 
 from box_contact_msgs.msg import Contacts
 
@@ -33,7 +35,7 @@ from ..node.messages import contacts_by_pair, make_header, pose_message, stamp_o
 from ..node.parameters import Setting, declare, flag, number, parse_command_line, warn_of_unknown
 from ..node.runtime import REFUSALS, GuardedNode, running_node, spin_once
 from ..node.topics import DEEP_RELIABLE, contact_qos
-from . import CRANE_WRENCH
+from . import CRANE_ROPES, CRANE_WRENCH
 from .crane import CraneScenario
 from .landing import CORNER_SPEED_LIMIT, ClosedLoop, Landing, LandingRecord, LoopState, with_patch
 
@@ -43,6 +45,7 @@ ANSWER_SHARE = 0.8  # share of a tick that waits for its answer; the rest is for
 DRAIN = 1.0  # patience for the last answers [s]
 LOOK_PERIOD = 0.05  # time after which a signal is noticed, at most [s]
 LOOK_RATE = 30.0  # forces published, and looks at the landing's stage, at most [Hz]
+ROPE_WIDTH = 0.04  # as drawn [m]
 STAGES = ('hanging', 'first touch', 'settling', 'at rest')
 POINTS_ALONE = ("the contact node's model gives contacts without a patch: the whole load stands "
                 'for it, and may not come to rest')
@@ -77,6 +80,7 @@ class CraneNode(GuardedNode):
         self._contacts = self.create_subscription(
             Contacts, 'contacts', self._on_contacts, DEEP_RELIABLE)
         self._force = self.create_publisher(WrenchStamped, CRANE_WRENCH, contact_qos())
+        self._ropes = self.create_publisher(Marker, CRANE_ROPES, contact_qos())
 
     @property
     def lost(self) -> int:
@@ -112,7 +116,7 @@ class CraneNode(GuardedNode):
                 self._serve(executor, due - time.perf_counter())
             stamp = self._publish(self.loop.ask())
             if tick % self._look_every == 0:
-                self._publish_force(stamp)
+                self._publish_forces(stamp)
                 for line in stages.lines():
                     print(line, flush=True)
             self._serve(executor, patience, lambda: stamp not in self._asked)  # noqa: B023
@@ -165,13 +169,20 @@ class CraneNode(GuardedNode):
                                  for name, contact in touches.items()},
                          latency=0.0 if self._lockstep else latency)
 
-    def _publish_force(self, stamp: int) -> None:
-        """Publish the force on the load of the last physics step."""
-        if self.loop.record.forces:
-            message = WrenchStamped(header=make_header(stamp, FRAME))
-            x, y, z = map(float, self.loop.record.forces[-1])
-            message.wrench.force = Vector3(x=x, y=y, z=z)
-            self._force.publish(message)
+    def _publish_forces(self, stamp: int) -> None:
+        """Publish the force on the load of the last physics step, and the ropes."""
+        record, header = self.loop.record, make_header(stamp, FRAME)
+        if not record.forces:
+            return
+        message = WrenchStamped(header=header)
+        x, y, z = map(float, record.forces[-1])
+        message.wrench.force = Vector3(x=x, y=y, z=z)
+        self._force.publish(message)
+        ropes = Marker(header=header, ns='ropes', type=Marker.LINE_LIST, color=ColorRGBA(a=1.0))
+        ropes.scale.x = ROPE_WIDTH
+        ropes.points = [Point(x=x, y=y, z=z)
+                        for x, y, z in self.loop.crane.ropes.reshape(-1, 3).tolist()]
+        self._ropes.publish(ropes)
 
     def _now(self) -> int:
         return int(self.get_clock().now().nanoseconds)

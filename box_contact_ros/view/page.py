@@ -9,6 +9,7 @@ draw in float32, which is half a metre coarse in map coordinates.
 from __future__ import annotations
 
 import contextlib
+import gzip
 import html
 import io
 import logging
@@ -38,8 +39,9 @@ LEAST_DEPTH, LEAST_FORCE = 1.0, 1.0
 """[mm], [kN]: what charts show at least, not to magnify noise."""
 MESSAGE_LIMIT = 1 << 20
 """Longest message [bytes] of a browser; the page sends a few hundred."""
-PANEL_WIDTH = 300  # pixels
-GROUND, LINES, SECTIONS = (236, 238, 241), (206, 211, 217), (176, 183, 191)
+PANEL_WIDTH, CHART_HEIGHT, TIMES_HEIGHT = 300, 110, 45  # pixels; the last is that of the axis
+GROUND, LINES, SECTIONS, ROPE = (236, 238, 241), (206, 211, 217), (176, 183, 191), (70, 70, 80)
+NO_LINES = np.zeros((0, 2, 3))
 GROUND_SIZE = 60.0  # length [m] of the ground at least
 VIEWPOINT = np.array([-0.55, -0.78, 0.42])
 """Direction from the boxes to the camera at first."""
@@ -50,6 +52,7 @@ CUBE_FACES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0
 _ENDS = np.array([(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit])
 CUBE_EDGES = np.concatenate([CUBE[_ENDS], 1.0001 * CUBE[_ENDS[:, :1]]], axis=1)
 """Corners (12, 3, 3) of a triangle an edge, so thin that its wireframe is the edge."""
+TITLE = b'<title>Contacts of boxes: box_contact_ros</title>'
 GAMMA = 2.2  # of the colours of screens
 LEGEND = ''.join(f'<span style="white-space:nowrap;color:rgb{colour}">■</span> {text} &ensp;'
                  for colour, text in style.LEGEND)
@@ -87,7 +90,7 @@ def closed_to_other_sites(host: str) -> Iterator[None]:
     def serve_own_page(*arguments: Any, process_request: Any, **options: Any) -> Any:
         def answer(connection: Any, request: Any) -> Any:
             if names_own_page(request.headers, host):
-                return process_request(connection, request)
+                return with_title(process_request(connection, request))
             return connection.respond(HTTPStatus.FORBIDDEN, 'Origin or Host is not of this page\n')
 
         nonlocal wrapped
@@ -103,6 +106,19 @@ def closed_to_other_sites(host: str) -> Iterator[None]:
     if not wrapped:
         raise RuntimeError('this viser does not serve by websockets.asyncio.server.serve, so '
                            'its page would be open to every site')
+
+
+def with_title(response: Any) -> Any:
+    """Return viser's response with the title of its page replaced: that of the browser's tab."""
+    headers = response.headers if response else {}
+    if headers.get('Content-Type', '').startswith('text/html'):
+        is_packed = headers['Content-Encoding'] == 'gzip'
+        text = gzip.decompress(response.body) if is_packed else response.body
+        text = text.replace(b'<title>Viser</title>', TITLE, 1)
+        response.body = gzip.compress(text, 1) if is_packed else text
+        del headers['Content-Length']
+        headers['Content-Length'] = str(len(response.body))
+    return response
 
 
 def names_own_page(headers: Headers, host: str) -> bool:
@@ -135,11 +151,11 @@ class Page:
         gui.configure_theme(show_logo=False, show_share_button=False, control_width='large')
         gui.main_panel.dock_right()
         gui.main_panel.set_width(PANEL_WIDTH)
-        self._figures = gui.add_html('')
+        self._figures = gui.add_html('', order=0.0)
         self._history: deque[tuple[float, float, float]] = deque()  # time [s], depth, force
         self._charts: dict[str, Any] = {}
         gui.add_html('<div id="legend" style="padding:0 0.7em 0.6em;font-size:0.78em">'
-                     f'{LEGEND}</div>')
+                     f'{LEGEND}</div>', order=1.0)
         self._seen = 0  # boxes; each that joins brings all of them into view
         self._origin = np.zeros(3)
         self._add_drawing(rows)
@@ -151,14 +167,17 @@ class Page:
 
     # --- the drawing ------------------------------------------------------------------------------
 
-    def draw(self, tick: DrawnTick) -> None:
-        """Show boxes and contacts."""
+    def draw(self, tick: DrawnTick, ropes: np.ndarray = NO_LINES) -> None:
+        """Show boxes and contacts, and ropes by their ends (n, 2, 3) [m]."""
         with self._server.atomic():
             known = ~np.isnan(tick.poses[:, 0])
             if known.sum() > self._seen:
                 self._look_at(tick, known)
             self._draw_boxes(tick, known)
             self._draw_contacts(tick.answer)
+            self._ropes.visible = len(ropes) > 0
+            if len(ropes):
+                self._ropes.points = ropes - self._origin
 
     def _add_drawing(self, rows: SceneRows) -> None:
         """Add all that is drawn. Boxes are instances of one cube: a tick moves them together."""
@@ -178,6 +197,8 @@ class Page:
         self._patches = scene.add_line_segments('/contact/patches', place, style.CONTACT,
                                                 thickness=3.0, thickness_units='screen',
                                                 visible=False)
+        self._ropes = scene.add_line_segments('/ropes', place, ROPE, thickness=2.0,
+                                              thickness_units='screen', visible=False)
         colours = np.where(rows.is_a[:, None], style.BOX_A, style.BOX_B)
         count = len(rows.sizes)
         no_turn, nothing = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.zeros((count, 3))
@@ -190,9 +211,9 @@ class Page:
                 path, corners, triangles, no_turn, nothing, batched_scales=nothing,
                 batched_colors=light, lod='off', cast_shadow=False, receive_shadow=False, **look)
 
-        # Flat faces look the same as toons, and cost a browser without a GPU some 10 % less.
+        # The steps of toons would cross a face, dark on one side.
         self._faces = add('/boxes', CUBE, CUBE_FACES, colours, opacity=style.BOX_OPACITY,
-                          flat_shading=True, material='toon5')
+                          flat_shading=True)
         self._edges = add('/edges', CUBE_EDGES.reshape(-1, 3), np.arange(36).reshape(12, 3),
                           colours // 2, wireframe=True)
 
@@ -259,20 +280,23 @@ class Page:
             self._figures.content = figures(tick, force, model=model)
             if self._history:
                 times, depths, forces = np.array(self._history).T
-                self._plot('depth [mm]', LEAST_DEPTH, times, depths)
-                self._plot('force [kN]', LEAST_FORCE, times, forces)
+                times -= times[-1]
+                known = ~np.isnan(forces)
+                if known.sum() > 1:  # fewer make no axis of times, which both charts share
+                    times, depths, forces = times[known], depths[known], forces[known]
+                    self._plot('force [kN]', LEAST_FORCE, times, forces, above=True)
+                if len(times) > 1:
+                    self._plot('depth [mm]', LEAST_DEPTH, times, depths)
 
-    def _plot(self, label: str, least: float, times: np.ndarray, values: np.ndarray) -> None:
-        """Show values over times [s]; what is NaN is left out, and a chart of nothing stays away.
+    def _plot(self, label: str, least: float, times: np.ndarray, values: np.ndarray, *,
+              above: bool = False) -> None:
+        """Show values over times [s], from zero to `least`, or as far as the values go.
 
-        The chart goes from zero to `least`, or as far as the values go.
+        above: over the chart whose axis of times it shares.
         """
-        known = ~np.isnan(values)
-        if known.sum() < 2:  # which make no axis of times
-            return
         # Axes are those of the data, which have a line at zero. Axes that are set lose their labels
         # where the browser gives the chart its width later, or builds it anew.
-        data = times[known] - times[-1], values[known], np.zeros(known.sum())
+        data = times, values, np.zeros(len(times))
         if label in self._charts:
             self._charts[label].data = data
             return
@@ -282,9 +306,10 @@ class Page:
                    {'label': 'zero', 'stroke': f'rgb{SECTIONS}'}),
             scales={'x': {'time': False},
                     'y': {'range': {'min': {'pad': 0.0, 'soft': 0.0, 'mode': 1}, 'max': high}}},
-            axes=({'label': 'time [s]', 'size': 30, 'labelSize': 18},
+            axes=({'show': False} if above else {'label': 'time [s]', 'size': 30, 'labelSize': 18},
                   {'label': label, 'size': 56, 'labelSize': 18}),
-            legend={'show': False}, padding=(10, 24, 0, 0), height=145)
+            legend={'show': False}, padding=(10, 24, 8 if above else 0, 0),
+            height=CHART_HEIGHT + (0 if above else TIMES_HEIGHT), order=3.0 - above)
 
 
 def figures(tick: DrawnTick | None, force: float, *, model: str) -> str:
@@ -297,7 +322,9 @@ def figures(tick: DrawnTick | None, force: float, *, model: str) -> str:
             rows.append(('pairs', 'pairs in contact', f'{len(answer.pairs)} of {pair_count}'))
             rows.append(('stale', 'pairs not evaluated', f'{len(answer.stale)}'))
         volume = answer.contacts.volume.sum() if answer is not None else math.nan
-        rows += [('volume', 'volume of the overlap', _text(1e3 * volume, '.3g', 'L')),
+        rows += [('volume', 'volume of the overlap', _text(1e3 * volume, '.3g', 'L')
+                  if volume < 0.9995 else  # what three digits show as 1,000 L is 1 m³
+                  _text(volume, '.3g' if volume < 999.5 else ',.0f', 'm³')),
                  ('force', 'force on the load', _text(1e-3 * force, '.1f', 'kN')),
                  ('latency', 'latency', _text(1e3 * tick.latency, '.2f', 'ms'))]
     lines = ''.join(f'<tr><td style="opacity:0.7">{label}</td><td style="text-align:right"><b '

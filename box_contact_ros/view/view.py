@@ -15,12 +15,14 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from rclpy.context import Context
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from visualization_msgs.msg import Marker
 
-from ..demo import CRANE_WRENCH
+from ..demo import CRANE_ROPES, CRANE_WRENCH
 from ..extras import require
 from ..node.messages import stamp_of
 from ..node.parameters import Setting, parse_command_line, text, whole_number
@@ -48,9 +50,11 @@ class ViewNode(Listener):
         super().__init__('view', context, PARAMETERS, qos, **options)
         self.model = ''  # of the contact node, as /diagnostics tells it
         self._force = (0, math.nan)  # stamp [ns], upward part [N]
+        self._ropes = np.zeros((0, 2, 3))  # ends [m]
         self._figures_at = 0.0  # monotonic time [s]
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
         self.create_subscription(WrenchStamped, CRANE_WRENCH, self._on_force, qos)
+        self.create_subscription(Marker, CRANE_ROPES, self._on_ropes, qos)
         host = self.values['host']
         try:
             self._page = Page(host, self.values['port'], self.rows)
@@ -72,7 +76,7 @@ class ViewNode(Listener):
     def _draw(self) -> None:
         tick = None if self.quiet else self.tick()
         if tick is not None:
-            self._page.draw(tick)
+            self._page.draw(tick, self._ropes)
         if time.monotonic() >= self._figures_at:
             self._figures_at = time.monotonic() + FIGURES_PERIOD
             self._page.show(tick, self.force(tick.stamp) if tick else math.nan, model=self.model)
@@ -83,6 +87,11 @@ class ViewNode(Listener):
             if status.name == name:
                 self.model = next((value.value for value in status.values if value.key == 'model'),
                                   '')
+
+    def _on_ropes(self, message: Marker) -> None:
+        if message.type == Marker.LINE_LIST and len(message.points) % 2 == 0:
+            ends = [(end.x, end.y, end.z) for end in message.points]
+            self._ropes = np.reshape(ends, (-1, 2, 3)) if np.isfinite(ends).all() else self._ropes
 
     def _on_force(self, message: WrenchStamped) -> None:
         self._force = stamp_of(message.header), message.wrench.force.z

@@ -68,6 +68,9 @@ def test_ropes_carry_the_weight(spread):
     slope = math.hypot((1 - spread) * math.hypot(LENGTH, WIDTH) / 2, drop) / drop
     share = crane.scenario.mass * GRAVITY / 4 * slope
     assert crane.rope_tensions == pytest.approx(np.full(4, share), rel=1e-3)
+    lengths = np.linalg.norm(np.diff(crane.ropes, axis=1), axis=2)[:, 0]
+    assert lengths == pytest.approx(crane.data.ten_length, abs=1e-9)
+    assert (crane.ropes[:, 0, 2] > crane.ropes[:, 1, 2]).all()
     assert np.abs(crane.load_velocity).max() < 1e-6
     # The ropes stretch, but by millimetres only.
     level = HEIGHT + 0.5 + HEIGHT / 2

@@ -17,11 +17,12 @@ import numpy as np
 import poses
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import WrenchStamped
+from geometry_msgs.msg import Point, WrenchStamped
 from patience import PATIENCE
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 from ros_client import Client, serving
+from visualization_msgs.msg import Marker
 
 pytest.importorskip('viser')
 pytest.importorskip('mujoco')
@@ -207,6 +208,14 @@ def test_the_force_is_that_of_the_tick(view_node):
     assert math.isnan(view_node.force(START + NANOSECONDS))
 
 
+def test_ropes_are_lines_of_numbers(view_node):
+    """Others are left out: one end alone, and what is not finite."""
+    ends = [Point(z=15.0), Point(x=1.0, z=2.0)]
+    for points in (ends, ends[:1], [ends[0], Point(x=math.nan)]):
+        view_node._on_ropes(Marker(type=Marker.LINE_LIST, points=points))
+        assert view_node._ropes.tolist() == [[[0, 0, 15], [1, 0, 2]]]
+
+
 def test_the_model_is_that_of_the_contact_node(view_node):
     for name, model in (('contact_node', 'exact'), ('soup_node', 'soup')):
         view_node._on_diagnostics(DiagnosticArray(status=[DiagnosticStatus(
@@ -301,6 +310,14 @@ def test_no_figure_is_made_up():
     assert {found[name] for name in ('model', 'volume', 'latency')} == {'–'}
     assert shown(figures(None, math.nan, model='')) == {
         'verdict': 'waiting for poses', 'model': '–'}
+
+
+@pytest.mark.parametrize(('volume', 'words'), [
+    (4e-5, '0.04 L'), (0.9994, '999 L'), (0.9996, '1 m³'), (81.24, '81.2 m³'),
+    (12345.6, '12,346 m³')])
+def test_large_volumes_are_in_cubic_metres(volume, words):
+    tick = tick_of(START, TOUCHING, {PAIR: changed(EXACT, volume=volume)})
+    assert shown(figures(tick, math.nan, model='exact'))['volume'] == words
 
 
 def test_the_name_of_a_model_is_text():
@@ -429,9 +446,15 @@ def wait_for_drawing(tab, least):
         assert time.monotonic() < deadline, shares
 
 
+def has_ropes(picture, width):
+    """Return whether the sky above the boxes, in so many columns, has pixels as dark as ropes."""
+    return (picture[5:60, :width].mean(axis=2) < 120.0).any()
+
+
 CHARTS = 'Object.values(window.__viserTestpoints?.uplots ?? {}).map(one => one.chart)'
 LAST = f'{CHARTS}.map(c => c.data[1].at(-1)).sort()'
-LABELS = f'{CHARTS}.every(c => c.axes.every(a => a._splits?.length > 1) && c.scales.x.max == 0)'
+LABELS = (f'{CHARTS}.every(c => c.axes.every(a => !a.show || a._splits?.length > 1) '
+          '&& c.scales.x.max == 0)')
 
 
 @in_browser
@@ -448,11 +471,22 @@ def test_the_page_in_a_browser(page, width):
         canvas = tab.evaluate('document.querySelector("canvas").clientWidth')
         assert 0.55 * width < canvas <= width - 300
         tab.evaluate('document.querySelector(".mantine-Notification-closeButton")?.click()')
+        assert tab.evaluate('document.title') == 'Contacts of boxes: box_contact_ros'
+        assert tab.evaluate(f'{CHARTS}.map(c => c.axes[0].show)') == [False, True]  # one for both
+        ends = [tab.evaluate(f'{CHARTS}.map(c => c.valToPos(c.scales.x.{end}, "x"))')
+                for end in ('min', 'max')]
+        assert all(force == depth for force, depth in ends)
         picture = wait_for_drawing(tab, 1e-3)
         for colour in (BOX_A, BOX_B):
             rows, columns = np.nonzero(near(picture[:, :canvas], colour))
             assert rows.min() > 5 and rows.max() < len(picture) - 6
             assert columns.min() > 5 and columns.max() < canvas - 6
+        assert not has_ropes(picture, canvas)
+        ropes = np.array([[(x, 0.0, 3.0), (x, 0.0, 15.0)] for x in (-0.5, 0.5)])
+        page.draw(tick_of(START + 2 * NANOSECONDS, TOUCHING, {PAIR: EXACT}), ropes)
+        deadline = time.monotonic() + PATIENCE
+        while not has_ropes(wait_for_drawing(tab, 1e-3), canvas):
+            assert time.monotonic() < deadline
         bring(page, tick_of(START + 5 * NANOSECONDS, APART, {}), 0.0)
         found = tab.wait_for('document.getElementById("verdict").innerText == "no contact" && '
                              f'[document.getElementById("force").innerText, ...{LAST}]')
