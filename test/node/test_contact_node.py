@@ -127,7 +127,8 @@ def test_parameters_are_read_only_but_three(node, client):
                                ('model', 'paper', "model 'paper' needs a new start: a running"),
                                ('model', 'soup-64', 'a running node takes exact or mlp'),
                                ('model', 7, 'model must be a string'),
-                               ('max_age', -1.0, 'max_age must lie within 0 and 1e+06, not -1'),
+                               ('max_age', -1.0, 'max_age out of range Min: 0.0, Max: 1000000.0'),
+                               ('max_age', -1, 'max_age must lie within 0 and 1e+06, not -1'),
                                ('tolerance', 'much', "tolerance must be a number, not 'much'")):
         result = set_to(node, **{name: value})
         assert not result.successful and words in result.reason

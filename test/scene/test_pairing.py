@@ -120,7 +120,7 @@ def test_stamps_that_stand_still_are_refused_and_noted():
     pairing = StampPairing(TWO)
     assert len(play(pairing, [(box, 0) for _ in range(1000) for box in TWO.moving])) == 1
     assert pairing.counts == {REPEATED: 1998}
-    assert pairing.rejections == {REPEATED: RejectedPose('box_b', 0, 0)}
+    assert pairing.rejections == {REPEATED: RejectedPose('box_b', 0, 0, stamps=1)}
 
 
 def test_a_stamp_older_than_all_that_are_remembered_is_refused():
@@ -258,7 +258,7 @@ def test_time_set_back_begins_anew(policy):
     pairing.add('b', pose(0))
     assert stamps(pairing.add('c', pose(0))) == [0, 0, 0]
     assert pairing.counts[RESETS] == 1
-    assert pairing.rejections[RESETS] == RejectedPose('b', 0, 5 * RESET + 9 * MS)
+    assert pairing.rejections[RESETS][:3] == ('b', 0, 5 * RESET + 9 * MS)
 
 
 def test_after_a_restart_the_first_box_waits_for_the_second():
