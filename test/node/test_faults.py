@@ -271,17 +271,18 @@ while True:
 
 
 def test_ticks_beside_a_greedy_client(node, client):
-    """It always has eight costly requests under way. Most are refused, and ticks come between."""
+    """It always has eight costly requests under way. They wait, and ticks come between."""
     with subprocess.Popen([sys.executable, '-c', GREEDY], stdout=subprocess.PIPE, text=True,
                           env=environment()) as greedy:
         try:
             assert greedy.stdout.readline() == 'answered\n'
-            for _ in range(50):
+            for _ in range(200):
                 client.ask(ORIGIN, TOUCHING)
+            assert greedy.stdout.readline() == 'answered\n'
         finally:
             greedy.kill()
         outcomes = greedy.stdout.read().split()
-    assert 4 * outcomes.count('answered') < outcomes.count('refused')
+    assert 'refused' not in outcomes
 
 
 def test_publishers_killed_and_started_again(node, client):
