@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from .models import check_model
@@ -40,3 +41,39 @@ def within(low: Number, high: Number | None = None) -> Callable[[str], Number]:
             raise argparse.ArgumentTypeError(f'must {limits}, got {text}')
         return value
     return number
+
+
+def parse_command_line(program: str, doc: str | None, settings: Mapping[str, Any],
+                       args: Sequence[str] | None) -> None:
+    """Serve `--help`, and refuse arguments that ROS does not take (exit status 2).
+
+    settings: the parameters of a node.
+    args: what follows the program's name; None: those of this process.
+    """
+    width = max(map(len, settings))
+    lines = [f'  {name:<{width}}  {setting.description} (default: {default_text(setting.default)})'
+             for name, setting in settings.items()]
+    parser = program_parser(
+        program, doc, usage=f'{program} [-h] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ...]',
+        epilog='parameters (--ros-args -p NAME:=VALUE):\n' + '\n'.join(lines))
+    unknown = parser.parse_known_args(outside_ros_args(sys.argv[1:] if args is None else args))[1]
+    if unknown:
+        parser.error(f'unrecognized arguments: {" ".join(unknown)}')
+
+
+def outside_ros_args(args: Sequence[str]) -> list[str]:
+    """Return what is not between `--ros-args` and `--`; rclpy's function fails on a bad value."""
+    outside, inside = [], False
+    for arg in args:
+        if arg == '--ros-args' or (inside and arg == '--'):
+            inside = arg == '--ros-args'
+        elif not inside:
+            outside.append(arg)
+    return outside
+
+
+def default_text(default: Any) -> str:
+    """Return a default as it is typed in a shell."""
+    if isinstance(default, tuple):
+        return '[' + ','.join(map(str, default)) + ']'
+    return str(default).lower() if isinstance(default, bool) else str(default) or 'none'

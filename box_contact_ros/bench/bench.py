@@ -31,11 +31,10 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
-from ..arguments import model_name, program_parser, within
+from ..arguments import model_name, outside_ros_args, program_parser, within
 from ..core import native
 from ..extras import require
 from ..models import MODELS
-from ..node.parameters import outside_ros_args
 from ..node.runtime import exit_on_refusal, running_node
 from ..processes import asked_to_end, keep_to_this_host, program, running
 from .drive import NODES, BenchNode

@@ -31,8 +31,9 @@ from visualization_msgs.msg import Marker
 
 from box_contact_msgs.msg import Contacts
 
+from ..arguments import parse_command_line
 from ..node.messages import contacts_by_pair, make_header, pose_message, stamp_of
-from ..node.parameters import Setting, declare, flag, number, parse_command_line, warn_of_unknown
+from ..node.parameters import Setting, declare, flag, number, warn_of_unknown
 from ..node.runtime import REFUSALS, GuardedNode, running_node, spin_once
 from ..node.topics import DEEP_RELIABLE, contact_qos
 from . import CRANE_ROPES, CRANE_WRENCH

@@ -32,7 +32,6 @@ PAUSE = 4.0
 MOST_WAITING = 16
 """Costly requests that wait for the end of a pause."""
 KEPT_TIMES = 4096  # of requests, for a report
-NOT_CONFIGURED = 'the node is not configured'
 
 
 class Checker:
@@ -90,18 +89,18 @@ class CheckService:
     """
 
     def __init__(self, node: GuardedNode, counts: Counter[str],
-                 checker: Callable[[], Checker | None]) -> None:
-        """Serve ~/check of a node; `checker` returns what answers, None before configure."""
-        self._counts, self._checker = counts, checker
+                 answer: Callable[[Check.Request, Check.Response], Check.Response]) -> None:
+        """Serve ~/check of a node; `answer` fills in a response."""
+        self._counts = counts
         self._until = 0.0  # end of the pause, by the steady clock [s]
         self._cheap = 0  # number of boxes and pairs that are not costly
         self._waiting: deque[tuple[float, Check.Request, Send]] = deque()  # when each came [s]
         self._times: deque[float] = deque(maxlen=KEPT_TIMES)  # from taking to answering [s]
-        self._filled = node.answered(self._fill, '~/check')
+        self._filled = node.answered(answer, '~/check')
         self._timer = node.create_timer(LONG, self._answer_next, clock=Clock(
             clock_type=ClockType.STEADY_TIME))
         self._timer.cancel()
-        answer_later(node.create_service(Check, '~/check', self._fill), self._take)
+        answer_later(node.create_service(Check, '~/check', answer), self._take)
 
     def take_times(self) -> list[float]:
         """Return the times [s] from taking to answering of the requests since the last call."""
@@ -147,13 +146,6 @@ class CheckService:
         if cost > COSTLY:
             self._until = ended + PAUSE * (ended - began)
             self._cheap = int((len(request.boxes) + len(request.pairs)) * COSTLY / cost)
-
-    def _fill(self, request: Check.Request, response: Check.Response) -> Check.Response:
-        checker = self._checker()
-        if checker is None:
-            response.message = NOT_CONFIGURED
-            return response
-        return checker.answer(request, response)
 
 
 def _pose(box: Any) -> Row:

@@ -31,6 +31,9 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
+from box_contact_msgs.srv import Check
+
+from ..arguments import parse_command_line
 from ..core import LENGTH_MAX
 from ..models import MODELS, check_model, make_model, most_near
 from ..scene.pairing import PAIRINGS, RESETS
@@ -39,7 +42,7 @@ from ..scene.scene_file import read_scene
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import short_repr
 from ..solver.models import NATIVE
-from .check import NOT_CONFIGURED, Checker, CheckService
+from .check import Checker, CheckService
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
 from .parameters import (
     Setting,
@@ -48,7 +51,6 @@ from .parameters import (
     limited,
     number,
     one_of,
-    parse_command_line,
     reason_of,
     size,
     text,
@@ -59,6 +61,7 @@ from .runtime import END_SECONDS, LOG_SECONDS, GuardedNode, run_node
 from .tick import TickAnswerer
 from .topics import SceneTopics
 
+NOT_CONFIGURED = 'the node is not configured'
 LONGEST = 1e6  # s, about twelve days
 NAMED_TOPICS = 3  # how many pose topics the node names when it is ready
 
@@ -132,7 +135,7 @@ class ContactNode(GuardedNode, LifecycleNode):
         self._answerer: TickAnswerer | None = None  # likewise
         self._checker: Checker | None = None  # of the solver's scene and model
         self.add_on_set_parameters_callback(self._set_live)
-        self._checks = CheckService(self, self.counts, self._checker_now)
+        self._checks = CheckService(self, self.counts, self._check)
         self.create_service(Trigger, '~/reset', self.answered(self._reset, '~/reset'))
         # On a clock of its own: simulated time may stand still.
         self.create_timer(DIAGNOSTICS_SECONDS, self._report, clock=Clock(
@@ -260,13 +263,14 @@ class ContactNode(GuardedNode, LifecycleNode):
             f'poses{frame} from {", ".join(topics[:NAMED_TOPICS])}'
             f'{f" and {more} more" if more > 0 else ""}')
 
-    def _checker_now(self) -> Checker | None:
-        """Return what answers ~/check on the node's scene and model; None before configure."""
+    def _check(self, request: Check.Request, response: Check.Response) -> Check.Response:
+        """Answer on the node's scene and model; ticks know nothing of it."""
         if self._answerer is None:
-            self._checker = None
-        elif self._checker is None or self._checker.solver is not self._answerer.solver:
+            response.message = NOT_CONFIGURED
+            return response
+        if self._checker is None or self._checker.solver is not self._answerer.solver:
             self._checker = Checker(self._answerer.solver, self.model_of(self._values))
-        return self._checker
+        return self._checker.answer(request, response)
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Forget all poses and stamps: a simulation begins anew."""

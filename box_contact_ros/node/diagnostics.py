@@ -18,7 +18,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
-from ..scene.pairing import OLD, OVERTAKEN, REPEATED, RESETS, TOO_LATE, Pairing, RejectedPose
+from ..scene.pairing import OVERTAKEN, Pairing
 from ..scene.scene import Pair, Scene
 from .messages import make_header
 from .topics import SceneTopics
@@ -184,7 +184,7 @@ class Diagnostics:
         logger = self._node.get_logger()
         rejections, pairing.rejections = pairing.rejections, {}
         for line in (*self._monitor.take_refusals(),
-                     *(_rejection_line(*rejection) for rejection in rejections.items())):
+                     *(rejection.line(reason) for reason, rejection in rejections.items())):
             logger.warning(line)
         new = self._counts - self._reported
         self._reported = Counter(self._counts)
@@ -321,27 +321,6 @@ def _without_partner(unmatched: Sequence[Pair], pairing: Pairing) -> Finding:
         return Finding('apart', message, f'none could be answered; set tolerance:={tolerance:.2g}, '
                                          'or start with pairing:=latest')
     return Finding('alone', message, 'none could be answered, as no tick had all its boxes')
-
-
-def _rejection_line(reason: str, rejection: RejectedPose) -> str:
-    """Return the log line, with its remedy, of what the pairing did to a pose."""
-    box = rejection.box
-    stamp, newest = (f'{1e-9 * value:.12g} s' for value in (rejection.stamp, rejection.newest))
-    if reason == RESETS:
-        return (f'time went back: {box} has stamp {stamp} after {newest}; a new time begins (a '
-                'loop, a restart, or a second publisher)')
-    if reason == TOO_LATE:
-        return (f'{box}: the tick of stamp {stamp} was answered without this pose; dropped: '
-                'publish the poses of a tick together')
-    if reason == OLD:
-        return (f'{box}: stamp {stamp} is older than {newest}; refused: publish in the order of '
-                'the stamps, from one publisher')
-    assert reason == REPEATED
-    if rejection.stamps == 1:
-        return (f'{box}: stamp {stamp} does not advance; refused: set header.stamp (`ros2 topic '
-                'pub` does for `stamp: now`), or start with pairing:=latest')
-    return (f'{box}: stamp {stamp} has come before; refused: its tick is answered once; wait '
-            'longer for the answer, call ~/reset before an episode begins anew, or ask ~/check')
 
 
 def _some(names: Sequence[str]) -> str:

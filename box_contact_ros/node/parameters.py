@@ -1,14 +1,13 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of a node as one table: checked, declared to rclpy, and listed by `--help`.
+"""The parameters of a node as one table: checked, and declared to rclpy.
 
 Parameters are declared with dynamic typing. So the validator of each one refuses a value of another
 type, and not rclpy. Where a double is meant, 200 is as good as 200.0.
 """
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,14 +15,11 @@ from typing import Any
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
-from ..arguments import program_parser
 from ..solver.checks import nearest_name, short_repr, size_fault
 from .rclpy_workarounds import parameter_overrides
 
 Validator = Callable[[str, Any], Any]
 """From a parameter's name and value to the value as the node uses it; ValueError if it is wrong."""
-Limits = Mapping[str, Any]
-"""What a ParameterDescriptor says of accepted values, by its fields."""
 
 
 @dataclass(frozen=True)
@@ -33,12 +29,6 @@ class Setting:
     default: Any
     description: str
     validate: Validator
-
-    @property
-    def limits(self) -> Limits:
-        """Return what `ros2 param describe` shows of accepted values."""
-        limits: Limits = getattr(self.validate, 'limits', {})
-        return limits
 
 
 def limited(**limits: Any) -> Callable[[Validator], Validator]:
@@ -131,7 +121,8 @@ def declare(node: Node, settings: Mapping[str, Setting], *, live: Collection[str
             node.declare_parameter(
                 name, list(value) if isinstance(value, tuple) else value,
                 ParameterDescriptor(description=setting.description, dynamic_typing=True,
-                                    read_only=name not in live, **setting.limits),
+                                    read_only=name not in live,
+                                    **getattr(setting.validate, 'limits', {})),
                 ignore_override=True)
     return values
 
@@ -151,38 +142,3 @@ def reason_of(error: Exception) -> str:
     """Return what an error says; with its type, unless it is a refusal or a missing library."""
     known = isinstance(error, (ValueError, ImportError))
     return str(error) if known else f'{type(error).__name__}: {error}'
-
-
-def parse_command_line(program: str, doc: str | None, settings: Mapping[str, Setting],
-                       args: Sequence[str] | None) -> None:
-    """Serve `--help`, and refuse arguments that ROS does not take (exit status 2).
-
-    args: what follows the program's name; None: those of this process.
-    """
-    width = max(map(len, settings))
-    lines = [f'  {name:<{width}}  {setting.description} (default: {default_text(setting.default)})'
-             for name, setting in settings.items()]
-    parser = program_parser(
-        program, doc, usage=f'{program} [-h] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ...]',
-        epilog='parameters (--ros-args -p NAME:=VALUE):\n' + '\n'.join(lines))
-    unknown = parser.parse_known_args(outside_ros_args(sys.argv[1:] if args is None else args))[1]
-    if unknown:
-        parser.error(f'unrecognized arguments: {" ".join(unknown)}')
-
-
-def outside_ros_args(args: Sequence[str]) -> list[str]:
-    """Return what is not between `--ros-args` and `--`; rclpy's function fails on a bad value."""
-    outside, inside = [], False
-    for arg in args:
-        if arg == '--ros-args' or (inside and arg == '--'):
-            inside = arg == '--ros-args'
-        elif not inside:
-            outside.append(arg)
-    return outside
-
-
-def default_text(default: Any) -> str:
-    """Return a default as it is typed in a shell."""
-    if isinstance(default, tuple):
-        return '[' + ','.join(map(str, default)) + ']'
-    return str(default).lower() if isinstance(default, bool) else str(default) or 'none'

@@ -13,9 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..scene.scene import ALONE, Scene
-from ..scene.scene_solver import Answer
-from ..solver.checks import short_repr
 from ..solver.contact import Contacts
 from .message_bytes import (
     CONTACT_BYTES,
@@ -100,23 +97,3 @@ def _texts(data: bytes, order: str, count: int) -> tuple[str, ...]:
         at += 4 + length
         at += -at % 4
     return tuple(texts)
-
-
-def read_answer(read: ReadContacts, scene: Scene) -> Answer:
-    """Return the answer that a message tells, as a `SceneSolver` gives it.
-
-    scene: that of the node. Raises MessageError for a pair that the scene lacks.
-    """
-    index, rows = scene.index_of, {pair.label: row for pair, row in zip(scene.pairs, scene.rows)}
-    if scene.patterns:
-        rows = {name: (number, ALONE) for name, number in index.items()} | rows
-    pairs = [(index.get(a, ALONE), index.get(b, ALONE)) for _, a, b in read.names]
-    for name, is_known in (*((names[0], min(pair) >= 0 and scene.has_pair(*pair))
-                             for names, pair in zip(read.names, pairs)),
-                           *((name, name in rows) for name in read.stale)):
-        if not is_known:
-            raise MessageError('unknown pair', f'{short_repr(name)} is no pair of the scene: read '
-                                               'the scene file that the node has')
-    boxes, stale = (np.array(part, np.int64).reshape(-1, 2)
-                    for part in (pairs, [rows[name] for name in read.stale]))
-    return Answer(boxes, read.contacts, len(boxes), stale, scene)

@@ -101,6 +101,26 @@ class RejectedPose(NamedTuple):
     newest: int  # newest stamp of the box so far [ns]
     stamps: int = 0  # how many stamps of the box are remembered
 
+    def line(self, reason: str) -> str:
+        """Return the log line of what was done to the pose, with its remedy."""
+        box = self.box
+        stamp, newest = (f'{1e-9 * value:.12g} s' for value in (self.stamp, self.newest))
+        if reason == RESETS:
+            return (f'time went back: {box} has stamp {stamp} after {newest}; a new time begins (a '
+                    'loop, a restart, or a second publisher)')
+        if reason == TOO_LATE:
+            return (f'{box}: the tick of stamp {stamp} was answered without this pose; dropped: '
+                    'publish the poses of a tick together')
+        if reason == OLD:
+            return (f'{box}: stamp {stamp} is older than {newest}; refused: publish in the order '
+                    'of the stamps, from one publisher')
+        assert reason == REPEATED
+        if self.stamps == 1:
+            return (f'{box}: stamp {stamp} does not advance; refused: set header.stamp (`ros2 '
+                    'topic pub` does for `stamp: now`), or start with pairing:=latest')
+        return (f'{box}: stamp {stamp} has come before; refused: its tick is answered once; wait '
+                'longer for the answer, call ~/reset before an episode begins anew, or ask ~/check')
+
 
 TickPoses = list['StampedPose | None']
 """A pose of each of `scene.streams`, None for a box that has none recent enough."""

@@ -27,14 +27,14 @@ from ..node.contact_node import PARAMETERS as CONTACT_PARAMETERS
 from ..node.message_bytes import PoseReader
 from ..node.messages import MessageError
 from ..node.parameters import Setting, declare, warn_of_unknown
-from ..node.read_contacts import ReadContacts, read_answer, read_contacts
+from ..node.read_contacts import ReadContacts, read_contacts
 from ..node.runtime import GuardedNode
 from ..node.topics import pose_qos
 from ..scene.pairing import StampedPose
-from ..scene.scene import ALL_BOXES, Scene, two_boxes
+from ..scene.scene import ALL_BOXES, ALONE, Scene, two_boxes
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import Answer
-from ..solver.checks import are_poses
+from ..solver.checks import are_poses, short_repr
 
 KEPT = 1000  # poses kept per topic: a second at 1 kHz
 UNANSWERED = 0.5
@@ -77,6 +77,26 @@ def read_touching(read: ReadContacts, scene: Scene) -> Answer:
     touching = np.flatnonzero(answer.contacts.colliding)
     rows = touching[np.argsort(answer.contacts.separation[touching], kind='stable')]
     return answer._replace(pairs=answer.pairs[rows], contacts=answer.contacts[rows])
+
+
+def read_answer(read: ReadContacts, scene: Scene) -> Answer:
+    """Return the answer that a message tells, as a `SceneSolver` gives it.
+
+    scene: that of the node. Raises MessageError for a pair that the scene lacks.
+    """
+    index, rows = scene.index_of, {pair.label: row for pair, row in zip(scene.pairs, scene.rows)}
+    if scene.patterns:
+        rows = {name: (number, ALONE) for name, number in index.items()} | rows
+    pairs = [(index.get(a, ALONE), index.get(b, ALONE)) for _, a, b in read.names]
+    for name, is_known in (*((names[0], min(pair) >= 0 and scene.has_pair(*pair))
+                             for names, pair in zip(read.names, pairs)),
+                           *((name, name in rows) for name in read.stale)):
+        if not is_known:
+            raise MessageError('unknown pair', f'{short_repr(name)} is no pair of the scene: read '
+                                               'the scene file that the node has')
+    boxes, stale = (np.array(part, np.int64).reshape(-1, 2)
+                    for part in (pairs, [rows[name] for name in read.stale]))
+    return Answer(boxes, read.contacts, len(boxes), stale, scene)
 
 
 class PoseTopic(NamedTuple):

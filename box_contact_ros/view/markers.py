@@ -20,8 +20,8 @@ from rclpy.context import Context
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
+from ..arguments import parse_command_line
 from ..node.messages import make_header, set_pose
-from ..node.parameters import parse_command_line
 from ..node.runtime import run_node
 from ..node.topics import contact_qos
 from ..solver.contact import Contacts

@@ -22,10 +22,11 @@ from rclpy.context import Context
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from visualization_msgs.msg import Marker
 
+from ..arguments import parse_command_line
 from ..demo import CRANE_ROPES, CRANE_WRENCH
 from ..extras import require
 from ..node.messages import stamp_of
-from ..node.parameters import Setting, parse_command_line, text, whole_number
+from ..node.parameters import Setting, text, whole_number
 from ..node.runtime import run_node
 from .listener import SCENE_PARAMETERS, Listener
 

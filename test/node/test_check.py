@@ -378,7 +378,7 @@ class Bench:
         node = Mock(create_timer=Mock(return_value=self.timer),
                     answered=lambda callback, name: callback)
         self.counts: Counter[str] = Counter()
-        self.service = CheckService(node, self.counts, lambda: Mock(answer=self.answer))
+        self.service = CheckService(node, self.counts, self.answer)
         self.end_of_pause = node.create_timer.call_args.args[1]
 
     def answer(self, request: Any, response: Check.Response) -> Check.Response:

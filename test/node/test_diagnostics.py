@@ -109,5 +109,5 @@ def test_who_sends_a_stamp_again_is_told_why(stamps, words):
     for stamp in stamps:
         pairing.add('box_a', StampedPose((0, 0, 0, 0, 0, 0, 1), '', stamp))
     (reason, rejection), = pairing.rejections.items()
-    line = diagnostics._rejection_line(reason, rejection)
+    line = rejection.line(reason)
     assert words in line and ('latest' in line) == (len(stamps) == 2)

@@ -30,10 +30,11 @@ from box_contact_msgs.msg import Contacts as ContactsMessage
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.message_bytes import ContactWriter, PoseReader, aligned, header_bytes
 from box_contact_ros.node.messages import MessageError, contacts_by_pair, make_header
-from box_contact_ros.node.read_contacts import read_answer, read_contacts
+from box_contact_ros.node.read_contacts import read_contacts
 from box_contact_ros.scene.scene import Pair, two_boxes
 from box_contact_ros.scene.scene_solver import Answer
 from box_contact_ros.solver.contact import Contact, Contacts
+from box_contact_ros.view.listener import read_answer
 
 STAMPS = st.integers(-2**31 * 10**9, 2**31 * 10**9 - 1)
 # U+FFFD is what rclpy puts in place of bytes that are not UTF-8.

@@ -10,6 +10,7 @@ import pytest
 from rclpy.parameter import Parameter
 from ros_client import serving
 
+from box_contact_ros import arguments
 from box_contact_ros.node import contact_node, parameters
 from box_contact_ros.node.contact_node import ContactNode
 
@@ -81,13 +82,13 @@ def test_help_lists_all_parameters_with_their_defaults(capsys):
 def test_options_outside_ros_args_are_refused(args, words, capsys):
     """With status 2; the line of usage has --ros-args."""
     with pytest.raises(SystemExit) as ended:
-        parameters.parse_command_line('node', 'Test.', SETTINGS, args)
+        arguments.parse_command_line('node', 'Test.', SETTINGS, args)
     assert ended.value.code == 2 and words in capsys.readouterr().err
 
 
 def test_a_word_that_ros_does_not_know_ends_the_program(capsys, signal_handlers):
     """With one line and status 1: -p is easily forgotten."""
-    parameters.parse_command_line('node', 'Test.', SETTINGS, ['--ros-args', '-p', 'model:=exact'])
+    arguments.parse_command_line('node', 'Test.', SETTINGS, ['--ros-args', '-p', 'model:=exact'])
     assert contact_node.main(['--ros-args', 'model:=exact']) == 1
     assert capsys.readouterr().err == (
         "error: after --ros-args, ROS does not know ['model:=exact']: a parameter is "
@@ -106,4 +107,4 @@ def test_ranges_and_choices_are_described():
     assert told['pairing'].additional_constraints == 'one of: stamp, latest'
     assert told['model'].additional_constraints.startswith('one of: exact, mlp')
     assert told['size_a'].additional_constraints == 'three numbers > 0'
-    assert parameters.whole_number(1, 9).limits['integer_range'][0].to_value == 9
+    assert vars(parameters.whole_number(1, 9))['limits']['integer_range'][0].to_value == 9

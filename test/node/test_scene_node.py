@@ -26,9 +26,9 @@ from typed_messages import pose_array, read
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import contacts_by_pair, make_header
-from box_contact_ros.node.read_contacts import read_answer
 from box_contact_ros.node.topics import ARRAY_DEPTH, MOST_PAIRS_WITH_TOPICS
 from box_contact_ros.scene.scene import ALONE
+from box_contact_ros.view.listener import read_answer
 
 MS = 1_000_000  # ns
 SCENE = """\
