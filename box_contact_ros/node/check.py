@@ -27,8 +27,8 @@ MOST_CONTACTS = 4096
 """Of a response: all pairs of 91 boxes, 0.8 MB."""
 COSTLY = 5e-3
 """Processor time [s] beyond which a request is costly: half a tick at 100 Hz."""
-PAUSE = 4.0
-"""Pause after a costly request, divided by its time: ticks have four fifths of the node's time."""
+PAUSE = 5.0
+"""Pause after a costly request, divided by its time: ticks have five sixths of the node's time."""
 MOST_WAITING = 16
 """Costly requests that wait for the end of a pause."""
 KEPT_TIMES = 4096  # of requests, for a report
