@@ -14,9 +14,9 @@ from .solver.contact_solver import ContactSolver
 
 if TYPE_CHECKING:
     from .models import make_model
-    from .node.contact_node import ContactNode as ContactNode
-    from .node.read_contacts import ReadContacts as ReadContacts
-    from .node.read_contacts import read_contacts as read_contacts
+    from .node.contact_node import ContactNode as ContactNode  # noqa: F401
+    from .node.read_contacts import ReadContacts as ReadContacts  # noqa: F401
+    from .node.read_contacts import read_contacts as read_contacts  # noqa: F401
     from .scene.contacts_of import contacts_of
     from .scene.forces import Body, PatchForces
     from .scene.scene import Box, Frame, Pair, Scene

@@ -14,7 +14,6 @@ off, so the load comes to rest on the stack only under the wrench of a contact f
 Conventions: SI units; world frame with z up, the ground at z = 0, the stack's centre above the
 origin. A pose is `x y z qx qy qz qw` of the body's centre. Angles of a `CraneScenario` are degrees.
 """
-# ruff: noqa: E402 - a missing MuJoCo ends in one line
 from __future__ import annotations
 
 import math
@@ -25,12 +24,12 @@ import numpy as np
 
 from ..extras import require
 
-require('sim')
-import mujoco
+require('sim')  # a missing MuJoCo ends in one line
+import mujoco  # noqa: E402
 
-from ..scene.forces import GRAVITY, Body
-from ..scene.scene import CONTAINER
-from ..solver.pose import cross, rotation_matrix
+from ..scene.forces import GRAVITY, Body  # noqa: E402
+from ..scene.scene import CONTAINER  # noqa: E402
+from ..solver.pose import cross, rotation_matrix  # noqa: E402
 
 PHYSICS_STEP = 5e-4
 """Longest physics step [s]. A tick of publication is cut into equal steps no longer than this."""
