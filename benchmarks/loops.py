@@ -16,14 +16,14 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
 from box_contact_ros import Body, ContactSolver, PatchForces
 from box_contact_ros.scene.forces import FRICTION, GRAVITY
-from box_contact_ros.solver.pose import rotation_matrix
+from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 
 # MuJoCo would write warnings to a file MUJOCO_LOG.TXT in the working directory.
 mujoco.set_mju_user_warning(logging.getLogger(__name__).warning)
@@ -38,15 +38,27 @@ FLOOR = ((60.0, 60.0, 1.0), 0.0, (0.0, 0.0, -0.5))
 Wrenches = Callable[[float, 'Boxes', np.ndarray, np.ndarray], np.ndarray]
 
 
+class Parts(NamedTuple):
+    """Boxes (m,): the body of each, its full extents and its pose."""
+
+    body: np.ndarray  # (m,)
+    size: np.ndarray  # (m, 3) [m]
+    pose: np.ndarray  # (m, 7)
+
+
 @dataclass
 class Boxes:
-    """Boxes of a scene, a row each: full extents, mass (0: fixed)."""
+    """Bodies of a scene, a row each: one box, its full extents, and the mass (0: fixed).
+
+    A body may have further boxes, its `parts`, whose poses are in the frame of its box.
+    """
 
     size: np.ndarray  # (n, 3) [m]
     mass: np.ndarray  # (n,) [kg]
     pose: np.ndarray  # (n, 7) of the boxes' centres
     centre: np.ndarray  # (n, 3) of mass, in the box's own frame [m]
     velocity: np.ndarray  # (n, 6) of the centre of mass
+    parts: Parts | None = None
 
     @classmethod
     def of(cls, rows: Sequence[tuple]) -> Boxes:
@@ -62,6 +74,18 @@ class Boxes:
                 centre[k] = more[1]
         return cls(np.array([row[0] for row in rows], dtype=float),
                    np.array([row[1] for row in rows], dtype=float), pose, centre, np.zeros((n, 6)))
+
+    def every_box(self) -> Parts:
+        """Return all boxes with their poses in the common frame: those of the rows, then parts."""
+        body, size, pose = np.arange(len(self.mass)), self.size, self.pose
+        if self.parts is None:
+            return Parts(body, size, pose)
+        on = pose[self.parts.body]
+        place = on[:, :3] + np.einsum('nij,nj->ni', rotation_matrix(on[:, 3:]),
+                                      self.parts.pose[:, :3])
+        turn = quaternion_multiply(on[:, 3:], self.parts.pose[:, 3:])
+        return Parts(np.append(body, self.parts.body), np.vstack([size, self.parts.size]),
+                     np.vstack([pose, np.hstack([place, turn])]))
 
     @property
     def carrier(self) -> int | None:
@@ -86,30 +110,42 @@ class Scene:
 
 
 class Timing(NamedTuple):
-    """The loop of a client: step of physics [s], rate of questions, and latency [s]."""
+    """The loop of a client: step of physics [s], rate of questions, latency [s], share lost.
+
+    own: answers are lists of pairs, and `PatchForces` solves the pairs at each step.
+    """
 
     step: float
     rate_hz: float
     latency: float
+    lost: float = 0.0
+    own: bool = False
 
     def __str__(self) -> str:
         return (f'{1e3 * self.step:g} ms, ' + ('each step' if self.rate_hz * self.step == 1.0 else
                                                f'{self.rate_hz:g} Hz')
-                + (f', {1e3 * self.latency:g} ms late' if self.latency else ''))
+                + (f', {1e3 * self.latency:g} ms late' if self.latency else '')
+                + (f', {100 * self.lost:g} % lost' if self.lost else '')
+                + (', own contacts' if self.own else ''))
 
 
 TIMINGS = (Timing(0.001, 1000.0, 0.0), Timing(0.004, 250.0, 0.0), Timing(0.001, 200.0, 0.0),
-           Timing(0.001, 200.0, 0.002), Timing(0.001, 50.0, 0.005))
+           Timing(0.001, 200.0, 0.002), Timing(0.001, 50.0, 0.005),
+           Timing(0.001, 50.0, 0.005, lost=0.05, own=True))
 MUJOCO = 'MuJoCo, 1 ms'
 
 
 def near_pairs(boxes: Boxes, margin: float) -> np.ndarray:
-    """Return the pairs (k, 2) whose bounding boxes come within a margin; one of them moves."""
-    half = 0.5 * np.einsum('nij,nj->ni', np.abs(rotation_matrix(boxes.pose[:, 3:])), boxes.size)
-    low, high = boxes.pose[:, :3] - half - margin, boxes.pose[:, :3] + half
+    """Return the pairs (k, 2) of `every_box` whose bounding boxes come within a margin.
+
+    They are of two bodies, of which one moves.
+    """
+    body, size, pose = boxes.every_box()
+    half = 0.5 * np.einsum('nij,nj->ni', np.abs(rotation_matrix(pose[:, 3:])), size)
+    low, high = pose[:, :3] - half - margin, pose[:, :3] + half
     near = np.triu((low[:, None] <= high).all(axis=2) & (low <= high[:, None]).all(axis=2), 1)
-    moves = boxes.mass > 0
-    return np.argwhere(near & (moves[:, None] | moves))
+    moves = boxes.mass[body] > 0
+    return np.argwhere(near & (moves[:, None] | moves) & (body[:, None] != body))
 
 
 def corner_speeds(boxes: Boxes) -> np.ndarray:
@@ -131,18 +167,50 @@ class Ours:
     def __init__(self, scene: Scene, timing: Timing) -> None:
         """Make solver and forces."""
         boxes = self.boxes = scene.boxes
-        self.scene, self.step_size, self.latency = scene, timing.step, timing.latency
+        self.scene, self.timing, self.step_size = scene, timing, timing.step
+        self.rng = np.random.default_rng(9)  # of lost answers
         self.every = max(1, round(1.0 / (timing.rate_hz * timing.step)))
         self.late = round(timing.latency / timing.step)
         self.solver = ContactSolver()
         self.forces = PatchForces(
             [Body(mass=m, inertia=i, centre=c)
              for m, i, c in zip(boxes.mass, boxes.inertia, boxes.centre)])
-        self.tick, self.spent = 0, 0.0
+        self.tick, self.searched, self.spent = 0, -SEARCHED, 0.0
         self.answers: deque = deque()
+        if boxes.parts is None:
+            self.forces.set_boxes(boxes.size)
+        else:
+            body, size, _ = boxes.every_box()
+            at_body = np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(boxes.mass), 1))
+            self.forces.set_boxes(size, body=body, poses=np.vstack([at_body, boxes.parts.pose]))
         self.pairs = np.empty((0, 2), dtype=np.int64)
         self.weight = np.zeros((len(boxes.mass), 6))
         self.weight[:, 2] = -GRAVITY * boxes.mass
+
+    def way(self, seconds: float) -> float:
+        """Return how much nearer two boxes may come in a time [m], by their speeds and gravity."""
+        boxes = self.boxes
+        fast = np.abs(boxes.velocity[:, :3]).max() + 0.5 * np.linalg.norm(
+            boxes.size, axis=1)[boxes.mass > 0].max() * np.abs(boxes.velocity[:, 3:]).max()
+        return seconds * (2.0 * fast + GRAVITY * seconds)
+
+    def answer(self) -> tuple:
+        """Return the arguments of `hold`: pairs, and their contacts and poses if not its own."""
+        boxes, h = self.boxes, self.step_size
+        if self.timing.own:  # the next answer may be lost
+            return (near_pairs(boxes, self.way(2.0 * self.every * h + self.timing.latency)),)
+        if self.tick - self.searched >= SEARCHED:
+            self.searched = self.tick
+            self.pairs = near_pairs(boxes, self.way(2.0 * SEARCHED * h))
+        _, size, pose = boxes.every_box()
+        contacts = self.solver.batch(pose, sizes=size, pairs=self.pairs)
+        return self.pairs, contacts, boxes.pose.copy()
+
+    def hold(self, pairs: np.ndarray, *contacts_and_poses: Any) -> None:
+        """Hand an answer to the forces."""
+        times = {} if self.timing.own else {
+            'age': self.timing.latency, 'period': self.every * self.step_size}
+        self.forces.hold(pairs, *contacts_and_poses, **times)
 
     def step(self) -> None:
         """Advance all boxes by a step."""
@@ -151,15 +219,10 @@ class Ours:
         if self.scene.act:
             outside = outside + self.scene.act(self.tick * h, boxes, boxes.pose, boxes.velocity)
         start = time.perf_counter()
-        if self.tick % SEARCHED == 0:
-            fast = np.abs(boxes.velocity[:, :3]).max() + 0.5 * np.linalg.norm(
-                boxes.size, axis=1)[boxes.mass > 0].max() * np.abs(boxes.velocity[:, 3:]).max()
-            self.pairs = near_pairs(boxes, 2 * SEARCHED * h * (2 * fast + 0.1))
-        if self.tick % self.every == 0:
-            contacts = self.solver.batch(boxes.pose, sizes=boxes.size, pairs=self.pairs)
-            self.answers.append((self.tick + self.late, self.pairs, contacts, boxes.pose.copy()))
+        if self.tick % self.every == 0 and self.rng.random() >= self.timing.lost:
+            self.answers.append((self.tick + self.late, *self.answer()))
         while self.answers and self.answers[0][0] <= self.tick:
-            self.forces.hold(*self.answers.popleft()[1:], age=self.latency)
+            self.hold(*self.answers.popleft()[1:])
         boxes.pose, boxes.velocity, _ = self.forces.advance(h, boxes.pose, boxes.velocity, outside)
         self.spent += time.perf_counter() - start
         self.tick += 1
@@ -190,6 +253,10 @@ class Theirs:
                 body.mass, body.inertia = HEAVY, (HEAVY,) * 3
             body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=0.5 * boxes.size[k],
                           friction=(FRICTION, 0.005, 0.0001))
+            for on, size, (x, y, z, qx, qy, qz, qw) in zip(*boxes.parts) if boxes.parts else ():
+                if on == k:
+                    body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=0.5 * size, pos=(x, y, z),
+                                  quat=(qw, qx, qy, qz), friction=(FRICTION, 0.005, 0.0001))
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         self.tick, self.spent = 0, 0.0

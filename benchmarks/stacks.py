@@ -33,6 +33,7 @@ from .loops import (
     MUJOCO,
     TIMINGS,
     Boxes,
+    Parts,
     Scene,
     Timing,
     corner_speeds,
@@ -79,8 +80,8 @@ def run(make: Callable[[], Scene], timing: Timing | None) -> Outcome:
             rest = math.nan
         elif math.isnan(rest):
             rest = loop.tick * loop.step_size
-        pairs = near_pairs(boxes, 0.0)
-        depth = -solver.batch(boxes.pose, sizes=boxes.size, pairs=pairs, patch=False
+        _, size, pose = boxes.every_box()
+        depth = -solver.batch(pose, sizes=size, pairs=near_pairs(boxes, 0.0), patch=False
                               ).separation.min(initial=0.0)
         deepest = max(deepest, depth)
         if not speed < LOST_SPEED:
@@ -266,6 +267,17 @@ def packed_pallets(count: int = 3, layers: int = 5) -> Scene:
     return Scene('three packed pallets', Boxes.of(rows), 4.0)
 
 
+def spreader() -> Scene:
+    """Return a spreader with four twist-locks that stands on a loaded container."""
+    base, lock = (12.192, 2.3, 0.6), (0.16, 0.12, 0.15)
+    low = 0.5 * (base[2] + lock[2])
+    boxes = Boxes.of([FLOOR, (CONTAINER, 25_000.0, (0, 0, 0.5 * CONTAINER[2])),
+                      (base, 12_000.0, (0, 0, CONTAINER[2] + lock[2] + 0.5 * base[2]))])
+    at = [(x, y, -low, 0, 0, 0, 1) for x, y in product((-5.9, 5.9), (-1.0, 1.0))]
+    boxes.parts = Parts(np.full(4, 2), np.tile(lock, (4, 1)), np.array(at, dtype=float))
+    return Scene('spreader on a container', boxes, 4.0)
+
+
 def turntable() -> Scene:
     """Return a tower of three cubes on a plate that turns once in ten seconds."""
     rows = [((6.0, 6.0, 0.2), 0.0, (0.0, 0.0, -0.1))]
@@ -354,7 +366,7 @@ SCENES: tuple[Callable[[], Scene], ...] = (
     partial(tower, 20), partial(tower, 20, jitter=0.03), wall, pyramid, pile, bars, mixed, pallet,
     partial(containers, False), partial(containers, True), partial(off_centre, 0.4),
     partial(off_centre, 0.45), partial(ratio, 10.0), partial(ratio, 100.0),
-    cube_on_four, twist_locks, heap, packed_pallets, turntable,
+    cube_on_four, twist_locks, heap, packed_pallets, spreader, turntable,
     partial(slope, 'plate'), partial(slope, 'tall'), partial(slope, 'five'),
     *(partial(gripper, force) for force in (2.0, 5.0, 20.0, 50.0)),
     *(partial(real_pallet, order) for order in ORDERS))
@@ -372,9 +384,10 @@ def recorded(make: Callable[[], Scene], timing: Timing | None, engine: str) -> s
     boxes, states = scene.boxes, []
     for loop in steps(scene, timing):
         if loop.tick == 0:
-            states.append((settled.PLACED, boxes.pose.copy(), near_pairs(boxes, 0.0)))
-    states.append((engine, boxes.pose, near_pairs(boxes, 0.0)))
-    parts = [(pose[pairs], boxes.size[pairs], [name] * len(pairs)) for name, pose, pairs in states]
+            states.append((settled.PLACED, boxes.every_box().pose.copy(), near_pairs(boxes, 0.0)))
+    states.append((engine, boxes.every_box().pose, near_pairs(boxes, 0.0)))
+    sizes = boxes.every_box().size
+    parts = [(pose[pairs], sizes[pairs], [name] * len(pairs)) for name, pose, pairs in states]
     pose, size, engines = (np.concatenate(columns) for columns in zip(*parts))
     return settled.Recorded(Pairs(pose[:, 0], pose[:, 1], size[:, 0], size[:, 1]),
                             np.full(len(engines), scene.name), engines)
