@@ -1,16 +1,17 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Land a container in MuJoCo on one contact per tick: `python docs/examples/mujoco_loop.py`.
+"""Land a container in MuJoCo on pairs that come late: `python docs/examples/mujoco_loop.py`.
 
-MuJoCo integrates the motion. Its own contact is off. Every 5 ms the solver answers for the pair,
-2 ms late. `PatchForces` takes the answer, and gives the wrench of each physics step.
+MuJoCo integrates the motion. Its own contact is off. Every 20 ms, a `SceneSolver` lists the pairs
+that may touch soon, as a contact node does, and its list comes 5 ms late. `PatchForces` solves the
+pairs at the poses of each physics step, and gives the wrench.
 
 It prints:
 
-    0.06 s: 0.0 mm deep, 540 mm/s
-    0.13 s: 1.9 mm deep, 966 mm/s
-    0.26 s: 1.8 mm deep, 146 mm/s
+    0.06 s: 0.0 mm deep, 589 mm/s
+    0.13 s: 0.2 mm deep, 981 mm/s
+    0.26 s: 0.0 mm deep, 138 mm/s
     0.51 s: 0.0 mm deep, 0 mm/s
     1.01 s: 0.0 mm deep, 0 mm/s
     at rest: force / weight 1.0000, tilt below 0.001°: True
@@ -18,10 +19,12 @@ It prints:
 import mujoco
 import numpy as np
 
-from box_contact_ros import Body, ContactSolver, PatchForces
+from box_contact_ros import Body, Box, Pair, PatchForces, Scene, SceneSolver
 
 SIZE, MASS = np.array([12.192, 2.438, 2.591]), 20_000.0  # a 40 ft container [m], [kg]
-STEP, STEPS, LATE = 0.001, 5, 2  # physics step [s]; steps from question to question, and to answer
+STEP, STEPS, LATE = 0.001, 20, 5  # physics step [s]; steps from question to question, and to answer
+CLOSING = 1.5  # the largest speed at which two boxes approach [m/s]
+MARGIN = CLOSING * (STEPS + LATE) * STEP  # pairs apart by this may touch before the next list [m]
 DURATION = 3.0  # [s]
 STACK = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])  # x y z qx qy qz qw, its top at 1.2955 m
 
@@ -55,23 +58,26 @@ def main() -> None:
     model = mujoco.MjModel.from_xml_string(MODEL)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    solver = ContactSolver(SIZE, SIZE, model='mlp')
+    boxes = {'load': Box(SIZE), 'stack': Box(SIZE, STACK)}
+    solver = SceneSolver(Scene(boxes, (Pair.between('load', 'stack'),)), margin=MARGIN)
     fixed = Body(mass=0.0, inertia=np.zeros(3))
     forces = PatchForces([Body.of_box(SIZE, MASS), fixed])  # body 0, the load, and 1, the stack
+    forces.set_boxes([SIZE, SIZE])
     velocities, weights = np.zeros((2, 6)), np.zeros((2, 6))
     weights[0, 2] = -9.81 * MASS
-    for tick in range(round(DURATION / (STEPS * STEP))):
-        asked = np.array([pose_of(data), STACK])
-        contacts = solver.batch(asked[:1], asked[1:])  # A is the load, so the normal points down
-        for step in range(STEPS):
-            if step == LATE:
-                forces.hold([(0, 1)], contacts, asked, age=LATE * STEP)
-            velocities[0] = velocity_of(data)
-            data.xfrc_applied[1] = forces.advance(STEP, np.array([pose_of(data), STACK]),
-                                                  velocities, weights).wrenches[0]
-            mujoco.mj_step(model, data)
-        if tick in (10, 25, 50, 100, 200):
-            print(f'{data.time:.2f} s: {1e3 * max(0.0, -contacts.separation[0]):.1f} mm deep, '
+    for step in range(round(DURATION / STEP)):
+        pose = pose_of(data)
+        if step % STEPS == 0:
+            answer = solver([pose])  # the pairs that touch, then those within the margin
+        if step % STEPS == LATE:
+            forces.hold(answer.pairs)
+        velocities[0] = velocity_of(data)
+        motion = forces.advance(STEP, np.array([pose, STACK]), velocities, weights)
+        data.xfrc_applied[1] = motion.wrenches[0]
+        mujoco.mj_step(model, data)
+        if step + 1 in (60, 130, 260, 510, 1010):
+            depth = max(0.0, -answer.contacts.separation.min(initial=0.0))
+            print(f'{data.time:.2f} s: {1e3 * depth:.1f} mm deep, '
                   f'{1e3 * np.linalg.norm(data.qvel[:3]):.0f} mm/s')
     weight = MASS * 9.81
     tilt = np.degrees(np.arccos(np.clip(data.xmat[1][8], -1.0, 1.0)))
