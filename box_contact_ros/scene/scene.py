@@ -240,7 +240,6 @@ class Scene:
         """Return the row of each box's body (n,) or -1, and its pose (n, 7) in the body's frame."""
         of_body = self.body_of >= 0
         local = np.array([box.pose if box.body else AT_FRAME for box in self.boxes.values()])
-        local[:, 3:] /= np.linalg.norm(local[:, 3:], axis=1, keepdims=True)
         return np.where(of_body, len(self.boxes) + self.body_of, -1).astype(np.int64), local
 
     def fixed_poses(self) -> np.ndarray:

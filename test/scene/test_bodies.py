@@ -11,6 +11,7 @@ import numpy as np
 import poses
 import pytest
 
+from box_contact_ros import Body, PatchForces
 from box_contact_ros.core import native
 from box_contact_ros.scene.scene import ALONE, EVERY_PAIR, Box, Frame, Pair, Scene, SceneError
 from box_contact_ros.scene.scene_file import read_scene
@@ -144,6 +145,29 @@ def test_a_rotation_moves_what_is_beside():
     pose = scene.fixed_poses()[1]
     assert pose[:3] == pytest.approx([5, 8, 8])
     assert pose[3:] / np.linalg.norm(pose[3:]) == pytest.approx([0.5, 0.5, 0.5, 0.5])
+
+
+def test_own_contacts_of_bodies_are_those_of_a_scene():
+    """To the bit: forces put boxes where a tick of a scene puts them."""
+    rng = np.random.default_rng(3)
+    local = np.hstack((rng.uniform(-1, 1, (8, 3)), poses.unit_quaternions(rng, 8)))
+    body = np.repeat([0, 1], 4)
+    boxes = {f'b{k}': Box(UNIT, local[k], body='uv'[body[k]]) for k in range(8)}
+    scene = Scene(boxes, patterns=EVERY_PAIR, bodies={'u': Frame(), 'v': Frame()})
+    sizes, at_body = np.ones((8, 3)), np.array([box.pose for box in boxes.values()])
+    touching = 0
+    for _ in range(20):
+        frames = np.hstack((rng.uniform(-1, 1, (2, 3)), poses.unit_quaternions(rng, 2)))
+        answer = SceneSolver(scene)(list(frames))
+        after = []
+        for contacts in (answer.contacts, None):
+            forces = PatchForces([Body.of_box(UNIT, 1.0)] * 2)
+            forces.set_boxes(sizes, body=body, poses=at_body)
+            forces.hold(answer.pairs, contacts, None if contacts is None else frames)
+            after.append(forces.advance(0.001, frames, np.zeros((2, 6))))
+        assert all(np.array_equal(one, other) for one, other in zip(*after))
+        touching += answer.touching
+    assert touching > 50
 
 
 BODIES = Scene({'a': Box(UNIT), 'b1': Box(UNIT, body='b'),

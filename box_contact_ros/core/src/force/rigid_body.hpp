@@ -122,13 +122,12 @@ inline void spin(double (&q)[4], const Vec<double>& angular, double h) {
 
 // The pose of a box in the common frame, of a pose in the frame of a body at `body`.
 inline bc_pose in_common_frame(const bc_pose& body, const bc_pose& box) {
-  Vec<double> position = vector(body.position) +
-                         rotation_matrix(body.quaternion) * vector(box.position);
-  Vec<double> u = vector_at(body.quaternion), v = vector_at(box.quaternion);
-  double w = body.quaternion[3], s = box.quaternion[3];
-  Vec<double> turned = (w * v + s * u) + cross(u, v);
-  return {{position[0], position[1], position[2]},
-          {turned[0], turned[1], turned[2], w * s - dot(u, v)}};
+  auto read = [](const bc_pose& pose) -> Pose<double> {
+    const double(&q)[4] = pose.quaternion;
+    return {vector(pose.position), {q[0], q[1], q[2], q[3]}};
+  };
+  auto [at, turned] = pose_in_common_frame(read(body), read(box));
+  return {{at[0], at[1], at[2]}, {turned[0], turned[1], turned[2], turned[3]}};
 }
 
 // The turn of a body between two places, as a vector: sin θ along the axis, for small θ its angle.
