@@ -34,6 +34,9 @@ PAPER = {8: (1.10, 11233, 11.52), 10: (1.47, 14323, 15.47), 12: (1.85, 17911, 19
          20: (2.72, 30475, 32.44), 22: (2.90, 35411, 36.77)}
 """The paper's figures by N: Table 3's mean time [ms]; Table 4's largest number of tests, and its
 time [ms]."""
+COARSE = (1, 2, 4)
+"""Divisions N that the paper does not have: its Figure 10 ends where soup and network are equally
+accurate."""
 PAPER_NETWORK = 0.5  # the paper's time of its network [ms]
 OVERLAP = 1e-3
 """Depth [m] of touching and near-parallel cubes of edge 2 where the accuracy is measured. At exact
@@ -81,7 +84,7 @@ class SoupResult:
 
     soups: Mapping[tuple[str, int], Row]  # by regime and N
     network: Row  # of `paper`, on the touching patterns that the soup's accuracy is measured on
-    exact: float  # time of a pair in a batch of model `exact` [ms]
+    exact: float  # time of a call of model `exact` [ms]
     counts: Mapping[str, Counts]
 
     @property
@@ -154,19 +157,23 @@ def judge_soup(divisions: int, patterns: Pairs, exact: Contacts) -> SoupErrors:
         depth=np.array(depths) + exact.separation[rows])
 
 
-def time_batch(model: Contestant, patterns: Pairs) -> float:
-    """Return the time of a pair in a batch [ms]: the sums, without the cost of a Python call."""
-    assert model.prepare_batch is not None
-    run = model.prepare_batch(patterns)
-    run()
-    return cpu_milliseconds(run)[0] / len(patterns.size)
+def time_calls(model: Contestant, patterns: Pairs) -> float:
+    """Return the mean time of a call [ms], pair by pair as the soup is asked."""
+    calls = model.prepare(patterns)
+
+    def call_all() -> None:
+        for call in calls:
+            call()
+
+    call_all()
+    return cpu_milliseconds(call_all)[0] / len(calls)
 
 
 def judge_network(model: Contestant, patterns: Pairs, exact: Contacts) -> Row:
     """Return a network's row on touching patterns."""
     found = model.solve(patterns)
     return {'model': model.name, 'regime': 'touching',
-            'batch_mean_ms': time_batch(model, patterns),
+            'call_mean_ms': time_calls(model, patterns),
             'point_error_mean_m': float(distances(found.point, exact.point).mean()),
             'normal_error_mean_deg': float(degrees_between(found.normal, exact.normal).mean())}
 
@@ -188,10 +195,10 @@ def measure(written: np.ndarray, touching: np.ndarray, *, quick: bool = False) -
     judged = {name: pairs.rows(slice(counts[name].judged)) for name, pairs in judged.items()}
     truth = {name: pairs.contacts() for name, pairs in judged.items()}
     soups: dict[tuple[str, int], Row] = {}
-    work = len(PAPER) * sum(c.timed + c.judged for c in counts.values())
+    work = len([*COARSE, *PAPER]) * sum(c.timed + c.judged for c in counts.values())
     with (pinned({usable_cores()[-1]}), no_garbage_collection(),
           tqdm(total=work, unit='pattern', disable=None) as bar):
-        for divisions in PAPER:
+        for divisions in (*COARSE, *PAPER):
             for regime in REGIMES:
                 bar.set_description(f'soup, N = {divisions}, {regime}')
                 row: Row = {'model': 'soup', 'divisions': divisions,
@@ -212,7 +219,7 @@ def measure(written: np.ndarray, touching: np.ndarray, *, quick: bool = False) -
                     bar.update(len(judged[regime].size))
                 soups[regime, divisions] = row
         network = judge_network(ours('paper'), judged['touching'], truth['touching'])
-        exact = time_batch(ours('exact'), judged['touching'])
+        exact = time_calls(ours('exact'), judged['touching'])
     return SoupResult(soups=soups, network=network, exact=exact, counts=counts)
 
 
@@ -250,7 +257,7 @@ def table_of_errors(result: SoupResult) -> str:
     head, regimes = ['N', 'misses at exact touch'], REGIMES[1:]
     for regime in regimes:
         head += [f'{regime}: point, mean', 'max', 'normal, mean', 'depth, mean']
-    found = {str(n): [result.soups[regime, n] for regime in regimes] for n in PAPER}
+    found = {str(n): [result.soups[regime, n] for regime in regimes] for n in (*COARSE, *PAPER)}
     found['`paper`'] = [result.network, {}]
     lines = []
     for label, (touching, parallel) in found.items():
@@ -272,7 +279,7 @@ def section_3(result: SoupResult) -> str:
     table = _with_growth(head, [
         [n, 12 * n**2, PAPER[n][0], *(result.soups[regime, n][column] for regime in REGIMES
                                       for column in columns)] for n in PAPER])
-    network = result.network['batch_mean_ms']
+    network = result.network['call_mean_ms']
     ends = min(PAPER), max(PAPER)
     return output.page(
         'benchmarks/paper/pages/table_3', counts=result.counts, table=table, low=ends[0],
@@ -304,11 +311,16 @@ def section_errors(result: SoupResult) -> str:
 
 
 def section_figure_10(result: SoupResult) -> str:
-    """Return Figure 10's caption."""
-    coarsest = result.soups['touching', min(PAPER)]
-    return output.page('benchmarks/paper/pages/figure_10', low=min(PAPER),
-                       error=1e3 * result.network['point_error_mean_m'],
-                       soup=1e3 * coarsest['point_error_mean_m'])
+    """Return Figure 10's caption, which tells from which N on the soup is more accurate."""
+    error = result.network['point_error_mean_m']
+    soups = {n: result.soups['touching', n]['point_error_mean_m'] for n in (*COARSE, *PAPER)}
+    better = next((n for n, soup in soups.items() if soup < error), None)
+    words = ('No soup here is as accurate as the network' if better is None else
+             'No N is as inaccurate as the network' if better == min(soups) else
+             f'The soup is more accurate from N = {better} on')
+    return output.page('benchmarks/paper/pages/figure_10', low=min(soups), words=words,
+                       triangles=12 * min(soups)**2, error=1e3 * error,
+                       soup=1e3 * soups[min(soups)])
 
 
 SECTIONS = {3: section_3, 4: section_4, 10: section_figure_10}
@@ -316,24 +328,33 @@ SECTIONS = {3: section_3, 4: section_4, 10: section_figure_10}
 
 
 def draw_figure_10(result: SoupResult, path: Path) -> None:
-    """Draw the mean and the longest time of the soup, and the network's, against N."""
-    figure, ((axes,),) = output.subplots(1, 1, (7.0, 4.8))
-    divisions = list(PAPER)
-    rows = [result.soups['as written', n] for n in divisions]
-    network = result.network['batch_mean_ms']
-    for who, colour, lines in (
-            ('paper', '0.55', ([PAPER[n][2] for n in divisions], [PAPER[n][0] for n in divisions],
-                               PAPER_NETWORK)),
-            ('here', 'tab:blue', ([row['most_tests_alone_ms'] for row in rows],
-                                  [row['alone_mean_ms'] for row in rows], network))):
+    """Draw times of the soup and of the network against N, and below their errors."""
+    figure, ((times,), (errors,)) = output.subplots(2, 1, (7.0, 6.8))
+    every = [*COARSE, *PAPER]
+    rows = [result.soups['as written', n] for n in every]
+    for who, colour, divisions, lines in (
+            ('paper', '0.55', list(PAPER), ([tests[2] for tests in PAPER.values()],
+                                            [tests[0] for tests in PAPER.values()],
+                                            PAPER_NETWORK)),
+            ('here', 'tab:blue', every, ([row['most_tests_alone_ms'] for row in rows],
+                                         [row['alone_mean_ms'] for row in rows],
+                                         result.network['call_mean_ms']))):
         for what, style, values in zip(('soup, most tests', 'soup, mean', 'network'),
                                        ('-^', '-o', '--'), lines):
-            axes.plot(divisions, np.broadcast_to(values, len(divisions)), style, color=colour,
-                      markersize=4, label=f'{who}: {what}')
-    axes.set(yscale='log', xticks=divisions, xlabel='divisions N of an edge', ylabel='time [ms]')
-    axes.yaxis.set_major_formatter('{x:g}')
-    axes.grid(color='0.9', linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[['top', 'right']].set_visible(False)
+            times.plot(divisions, np.broadcast_to(values, len(divisions)), style, color=colour,
+                       markersize=4, label=f'{who}: {what}')
+    for style, error in (
+            ('-o', [result.soups['touching', n]['point_error_mean_m'] for n in every]),
+            ('--', result.network['point_error_mean_m'])):
+        errors.plot(every, 1e3 * np.broadcast_to(error, len(every)), style, color='tab:blue',
+                    markersize=4)
+    times.set(yscale='log', xticks=every, ylabel='time of a pair [ms]')
+    errors.set(yscale='log', xticks=every, xlabel='divisions N of an edge',
+               ylabel='mean point error [mm]')
+    for axes in (times, errors):
+        axes.yaxis.set_major_formatter('{x:g}')
+        axes.grid(color='0.9', linewidth=0.6)
+        axes.set_axisbelow(True)
+        axes.spines[['top', 'right']].set_visible(False)
     figure.legend(loc='outside lower center', ncols=2, frameon=False)
     figure.savefig(path)

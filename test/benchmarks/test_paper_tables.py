@@ -222,7 +222,7 @@ def test_all_is_written(small, tmp_path, capsys):
         rows = list(csv.DictReader(file))
     timed = [row for row in rows if row['step_mean_ms']]
     assert {(int(row['divisions']), row['regime']) for row in timed} == {
-        (n, regime) for n in (8, 10) for regime in soup_tables.REGIMES}
+        (n, regime) for n in (1, 2, 4, 8, 10) for regime in soup_tables.REGIMES}
     for row in timed:
         assert int(row['triangles']) == 12 * int(row['divisions'])**2
         assert 0 < float(row['alone_p50_ms']) <= float(row['alone_max_ms']) and row['processor']
@@ -231,3 +231,7 @@ def test_all_is_written(small, tmp_path, capsys):
     assert f'| {most:,} |' in page
     assert '11,233' in page and '36.77' not in page  # the paper's, of the N that were run
     assert {row['model'] for row in rows} == {'soup', 'paper'}
+    error, = (float(row['point_error_mean_m']) for row in rows if row['model'] == 'paper')
+    coarsest, = (float(row['point_error_mean_m']) for row in timed
+                 if (row['divisions'], row['regime']) == ('1', 'touching'))
+    assert coarsest < error and 'No N is as inaccurate as the network: at N = 1' in page
