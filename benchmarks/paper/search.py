@@ -251,7 +251,7 @@ def main(args: Sequence[str] | None = None) -> int:
     text = page('benchmarks/paper/pages/search', made=made,
                 total=sum(len(search.candidates) for search in results), external=' and '.join(
             f'{len(search.sets["external"]):,} patterns' for search in results))
-    text += f'\n![Settings and errors]({NAME}.png)\n' + ''.join(map(section, results))
+    text += ''.join(map(section, results))
     text += f'\nAll candidates: [{NAME}.csv]({NAME}.csv).\n'
     (folder / f'{NAME}.md').write_text(text, 'utf-8')
     write_table(folder / f'{NAME}.csv', results)

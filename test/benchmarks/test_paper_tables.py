@@ -234,4 +234,4 @@ def test_all_is_written(small, tmp_path, capsys):
     error, = (float(row['point_error_mean_m']) for row in rows if row['model'] == 'paper')
     coarsest, = (float(row['point_error_mean_m']) for row in timed
                  if (row['divisions'], row['regime']) == ('1', 'touching'))
-    assert coarsest < error and 'No N is as inaccurate as the network: at N = 1' in page
+    assert coarsest < error and 'No N is as inaccurate as the network. At N = 1' in page
