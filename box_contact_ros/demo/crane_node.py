@@ -237,6 +237,7 @@ def main(args: Sequence[str] | None = None) -> int:
             node.lower(executor)
             landing = node.loop.record.judge()
             passed, words = verdict(landing, node.latencies, node.lost)
+            corners = node.loop.forces.corner_loads()
     except KeyboardInterrupt:
         return 130  # 128 + SIGINT, as shells report it
     except ExternalShutdownException:
@@ -244,7 +245,7 @@ def main(args: Sequence[str] | None = None) -> int:
     except (*REFUSALS, TimeoutError) as error:
         print(f'error: {error}', file=sys.stderr)
         return 1
-    print(f'{words}\n{landing}', flush=True)
+    print('\n'.join(filter(None, (words, str(landing), corners))), flush=True)
     return 0 if passed else 1
 
 

@@ -90,6 +90,13 @@ class LoadForces:
         self._forces.hold(pairs, Contacts.of(contacts.values()), self._rows(pose, NO_TURN),
                           age=self._late, period=self._period)
 
+    def corner_loads(self) -> str:
+        """Return a line for each patch: what its corners carried in the last step."""
+        loads = self._forces.loads()
+        return '\n'.join(
+            f'  corner loads  {" ".join(f"{1e-3 * load:.1f}" for load in row)} kN'
+            for row in loads.corner_loads if row.any())
+
     def wrench(self, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return force and torque (6,) at `pose` (7,) and `velocity` (6,), a physics step each."""
         still, weight = np.zeros(6), np.array([0, 0, -GRAVITY * self._load.mass, 0, 0, 0])

@@ -4,6 +4,7 @@
 """The crane over DDS: it lands on the answers of a contact node in another process."""
 from __future__ import annotations
 
+import re
 import signal
 import time
 
@@ -23,6 +24,7 @@ from box_contact_ros.demo import crane_node, landing
 from box_contact_ros.demo.crane import CraneScenario
 from box_contact_ros.demo.landing import Landing
 from box_contact_ros.node.messages import make_header
+from box_contact_ros.scene.forces import GRAVITY
 
 HARD = CraneScenario(rope_angle=3.0, rope_heading=100.0, pitch=2.0, roll=-2.0, yaw=1.0,
                      offset=(0.2, 0.4))
@@ -49,6 +51,8 @@ def test_it_lands(program, contact_node):
     assert str(landed(CraneScenario(), latency=0.0)) in crane.output
     assert ' contacts, none lost; latency p50 ' in crane.output
     assert 'not met' not in crane.output
+    corners = re.search('corner loads  (.*) kN', crane.output)[1].split()
+    assert sum(map(float, corners)) == pytest.approx(1e-3 * GRAVITY * CraneScenario().mass, abs=0.3)
     stages = [line.split(' s  ')[1][:12].strip() for line in crane.output.splitlines()
               if 'fastest corner' in line]
     assert stages == ['hanging', 'first touch', 'settling', 'at rest']
