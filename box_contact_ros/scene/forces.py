@@ -16,6 +16,7 @@ force [N], then a torque [N m] about the centre of mass. All in the common frame
 """
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Self
@@ -24,8 +25,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import INERTIA_SLACK, LENGTH_MAX, MASS_MAX, MASS_MIN, THREADS_MAX, native
-from ..solver.checks import as_floats, as_number, as_pairs, as_size, as_whole, as_wholes, short_repr
+from ..solver.checks import (
+    as_floats,
+    as_number,
+    as_pairs,
+    as_size,
+    as_whole,
+    as_wholes,
+    pose_fault,
+    short_repr,
+    size_fault,
+)
 from ..solver.contact import Contacts
+from ..solver.pose import rotation_matrix
 
 GRAVITY = 9.81
 """Gravitational acceleration [m/s²]."""
@@ -75,6 +87,38 @@ class Body:
         squares = np.square(as_size(size, 'size')[0])
         mass = as_number(mass, 'mass')
         return cls(mass=mass, inertia=mass / 12.0 * (squares.sum() - squares))
+
+    @classmethod
+    def of_boxes(cls, sizes: ArrayLike, poses: ArrayLike, masses: ArrayLike) -> Self:
+        """Return the body of boxes of one density each, fixed to each other.
+
+        sizes: full extents (m, 3) [m]. poses: (m, 7) in the body's frame. masses: (m,) [kg].
+        ValueError: names field and value; and where the body's axes are not principal.
+        """
+        size, pose = _as_rows(sizes, 'sizes', 3), _as_rows(poses, 'poses', 7)
+        mass = _as_rows(masses, 'masses')
+        if not len(size) == len(pose) == len(mass) > 0:
+            raise ValueError(f'sizes, poses and masses must be equally many, not {len(size)}, '
+                             f'{len(pose)} and {len(mass)}')
+        for k, (row, each) in enumerate(zip(pose, size)):
+            fault, field = pose_fault(row), f'poses[{k}]'
+            if not fault:
+                fault, field = size_fault(each), f'sizes[{k}]'
+            if fault:
+                raise ValueError(f'{field} {fault}')
+        if not (mass.min() >= 0.0 and 0.0 < mass.sum() < math.inf):
+            raise ValueError(f'masses must be 0 or more, and not all 0, not {short_repr(mass)}')
+        centre = mass @ pose[:, :3] / mass.sum()
+        axes, arm, squares = rotation_matrix(pose[:, 3:]), pose[:, :3] - centre, size**2
+        own = mass[:, None] / 12.0 * (squares.sum(axis=1, keepdims=True) - squares)
+        inertia = np.einsum('nij,nj,nkj->ik', axes, own, axes) + np.einsum(
+            'n,nij->ij', mass, (arm**2).sum(axis=1)[:, None, None] * np.eye(3)
+            - arm[:, :, None] * arm[:, None])
+        aside = np.abs(inertia - np.diag(np.diag(inertia))).max()
+        if aside > INERTIA_SLACK * inertia.max():
+            raise ValueError(f'the axes of the body are not principal: a product of inertia is '
+                             f'{aside:g} kg m²; turn its frame')
+        return cls(mass=float(mass.sum()), inertia=np.diag(inertia), centre=centre)
 
 
 class Motion(NamedTuple):

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 import pytest
@@ -194,6 +195,18 @@ def test_two_feet_stand_on_a_floor() -> None:
     assert abs(loads.pressing @ loads.centre[:, 0]) < 1e-5 * GRAVITY
     with pytest.raises(ValueError, match=r'pairs\[0\]: both boxes are of body 1'):
         forces.hold([(1, 3)])
+
+
+def test_a_body_of_boxes_has_their_moments() -> None:
+    """A container of eight octants, one turned by a right angle, is one box of the same density."""
+    whole, size = Body.of_box(CONTAINER, 20_000.0), 0.5 * np.array(CONTAINER)
+    poses = np.array([[*(0.5 * size * signs), 0, 0, 0, 1] for signs in product((-1, 1), repeat=3)])
+    sizes, quarter = np.tile(size, (8, 1)), math.sqrt(0.5)
+    sizes[0], poses[0, 3:] = size[[1, 0, 2]], (0, 0, quarter, quarter)
+    poses[:, 0] += 0.7
+    body = Body.of_boxes(sizes, poses, [2500.0] * 8)
+    assert body.mass == whole.mass and body.inertia == pytest.approx(whole.inertia, rel=1e-12)
+    assert body.centre == pytest.approx([0.7, 0, 0], abs=1e-12)
 
 
 def test_two_boxes_land_as_one() -> None:
