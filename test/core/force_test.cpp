@@ -75,7 +75,15 @@ int main() {
     ++failures;
   } catch (const std::invalid_argument&) {
   }
+  const BodyBox boxes[] = {{0, {{{0, 0, 0}, {0, 0, 0, 1}}, size}}, {1, {{{0, 0, 0}, {0, 0, 0, 1}}, size}}};
+  copy.set_boxes(boxes);
+  copy.hold(Patches(pair));
+  const long before = allocations;
+  for (int step = 0; step < 10; ++step) copy.advance(0.001, poses, velocities, outside);
+  failures += allocations != before;
+  failures += !(copy.loads()[0].pressing > 1e5);
   copy.forget(pair);
+  copy.set_boxes({});
   copy.set_bodies({bodies, 1});
   copy.advance(0.001, {poses, 1}, {velocities, 1});
   std::printf("%d failures\n", failures);

@@ -99,11 +99,12 @@ inline Mat<double> compliance(const Moving& a, const Moving& b, const Block& blo
     turn_a[i] = cross(block.arm_a, directions[i]) + axes[i];
     turn_b[i] = cross(block.arm_b, directions[i]) + axes[i];
   }
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j <= i; ++j)
+  for (int j = 0; j < 3; ++j) {
+    Vec<double> spun_a = a.inverse_inertia * turn_a[j], spun_b = b.inverse_inertia * turn_b[j];
+    for (int i = j; i < 3; ++i)
       m[i][j] = m[j][i] = (a.inverse_mass + b.inverse_mass) * dot(directions[i], directions[j]) +
-                          dot(turn_a[i], a.inverse_inertia * turn_a[j]) +
-                          dot(turn_b[i], b.inverse_inertia * turn_b[j]);
+                          dot(turn_a[i], spun_a) + dot(turn_b[i], spun_b);
+  }
   return m;
 }
 
@@ -120,8 +121,8 @@ inline double frequency_of(double late, double period) {
 // Catto's soft step: a spring and a damper, implicit in time. Relaxation is without them, but for a
 // stiffness of the patch's own. Rocking is soft where answers are late: the wedge of the overlap,
 // which levels a body, is late then.
-inline void soften(const Patch& patch, const SubStep& step, double depth, const Vec<double>& turned,
-                   const Mat<double>& pressed, Block& block) {
+inline void soften(const Patch& patch, const SubStep& step, double depth, const Moving& a,
+                   const Moving& b, const Mat<double>& pressed, Block& block) {
   bool is_apart = depth < 0.0;
   double h = step.length;
   block.relaxed = {{0.0, 0.0, 0.0}, {is_apart ? -depth / h : 0.0, 0.0, 0.0}, inverse(pressed)};
@@ -137,6 +138,7 @@ inline void soften(const Patch& patch, const SubStep& step, double depth, const 
   double softness = rate / (h * frequency * frequency);
   PressRows& rows = block.pushing;
   if (is_late) {
+    Vec<double> turned = turn(patch.asked_b, b.placed) - turn(patch.asked_a, a.placed);
     rows.softness = softness * Vec<double>{0.0, pressed[1][1], pressed[2][2]};
     rows.bias =
         rate * Vec<double>{0.0, dot(turned, block.shape.axis_1), dot(turned, block.shape.axis_2)};
@@ -174,17 +176,20 @@ inline void prepare(const Patch& patch, const Moving& a, const Moving& b, const 
       compliance(a, b, block, {patch.normal, zero, zero}, {zero, shape.axis_1, shape.axis_2});
   block.closing = pressed[0][0];
   double depth = patch.depth + dot(way_a - way_b, patch.normal);
-  Vec<double> turned = turn(patch.asked_b, b.placed) - turn(patch.asked_a, a.placed);
-  soften(patch, step, depth, turned, pressed, block);
+  soften(patch, step, depth, a, b, pressed, block);
 }
 
 // Give B an impulse at the point and an angular impulse, and A the opposite.
 inline void give(const Block& block, const Vec<double>& impulse, const Vec<double>& turn, Moving& a,
                  Moving& b) {
-  a.linear = a.linear - a.inverse_mass * impulse;
-  a.angular = a.angular - a.inverse_inertia * (cross(block.arm_a, impulse) + turn);
-  b.linear = b.linear + b.inverse_mass * impulse;
-  b.angular = b.angular + b.inverse_inertia * (cross(block.arm_b, impulse) + turn);
+  if (a.inverse_mass > 0.0) {
+    a.linear = a.linear - a.inverse_mass * impulse;
+    a.angular = a.angular - a.inverse_inertia * (cross(block.arm_a, impulse) + turn);
+  }
+  if (b.inverse_mass > 0.0) {
+    b.linear = b.linear + b.inverse_mass * impulse;
+    b.angular = b.angular + b.inverse_inertia * (cross(block.arm_b, impulse) + turn);
+  }
 }
 inline void give_press(const Block& block, const Vec<double>& x, Moving& a, Moving& b) {
   give(block, x[0] * block.normal, x[1] * block.shape.axis_1 + x[2] * block.shape.axis_2, a, b);

@@ -35,7 +35,6 @@ class Islands {
   }
 
   void group(const std::vector<Body>& bodies, const std::vector<Patch>& patches) {
-    make_room(bodies.size(), patches.size());
     number(bodies, patches);
     bodies_.sort(bodies.size(), all.size(), [&](size_t body) { return island_[body]; });
     patches_.sort(patches.size(), all.size(), [&](size_t k) {

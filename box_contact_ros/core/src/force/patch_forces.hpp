@@ -87,7 +87,7 @@ class PatchForces {
 
   PatchForces(std::vector<Body> bodies, const Options& options)
       : bodies_(std::move(bodies)), options_(options), before_(bodies_.size()) {
-    islands_.group(bodies_, patches_);
+    make_room(0);
   }
 
   const std::vector<Body>& bodies() const { return bodies_; }
@@ -105,6 +105,7 @@ class PatchForces {
     bodies_ = std::move(bodies);
     before_.resize(bodies_.size());
     auto count = int32_t(bodies_.size());
+    make_room(patches_.size());
     drop([this, count](const Patch& patch) {
       return !is_of_boxes(patch) || std::max(patch.a, patch.b) >= count || !moves(patch.a, patch.b);
     });
@@ -132,7 +133,7 @@ class PatchForces {
     loads_.clear();
     before_.assign(bodies_.size(), {});
     clock_ = {};
-    islands_.group(bodies_, patches_);
+    is_grouped_ = false;
   }
 
   // Take an answer, and the poses of its question. Pairs that are missing are forgotten. Nothing
@@ -202,6 +203,8 @@ class PatchForces {
                  motion, {},         {}};
     step.first = sub_step(step, least_window);
     step.later = sub_step(step, least_window);
+    if (!is_grouped_) islands_.group(bodies_, patches_);
+    is_grouped_ = true;
     loads_.resize(patches_.size());
     in_chunks([&](const Island& island) { advance(island, step); });
     for (size_t k = 0; k < bodies_.size(); ++k)
@@ -269,7 +272,7 @@ class PatchForces {
     for (size_t k = 0; k < own_.count(); ++k)
       if (body_of(own_.pairs[2 * k]) == body_of(own_.pairs[2 * k + 1])) return false;
     read_sizes();
-    islands_.group(bodies_, patches_);
+    make_room(patches_.size());
     return true;
   }
 
@@ -322,11 +325,13 @@ class PatchForces {
            body_of(patch.box_a) == patch.a && body_of(patch.box_b) == patch.b && patch.a >= 0 &&
            patch.b >= 0 && size_t(std::max(patch.a, patch.b)) < bodies_.size();
   }
+  // So that an advance takes no memory. It doubles, so many answers of more and more pairs are cheap.
   void make_room(size_t patches) {
-    patches_.reserve(patches);
-    next_.reserve(patches);
-    loads_.reserve(patches);
-    islands_.make_room(bodies_.size(), patches);
+    if (patches > room_) room_ = std::max(patches, 2 * room_);
+    patches_.reserve(room_);
+    next_.reserve(room_);
+    loads_.reserve(room_);
+    islands_.make_room(bodies_.size(), room_);
   }
   bool moves(int32_t a, int32_t b) const {
     return bodies_[size_t(a)].is_free() || bodies_[size_t(b)].is_free();
@@ -335,7 +340,7 @@ class PatchForces {
   template <class Condition>
   void drop(Condition condition) {
     patches_.erase(std::remove_if(patches_.begin(), patches_.end(), condition), patches_.end());
-    islands_.group(bodies_, patches_);
+    is_grouped_ = false;
   }
 
   Held take(const bc_patches& answer, const bc_pose* poses) {
@@ -356,8 +361,8 @@ class PatchForces {
       return Held::pair_twice;
     keep_impulses();
     patches_.swap(next_);
-    islands_.group(bodies_, patches_);
-    loads_.reserve(patches_.size());
+    is_grouped_ = false;
+    make_room(patches_.size());
     return Held::all;
   }
 
@@ -609,6 +614,8 @@ class PatchForces {
   Own own_;
   // Memory that calls use again.
   Islands islands_;
+  size_t room_ = 0;          // for patches
+  bool is_grouped_ = false;  // whether islands are those of the patches
   std::vector<bc_size> sizes_;
   std::vector<bc_pose> box_poses_;
   std::vector<BoxPair> keys_;

@@ -151,11 +151,15 @@ inline Mat<double> inverse_inertia_of(const Body& body, const Placed& placed) {
   return m;
 }
 
+// A body that turns less in a step [rad] has no gyroscopic change: it is beyond the digits of ω.
+constexpr double least_turn = 0x1p-54;
+
 // How much the angular velocity ω of a body that nothing touches changes in a step h; all in its frame.
 //
 // Implicit midpoint, which keeps the energy, by two Newton steps: I·Δ = −h·ω̄ × I·ω̄ with ω̄ = ω + Δ/2.
 // An explicit step gains energy without bound. What Newton leaves of the energy is scaled off.
 inline Vec<double> gyroscopic_change(const Body& body, const Vec<double>& angular, double h) {
+  if (h * largest(abs(angular)) < least_turn) return {0.0, 0.0, 0.0};
   const Vec<double>& inverse_inertia = body.inverse_inertia;
   Vec<double> ones{1.0, 1.0, 1.0}, inertia = ones / inverse_inertia;
   // Euler's equations: the rate of ω0 is share[0]·ω1·ω2, and so on.
