@@ -89,21 +89,22 @@ inline void bound(Vec<double>& rub, double limit) {
   if (squared > limit * limit) rub = (limit / std::sqrt(squared)) * rub;
 }
 
-// How the velocities along three rows change by impulses along them. A row is a direction at the
-// point and an axis.
-inline Mat<double> compliance(const Moving& a, const Moving& b, const Block& block,
-                              const Vec<double> (&directions)[3], const Vec<double> (&axes)[3]) {
+// How the velocities along three rows change by impulses along them. A row turns the bodies about an
+// axis through their centres of mass, and the first `linear` rows have a direction as well.
+template <int linear>
+Mat<double> compliance(const Moving& a, const Moving& b, const Vec<double> (&turn_a)[3],
+                       const Vec<double> (&turn_b)[3], const Vec<double> (&directions)[linear]) {
   Mat<double> m;
-  Vec<double> turn_a[3], turn_b[3];
-  for (int i = 0; i < 3; ++i) {
-    turn_a[i] = cross(block.arm_a, directions[i]) + axes[i];
-    turn_b[i] = cross(block.arm_b, directions[i]) + axes[i];
-  }
+  bool a_moves = a.inverse_mass > 0.0, b_moves = b.inverse_mass > 0.0;
   for (int j = 0; j < 3; ++j) {
-    Vec<double> spun_a = a.inverse_inertia * turn_a[j], spun_b = b.inverse_inertia * turn_b[j];
-    for (int i = j; i < 3; ++i)
-      m[i][j] = m[j][i] = (a.inverse_mass + b.inverse_mass) * dot(directions[i], directions[j]) +
-                          dot(turn_a[i], spun_a) + dot(turn_b[i], spun_b);
+    Vec<double> spun_a = a_moves ? a.inverse_inertia * turn_a[j] : Vec<double>{0.0, 0.0, 0.0};
+    Vec<double> spun_b = b_moves ? b.inverse_inertia * turn_b[j] : Vec<double>{0.0, 0.0, 0.0};
+    for (int i = j; i < 3; ++i) {
+      double moved = i < linear ? (a.inverse_mass + b.inverse_mass) *
+                                      dot(directions[i % linear], directions[j % linear])
+                                : 0.0;
+      m[i][j] = m[j][i] = moved + dot(turn_a[i], spun_a) + dot(turn_b[i], spun_b);
+    }
   }
   return m;
 }
@@ -167,13 +168,16 @@ inline void prepare(const Patch& patch, const Moving& a, const Moving& b, const 
   block.shape = shape;
   block.friction = patch.friction;
 
-  Vec<double> zero{0.0, 0.0, 0.0};
-  Mat<double> rubbed = compliance(a, b, block, {shape.axis_1, shape.axis_2, zero},
-                                  {zero, zero, shape.radius * patch.normal});
+  const Vec<double>&arm_a = block.arm_a, &arm_b = block.arm_b;
+  Vec<double> spin = shape.radius * patch.normal;
+  Mat<double> rubbed = compliance<2>(
+      a, b, {cross(arm_a, shape.axis_1), cross(arm_a, shape.axis_2), spin},
+      {cross(arm_b, shape.axis_1), cross(arm_b, shape.axis_2), spin}, {shape.axis_1, shape.axis_2});
   block.rub_mass = inverse(rubbed);
   block.least_rub_mass = 1.0 / std::max(std::max(rubbed[0][0], rubbed[1][1]), rubbed[2][2]);
   Mat<double> pressed =
-      compliance(a, b, block, {patch.normal, zero, zero}, {zero, shape.axis_1, shape.axis_2});
+      compliance<1>(a, b, {cross(arm_a, patch.normal), shape.axis_1, shape.axis_2},
+                    {cross(arm_b, patch.normal), shape.axis_1, shape.axis_2}, {patch.normal});
   block.closing = pressed[0][0];
   double depth = patch.depth + dot(way_a - way_b, patch.normal);
   soften(patch, step, depth, a, b, pressed, block);
