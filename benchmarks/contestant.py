@@ -13,13 +13,15 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from box_contact_ros.core import FORCE
+from box_contact_ros.core import FORCE, native
 from box_contact_ros.models import make_model
+from box_contact_ros.networks.models import GROUP, INPUTS_TOGETHER, mlp_numbers
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
@@ -27,10 +29,16 @@ from box_contact_ros.solver.pose import rotation_matrix
 
 from .pose_sets import Pairs
 
-MODELS = ('exact', 'mlp', 'paper', *(f'soup-{n}' for n in (8, 10, 12, 14, 16, 18, 20, 22)))
-"""Our contestants; the soups are those of the paper's Table 3."""
+MODELS = ('exact', 'mlp', 'paper', *(f'soup-{n}' for n in (1, 8, 10, 12, 14, 16, 18, 20, 22)))
+"""Our contestants; the soups are the coarsest, and those of the paper's Table 3."""
 CORE_MODELS = ('exact', 'mlp')
 """Models in C++ with volume and covariance: each instruction set of the machine is measured."""
+WEIGHTS = resource_path('weights', 'mlp.safetensors').parent
+MLP_SIZES = sorted((path.stem for path in WEIGHTS.glob('mlp-*.safetensors')),
+                   key=lambda name: [int(units) for units in name.split('-')[1:]])
+"""Other sizes of the network of `mlp` that are shipped, by their weights files."""
+AT_REST = Path(__file__).with_name('paper') / 'weights' / 'paper-at-rest.safetensors'
+"""Weights of `paper` for cubes that lie on each other: `python -m training paper --scene`."""
 ENDING = 5.0  # time that a subprocess has to end after its answer [s]
 MOST_CONTACTS = 16  # contacts asked for; two boxes have at most eight
 
@@ -123,10 +131,23 @@ def ours(model: Any, *, weights: str | None = None, name: str = '') -> Contestan
         prepare_batch=None if name.startswith('soup') else prepare_batch)  # it loops over pairs
 
 
+def idle_mlp() -> native.Mlp:
+    """Return `mlp` with the last layer of its network zeroed: what its geometry alone knows."""
+    numbers = mlp_numbers(resource_path('weights', 'mlp.safetensors'))
+    inputs = -(-int(numbers[2]) // INPUTS_TOGETHER) * INPUTS_TOGETHER
+    groups = -(-int(numbers[3]) // GROUP)
+    numbers[-groups * GROUP * (1 + inputs):] = 0.0
+    return native.Mlp(numbers)
+
+
 def other_networks() -> list[Contestant]:
-    """Return `paper` on containers with x, y and z as outputs."""
-    place = resource_path('weights', 'paper-12.192x2.438x2.591-place.safetensors')
-    return [ours('paper', weights=str(place), name='paper-place')]
+    """Return `mlp` by its other sizes and idle, and `paper` by weights for other scenes."""
+    place = WEIGHTS / 'paper-12.192x2.438x2.591-place.safetensors'
+    return [*(ours('mlp', weights=str(WEIGHTS / f'{name}.safetensors'), name=name)
+              for name in MLP_SIZES),
+            ours(idle_mlp(), name='mlp, idle'),
+            ours('paper', weights=str(place), name='paper-place'),
+            ours('paper', weights=str(AT_REST), name='paper-at-rest')]
 
 
 def _deepest(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> np.ndarray:

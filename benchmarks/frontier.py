@@ -23,10 +23,11 @@ from pathlib import Path
 
 from box_contact_ros.core import instruction_sets, native
 
-from . import output
+from . import output, settled
 from .accuracy import Summary
 from .contestant import (
     CORE_MODELS,
+    MLP_SIZES,
     MODELS,
     Contestant,
     in_subprocess,
@@ -49,24 +50,35 @@ from .trials import (
     measure_all,
 )
 
-TIMED_SETS = {**SETS, 'just apart': apart}
-IN_SHORT = ('exact', 'mlp', 'paper', 'paper-place', 'soup-8', 'soup-22')
+TIMED_SETS = {**SETS, 'just apart': apart, 'settled': settled.at_rest,
+              'settled cubes': settled.cubes_at_rest}
+IN_SHORT = ('exact', 'mlp', 'mlp-16-16', 'mlp-8-8', 'mlp, idle', 'paper', 'paper-place',
+            'paper-at-rest', 'soup-1', 'soup-8', 'soup-22')
 """Models in the first table."""
-QUICK_MODELS = ('exact', 'mlp', 'paper', 'soup-8')
+QUICK_MODELS = ('exact', 'mlp', 'paper', 'soup-1', 'soup-8')
 ODD_NORMAL = 10.0  # error of an engine's normal that is explained [deg]
 
-SHOWN = {'exact': ('exact', 'C0', 0), 'mlp': ('mlp', 'C2', 0),
+SIZES = (*MLP_SIZES, 'mlp')
+"""The network of `mlp` by size; `mlp` itself has 32-32."""
+SHOWN = {'exact': ('exact', 'C0', 0), 'mlp-8-8': ('mlp, 8-8', 'C2', 4),
+         'mlp-16-16': ('16-16', 'C2', 0), 'mlp': ('32-32', 'C2', -4),
+         'mlp, idle': ('mlp without its network', 'C8', 5),
          'paper': ("the paper's network", 'C4', 4),
-         'paper-place': ('the same, output x y z', 'C4', -2),
-         'soup-8': ('polygon soup, N = 8', 'C5', -5),
-         'MuJoCo mj_collision': ('MuJoCo, best point', 'C1', 0)}
+         'paper-at-rest': ('the same, for this scene', 'C4', -2),
+         'soup-1': ('polygon soup, 12 triangles', 'C5', 5),
+         'soup-8': ('N = 8', 'C5', -5),
+         'MuJoCo mj_collision': ('MuJoCo, best point', 'C1', 0),
+         'PyBullet getContactPoints': ('Bullet, best point', 'C6', 5)}
 """Contestant: how the picture calls it, its colour, and how much higher the name stands [pt]."""
-PANELS = {'containers': 'A 12 m container on another, swaying', 'random cubes': 'Cubes in any pose'}
-"""The sets of poses that are drawn, with the titles."""
+PANELS = {'Goods at rest': ('settled', 'settled cubes'),
+          'A 12 m container on another, swaying': ('containers',)}
+"""Titles, and the sets that are drawn: of each contestant the first that it answers."""
+AXES = {'call_p50': ('time of a call from Python [µs]', 1e-3, (0.1, 3e3)),
+        'batch_p50': ('time of a pair in a batch [ns]', 1.0, (20.0, 1e3))}
+"""Times in the CSV: what they are, by which they are multiplied, and what the picture shows: names
+stand on the right of their points."""
 ERRORS = (1e-2, 1e2)
 """Errors that are drawn to scale [%]; 0 has a band of its own below."""
-TIMES = (0.1, 2e4)
-"""Times that the picture shows [µs]: names stand on the right of their points."""
 
 
 def measure_core(seed: int, plan: Plan) -> list[FrontierRow]:
@@ -100,7 +112,7 @@ def odd_answers(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> I
 
 
 def in_short(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> str:
-    """Return the short table: containers and stacks, what a crane has all day."""
+    """Return the short table: containers and goods at rest, what a crane has all day."""
     rivals, lines = [engine.name for engine in engines], []
     for name in (*IN_SHORT, *rivals):
         for instruction_set in dict.fromkeys(row.instruction_set for row in rows
@@ -109,7 +121,7 @@ def in_short(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> str:
                     if (row.name, row.instruction_set) == (name, instruction_set)}
             if 'containers' not in mine:
                 continue
-            shown, stack = mine['containers'], mine.get('stacks')
+            shown, rest = mine['containers'], mine.get('settled')
             normals = [row.errors.normal[1] for row in mine.values()
                        if not math.isnan(row.errors.normal[1])]
             lines.append([
@@ -117,14 +129,14 @@ def in_short(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> str:
                 f'{number(shown.single[0] / 1e3)} / {number(shown.single[1] / 1e3)}',
                 number(shown.batch), shown.best if name in rivals else '–',
                 *[number(row.errors.points['all'].p99) if row and row.errors.points else '–'
-                  for row in (shown, stack)],
+                  for row in (shown, rest)],
                 number(max(normals, default=math.nan)),
                 f'{sum(row.errors.missed for row in mine.values())} of '
                 f'{sum(row.judged for row in mine.values()):,}',
                 sum(row.errors.invented for row in mine.values())])
     return markdown_table(
         ['', 'single call, p50 / p99 [µs]', 'batch [ns per pair]', 'best point',
-         'point error p99, containers [%]', 'stacks [%]', 'normal, worst [°]', 'missed',
+         'point error p99, containers [%]', 'settled [%]', 'normal, worst [°]', 'missed',
          'invented'], lines)
 
 
@@ -148,9 +160,7 @@ def write_page(folder: Path, args: Sequence[str] | None, rows: Sequence[Frontier
         in_short=in_short(rows, engines), odd='\n'.join(
             f'{place}. {line}' for place, line in enumerate(odd_answers(rows, engines), start=1)
         ) or 'None.',
-        single=by_exact(by['mlp', 'containers'], rows)[0],
-        containers=by_exact(by['mlp', 'containers'], rows)[1],
-        stacks=by_exact(by['mlp', 'stacks'], rows)[1],
+        traded=traded(rows),
         paper=by['paper', 'random cubes'].errors.points['all'].p50,
         verdict=VERDICT, few_pairs=FEW_PAIRS, timed_pairs=plan.timed_pairs,
         calls=calls_table(engines))
@@ -179,39 +189,62 @@ def csv_rows(rows: Sequence[FrontierRow], contestants: Sequence[Contestant],
                     'instruction_set': row.instruction_set}
 
 
-def shown_points(table: Path, of_set: str) -> dict[str, tuple[float, float]]:
-    """Return the time of a call [µs] and the p99 point error [%] by contestant, from a CSV.
+def shown_points(table: Path, of_sets: Sequence[str], column: str,
+                 ) -> dict[str, tuple[float, float]]:
+    """Return a time of the CSV and the p99 point error [%] by contestant.
 
     An engine with several ways to make one point has the best of them. Models have the fastest
     instruction set, whose rows come first.
     """
     points: dict[str, tuple[float, float]] = {}
-    for row in output.read_csv(table):
-        if row['set'] == of_set and row['class'] == 'all' and row['contestant'] in SHOWN:
-            time, error = float(row['call_p50']) / 1e3, float(row['point_p99'])
-            before = points.get(row['contestant'], (time, math.inf))
-            points[row['contestant']] = before[0], min(before[1], error)
+    for of_set in of_sets:
+        here: dict[str, tuple[float, float]] = {}
+        for row in output.read_csv(table):
+            name, time = row['contestant'], float(row[column] or 'nan')
+            if (row['set'], row['class']) == (of_set, 'all') and name in SHOWN and time > 0.0:
+                before = here.get(name, (time, math.inf))
+                here[name] = before[0], min(before[1], float(row['point_p99']))
+        points = here | points
     return points
 
 
 def draw(path: Path, table: Path) -> None:
-    """Draw the point error of some contestants over the time of a call, from the CSV."""
-    figure, axes = output.subplots(1, len(PANELS), (10.5, 4.4), sharey=True)
-    for axis, (of_set, title) in zip(axes[0], PANELS.items()):
-        height = output.log_errors(axis, *ERRORS)
-        axis.set_xscale('log')
-        axis.xaxis.set_major_formatter('{x:g}')
-        axis.set(xlim=TIMES, xlabel='time of a call from Python [µs]', title=title)
-        named = set()
-        for name, (time, error) in shown_points(table, of_set).items():
-            label, colour, rise = SHOWN[name]
-            axis.plot(time, height(error), 'o', color=colour, markersize=7, alpha=0.7)
-            if label not in named:
-                axis.annotate(label, (time, height(error)), xytext=(9, rise), va='center',
+    """Draw the point errors of some contestants over both times, from the CSV."""
+    figure, axes = output.subplots(len(AXES), len(PANELS), (10.5, 8.8), sharey=True)
+    for line, (column, (label, factor, limits)) in zip(axes, AXES.items()):
+        for axis, (title, of_sets) in zip(line, PANELS.items()):
+            height = output.log_errors(axis, *ERRORS)
+            axis.set_xscale('log')
+            axis.xaxis.set_major_formatter('{x:g}')
+            axis.set(xlim=limits, xlabel=label, title=title)
+            found = shown_points(table, of_sets, column)
+            sizes = [found[name] for name in SIZES if name in found]
+            axis.plot([factor * time for time, _ in sizes], [height(error) for _, error in sizes],
+                      color=SHOWN['mlp'][1], linewidth=1)
+            for name, (time, error) in found.items():
+                shown, colour, rise = SHOWN[name]
+                axis.plot(factor * time, height(error), 'o', color=colour, markersize=7, alpha=0.7)
+                axis.annotate(shown, (factor * time, height(error)), xytext=(9, rise), va='center',
                               textcoords='offset points', color=colour, fontsize=10)
-            named.add(label)
-    axes[0, 0].set_ylabel('point error, p99 [% of the edge]')
+    for axis in axes[:, 0]:
+        axis.set_ylabel('point error, p99 [% of the edge]')
     figure.savefig(path, metadata={'Software': None})
+
+
+def traded(rows: Sequence[FrontierRow]) -> str:
+    """Return what `mlp` costs in a batch and how far it is off, by size and on both panels."""
+    lines = []
+    for name in ('exact', *reversed(SIZES), 'mlp, idle'):
+        line: list[object] = [f'`{name}`']
+        for of_set in ('settled', 'containers'):
+            row = next(row for row in rows if (row.name, row.set, row.instruction_set)
+                       == (name, of_set, native.instruction_set))
+            call, batch = by_exact(row, rows)
+            point = row.errors.points['all']
+            line += [f'{call:.2f}', f'{batch:.2f}', number(point.p50), number(point.p99)]
+        lines.append(line)
+    return markdown_table(['', *(f'{of_set}: {what}' for of_set in ('settled', 'containers')
+                                 for what in ('call', 'batch', 'p50 [%]', 'p99 [%]'))], lines)
 
 
 def main(args: Sequence[str] | None = None) -> int:

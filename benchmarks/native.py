@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -25,8 +26,12 @@ from typing import NamedTuple
 import numpy as np
 
 from box_contact_ros.core import FORCE, instruction_sets
+from box_contact_ros.networks.models import SHIPPED_PAPERS, PaperWeights, mlp_numbers
+from box_contact_ros.networks.weights_file import load_weights
+from box_contact_ros.resources import resource_path
 
 from . import output, settled
+from .contestant import MLP_SIZES
 from .output import markdown_table, percentiles
 from .pose_sets import FLUSH, LOADS, SETS, Pairs, drawn
 from .timing import by_round, pinned, usable_cores
@@ -44,6 +49,7 @@ SHOWN = f'settled by {settled.OURS}', 'containers'
 UNIT = 'mjc_BoxBox, single'
 OURS = tuple(f'exact {finds}, {way}' for way in ('single', 'batch')
              for finds in ('volume', 'covariance'))
+ROOT = Path(__file__).parents[1]
 CALLS_FOLDER = Path(__file__).with_name('native_calls')
 LIBRARY = Path(sys.prefix, 'lib', 'libbox_contact.so')  # its headers are in include/
 OPTIONAL = {'coal': 'pip install coal cmeel-eigen', 'bullet': 'apt install libbullet-dev'}
@@ -92,8 +98,19 @@ def package_flags(name: str) -> list[str] | None:
     return flags + [f'-Wl,-rpath,{flag[2:]}' for flag in flags if flag.startswith('-L')]
 
 
-def compiled(folder: Path) -> tuple[Path, list[str]]:
+def library_flags(instruction_set: str) -> list[str]:
+    """Return the flags by which CMakeLists.txt compiles a kernel."""
+    text = (ROOT / 'CMakeLists.txt').read_text('utf-8')
+    own, shared = (re.search(pattern, text, re.DOTALL) for pattern in (
+        rf'set\(FLAGS_{instruction_set} ([^)]*)\)', r'\n    (-ffp-contract=off[^$]*)\$<'))
+    assert own and shared
+    return [*own[1].split(), *shared[1].split(), '-falign-loops=32', '-falign-jumps=16']
+
+
+def compiled(folder: Path, sets: Sequence[str]) -> tuple[Path, list[str]]:
     """Compile native_calls/ into a folder; return the program, and the rivals that are left out.
+
+    sets: the instruction sets that it is for.
 
     Raises `RuntimeError` with what the compiler reports.
     """
@@ -104,16 +121,43 @@ def compiled(folder: Path) -> tuple[Path, list[str]]:
     options = {name: package_flags(name) for name in OPTIONAL}
     rivals = {name: flags for name, flags in options.items() if flags is not None}
     flags = [flag for name, more in rivals.items() for flag in (f'-DWITH_{name.upper()}', *more)]
-    done = subprocess.run(
-        [os.environ.get('CXX', 'g++'), '-std=c++17', '-O2', '-Wall', '-Wextra',
-         f'-I{Path(sys.prefix, "include")}', f'-I{mujoco / "include"}',
+    compiler = [os.environ.get('CXX', 'g++'), '-std=c++17', '-Wall', '-Wextra',
+                f'-I{Path(sys.prefix, "include")}']
+    networks = {name: str(folder / f'{name}.o') for name in sets}
+    for name, made in networks.items():
+        run_compiler([*compiler, *library_flags(name), '-Wno-psabi', '-c',
+                      f'-DADD_NETWORKS=add_networks_{name}', str(CALLS_FOLDER / 'networks.cpp'),
+                      '-o', made])
+        flags += [f'-DWITH_{name.upper()}', made]
+    run_compiler(
+        [*compiler, '-O2', f'-I{mujoco / "include"}',
          *[str(CALLS_FOLDER / f'{name}.cpp') for name in ('main', 'mujoco', 'ours', *rivals)],
          '-o', str(folder / 'native'), str(LIBRARY),
          str(next(mujoco.glob('libmujoco.so*'))), f'-Wl,-rpath,{LIBRARY.parent}',
-         f'-Wl,-rpath,{mujoco}', *flags], capture_output=True, text=True)
+         f'-Wl,-rpath,{mujoco}', *flags])
+    return folder / 'native', [name for name in OPTIONAL if name not in rivals]
+
+
+def run_compiler(command: Sequence[str]) -> None:
+    """Run a compiler; raises `RuntimeError` with what it reports."""
+    done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
         raise RuntimeError(f'native_calls does not compile:\n{done.stderr}')
-    return folder / 'native', [name for name in OPTIONAL if name not in rivals]
+
+
+def networks_for(pairs: Pairs) -> bytes:
+    """Return the networks that answer for these pairs, as native_calls/ reads them.
+
+    They are the other sizes of `mlp`, and the paper's where both boxes have a size that it knows.
+    """
+    networks = {name: mlp_numbers(resource_path('weights', f'{name}.safetensors'))
+                for name in MLP_SIZES}
+    for name in SHIPPED_PAPERS:
+        paper = PaperWeights(load_weights(resource_path('weights', f'{name}.safetensors')))
+        if paper.fits(pairs.size_a, pairs.size_b).all():
+            networks['paper'] = paper.numbers
+    return b''.join(np.array([len(name), len(numbers)]).tobytes() + name.encode()
+                    + numbers.tobytes() for name, numbers in networks.items())
 
 
 def calls_shown(missing: Sequence[str]) -> str:
@@ -174,8 +218,9 @@ def each_contact(program: Path, by_set: Mapping[str, Pairs], instruction_set: st
 
 def timed(program: Path, pairs: Pairs, instruction_set: str, *, rounds: int, calls: int) -> OnSet:
     """Return times and errors of all contestants on one set, with one instruction set."""
-    answers = program.parent / 'answers'
-    first, names, *lines = run(program, pairs, instruction_set, rounds, calls, answers)
+    answers, networks = program.parent / 'answers', program.parent / 'networks'
+    networks.write_bytes(networks_for(pairs))
+    first, names, *lines = run(program, pairs, instruction_set, rounds, calls, answers, networks)
     if first != instruction_set:
         raise RuntimeError(f'{instruction_set} was asked for, and the library answered {first!r}')
     times: dict[str, list[float]] = {name: [] for name in names.split('\t')}
@@ -288,7 +333,7 @@ def main(args: Sequence[str] | None = None) -> int:
     found: dict[str, dict[str, OnSet]] = {name: {} for name in names}
     with tempfile.TemporaryDirectory() as made:
         try:
-            program, missing = compiled(Path(made))
+            program, missing = compiled(Path(made), names)
         except RuntimeError as error:
             print(f'native: {error}', file=sys.stderr)
             return 2

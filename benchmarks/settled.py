@@ -61,6 +61,17 @@ def at_rest(rng: np.random.Generator, n: int) -> Pairs:
     return pairs.rows(rng.permutation(len(pairs.size))[:n])
 
 
+def cubes_at_rest(rng: np.random.Generator, n: int) -> Pairs:
+    """Return the cubes among goods at rest, for which the paper's network can be trained."""
+    pairs = at_rest(rng, len(touching(learnt=False).size))
+    return pairs.rows(cubes(pairs)).rows(slice(n))
+
+
+def cubes(pairs: Pairs) -> np.ndarray:
+    """Return which pairs (n,) are cubes of the edge 1 m."""
+    return (np.hstack([pairs.size_a, pairs.size_b]) == 1.0).all(axis=1)
+
+
 def write(file: Path, recorded: Recorded) -> None:
     """Write recorded pairs."""
     (scene_names, scene), (engine_names, engine) = (

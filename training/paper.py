@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks import settled
 from benchmarks.errors import point_errors
 from benchmarks.output import percentiles
 from benchmarks.paper.dataset import INPUTS, OUTPUTS, PAPER_COUNTS, SETS, Patterns, spherical
@@ -30,7 +31,17 @@ from box_contact_ros.networks.models import in_file_name, is_cube
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix
 
-SCENES: dict[str, Generator] = {**POSE_SETS, **LOADS}
+from .samples import nearly_settled
+
+
+def cubes_nearly_settled(rng: np.random.Generator, n: int) -> Pairs:
+    """Draw cubes on each other: recorded ones, each turned and moved by up to a thousandth."""
+    pairs = settled.touching(learnt=True)
+    pairs = nearly_settled(rng, 2 * n, pairs.rows(settled.cubes(pairs)))
+    return pairs.rows(pairs.contacts().colliding).rows(slice(n))
+
+
+SCENES: dict[str, Generator] = {**POSE_SETS, **LOADS, 'cubes at rest': cubes_nearly_settled}
 ANGLES, PLACE = 'angles', 'place'
 """Outputs: the paper's four angles, or x, y and z of the impact point."""
 SETTINGS = {ANGLES: PaperSettings((6, 20, 18, 4), networks=16, epochs=500, rate=0.1, initial=0.7),

@@ -91,9 +91,9 @@ def draw_samples(make: Generator, seed: Sequence[int], n: int, progress: bool = 
         for start in starts])
 
 
-def nearly_settled(rng: np.random.Generator, n: int) -> Pairs:
+def nearly_settled(rng: np.random.Generator, n: int, chosen: Pairs | None = None) -> Pairs:
     """Draw recorded pairs of goods at rest, each turned and moved by up to a thousandth."""
-    pairs = settled.touching(learnt=True)
+    pairs = chosen or settled.touching(learnt=True)
     pairs = pairs.rows(rng.integers(0, len(pairs.edge), n))
     little = log_uniform(rng, 1e-8, 1e-3, (2, n)) * (rng.random((2, n)) < 0.5)
     b = pairs.pose_b.copy()

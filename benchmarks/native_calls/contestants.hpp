@@ -64,6 +64,9 @@ Contestant single(const std::string& name, size_t calls, Call call, Read read) {
 void add_ours(const Poses& poses, size_t calls, Contestants& all);
 // Prints for each contact the time of a call of `exact` and of `mlp` [ns], the least of all passes.
 void time_each_contact(const Poses& poses, size_t passes);
+// Adds the networks of a file: for each the lengths of its name and of its numbers, int64, and both.
+void add_networks_avx2(const Poses& poses, size_t calls, const char* path, Contestants& all);
+void add_networks_avx512(const Poses& poses, size_t calls, const char* path, Contestants& all);
 void add_mujoco(const Poses& poses, size_t calls, Contestants& all);
 #ifdef WITH_COAL
 void add_coal(const Poses& poses, size_t calls, Contestants& all);

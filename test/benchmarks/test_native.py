@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from benchmarks import native, settled
+from benchmarks.contestant import MLP_SIZES
 from benchmarks.pose_sets import FLUSH, LOADS, SETS, Pairs
 from box_contact_ros.core import instruction_sets
 
@@ -26,7 +27,7 @@ def containers() -> Pairs:
 @pytest.fixture(scope='module')
 def program(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
     pytest.importorskip('mujoco')
-    return native.compiled(tmp_path_factory.mktemp('native'))
+    return native.compiled(tmp_path_factory.mktemp('native'), instruction_sets()[-1:])
 
 
 @needs_compiler
@@ -38,7 +39,8 @@ def test_all_answer_as_exact(program: tuple[Path, list[str]], containers: Pairs)
     pose_b[::2, :3] *= 1.5  # these are apart
     found = native.timed(path, containers._replace(pose_b=pose_b), instruction_sets()[-1],
                          rounds=1, calls=n)
-    expected = {'mjc_BoxBox, single', 'mj_geomDistance, single', 'exact covariance, batch'}
+    expected = {'mjc_BoxBox, single', 'mj_geomDistance, single', 'exact covariance, batch',
+                *(f'{name} volume, batch' for name in MLP_SIZES), 'paper, single'}
     expected |= {'Coal ComputeCollision, single'} if 'coal' not in missing else set()
     expected |= {'Bullet btBoxBoxDetector, single'} if 'bullet' not in missing else set()
     assert expected <= set(found)

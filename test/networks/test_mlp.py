@@ -18,6 +18,7 @@ from safetensors.numpy import save_file
 pytest.importorskip('benchmarks.pose_sets')
 
 from benchmarks import settled
+from benchmarks.contestant import MLP_SIZES
 from benchmarks.errors import contact_errors
 from benchmarks.pose_sets import LOADS, SETS, Generator, Pairs, at_depth, log_uniform
 from benchmarks.steps import drawn_paths, largest_steps
@@ -29,7 +30,7 @@ from box_contact_ros.core import (
     UNITS_MAX,
     native,
 )
-from box_contact_ros.networks.models import core_numbers, mlp_numbers
+from box_contact_ros.networks.models import core_numbers, mlp_numbers, read_mlp
 from box_contact_ros.networks.weights_file import Network, WeightsError, load_weights
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.contact import FIELDS, Contacts
@@ -424,3 +425,14 @@ def test_weights_with_another_meaning_are_refused(
 def test_numbers_that_are_no_network_are_refused(numbers: np.ndarray) -> None:
     with pytest.raises(ValueError, match='the network does not fit'):
         native.Mlp(numbers)
+
+
+@pytest.mark.parametrize('name', MLP_SIZES)
+def test_other_sizes_are_shipped(name: str) -> None:
+    """Less accurate, but as sound."""
+    model = read_mlp(resource_path('weights', f'{name}.safetensors'))
+    pairs = drawn('containers')
+    found = pairs.contacts(ContactSolver(model=model))
+    assert_sound(pairs, found)
+    errors = contact_errors(found, pairs.contacts(), pairs.edge).point
+    assert np.percentile(errors, 99) < 6.0
