@@ -37,7 +37,7 @@ from .contestant import (
 )
 from .engines import installed
 from .output import markdown_table, number
-from .pose_sets import SETS, apart
+from .pose_sets import SETS, apart, landings
 from .timing import by_round, pinned, usable_cores
 from .trials import (
     FEW_PAIRS,
@@ -50,7 +50,7 @@ from .trials import (
     measure_all,
 )
 
-TIMED_SETS = {**SETS, 'just apart': apart, 'settled': settled.at_rest,
+TIMED_SETS = {**SETS, 'just apart': apart, 'landings': landings, 'settled': settled.at_rest,
               'settled cubes': settled.cubes_at_rest}
 IN_SHORT = ('exact', 'mlp', 'mlp-16-16', 'mlp-8-8', 'mlp, idle', 'paper', 'paper-place',
             'paper-at-rest', 'soup-1', 'soup-8', 'soup-22')
