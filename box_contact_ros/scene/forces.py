@@ -170,7 +170,7 @@ class PatchForces:
     """
 
     def __init__(self, bodies: Sequence[Body], *, friction: float = FRICTION, substeps: int = 4,
-                 iterations: int = 4, relaxations: int = 1, threads: int = 1) -> None:
+                 iterations: int = 4, relaxations: int = 2, threads: int = 1) -> None:
         """Begin without patches.
 
         friction: Coulomb's μ of pairs without one of their own. substeps: equal parts of a step;

@@ -429,7 +429,7 @@ LIMITS = {
     'explanation/force.md': (
         f'has {STEPS["substeps"].default} sub-steps',
         f'up to {STEPS["iterations"].default} times',
-        f'{STEPS["relaxations"].default} more iteration ',
+        f'{STEPS["relaxations"].default} more iterations ',
         f'{constant("force/rectangle.hpp", "torsion_share")} times the mean',
         f'last {constant("force/patch_forces.hpp", "intervals_kept")} intervals',
         f'{1 / float(constant(FORCES, "window_shrinkage"))} of the window before',

@@ -85,7 +85,7 @@ typedef struct bc_force_options {
   double friction; /* Coulomb's μ [1] */
 } bc_force_options;
 
-#define BC_DEFAULT_FORCE_OPTIONS {sizeof(bc_force_options), 4, 4, 1, 1, 0.5}
+#define BC_DEFAULT_FORCE_OPTIONS {sizeof(bc_force_options), 4, 4, 2, 1, 0.5}
 
 /* What an advance leads to: arrays of a row for each body; NULL: not wanted. The poses and velocities
  * may be those that are given. */

@@ -56,7 +56,7 @@ class PatchForces {
   struct Options {
     int substeps = 4;       // equal parts of an advance; heavy bodies on light ones need them
     int iterations = 4;     // of sequential impulses in a sub-step, at most
-    int relaxations = 1;    // iterations more, at most, which remove the speed of pushing out
+    int relaxations = 2;    // iterations more, at most, which remove the speed of pushing out
     int threads = 1;        // at most
     double friction = 0.5;  // Coulomb's μ
   };
