@@ -341,6 +341,9 @@ struct PatchBox {
 //
 // Axes are mirrored so that 0–2 are not above 0.
 constexpr int features = 19;
+// A smaller share [1] of the sum of three counts as none. The digits of float32 end before it, and
+// products of the least cuts with it would be denormal numbers, which take a hundred times as long.
+constexpr float least_share = 1e-8F;
 
 template <class F>
 struct Cuts {
@@ -354,7 +357,10 @@ struct Cuts {
     for (int n = 0; n < 2; ++n) {
       Triple<F>(&share)[3] = slabs[n].share;
       Triple<F> scale = inverses<F>((abs(share[0]) + abs(share[1])) + abs(share[2]));
-      for (int i = 0; i < 3; ++i) share[i] = scale * share[i];
+      for (int i = 0; i < 3; ++i) {
+        share[i] = scale * share[i];
+        share[i] = choose(abs(share[i]) >= uniform(splat<F>(least_share)), share[i], zero);
+      }
       slabs[n].plus = scale * slabs[n].plus;
       slabs[n].minus = scale * slabs[n].minus;
       auto cut = [&](const Triple<F>& side) { return min(whole, max(one - side, zero)); };
