@@ -62,13 +62,13 @@ SIZES = (*MLP_SIZES, 'mlp')
 """The network of `mlp` by size; `mlp` itself has 32-32."""
 SHOWN = {'exact': ('exact', 'C0', 0), 'mlp-8-8': ('mlp, 8-8', 'C2', 4),
          'mlp-16-16': ('16-16', 'C2', 0), 'mlp': ('32-32', 'C2', -4),
-         'mlp, idle': ('mlp without its network', 'C8', 5),
-         'paper': ("the paper's network", 'C4', 4),
-         'paper-at-rest': ('the same, for this scene', 'C4', -2),
-         'soup-1': ('polygon soup, 12 triangles', 'C5', 5),
+         'mlp, idle': ('mlp without its network', 'C8', -9),
+         'paper': ("the paper's network", 'C4', 0),
+         'paper-at-rest': ('the same, for this scene', 'C4', 0),
+         'soup-1': ('polygon soup, N = 1', 'C5', 9),
          'soup-8': ('N = 8', 'C5', -5),
-         'MuJoCo mj_collision': ('MuJoCo, best point', 'C1', 0),
-         'PyBullet getContactPoints': ('Bullet, best point', 'C6', 5)}
+         'MuJoCo mj_collision': ('MuJoCo, best point', 'C1', -9),
+         'PyBullet getContactPoints': ('Bullet, best point', 'C6', 9)}
 """Contestant: how the picture calls it, its colour, and how much higher the name stands [pt]."""
 PANELS = {'Goods at rest': ('settled', 'settled cubes'),
           'A 12 m container on another, swaying': ('containers',)}
@@ -77,7 +77,7 @@ AXES = {'call_p50': ('time of a call from Python [µs]', 1e-3, (0.1, 3e3)),
         'batch_p50': ('time of a pair in a batch [ns]', 1.0, (20.0, 1e3))}
 """Times in the CSV: what they are, by which they are multiplied, and what the picture shows: names
 stand on the right of their points."""
-ERRORS = (1e-2, 1e2)
+ERRORS = (1e-2, 3e2)
 """Errors that are drawn to scale [%]; 0 has a band of its own below."""
 
 
@@ -216,6 +216,7 @@ def draw(path: Path, table: Path) -> None:
             height = output.log_errors(axis, *ERRORS)
             axis.set_xscale('log')
             axis.xaxis.set_major_formatter('{x:g}')
+            axis.xaxis.set_minor_formatter('')
             axis.set(xlim=limits, xlabel=label, title=title)
             found = shown_points(table, of_sets, column)
             sizes = [found[name] for name in SIZES if name in found]

@@ -13,6 +13,7 @@ import functools
 import re
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.append(str(ROOT))  # where benchmarks/ is, which is not installed
@@ -25,15 +26,32 @@ BLOCK = re.compile(r'(<!-- table ([\w-]+) -->\n).*?(<!-- end of table -->)', re.
 
 Row = dict[str, str]
 
-CHOICES = {
-    'exact': '`exact`, the default',
-    'mlp': '`mlp`, the network',
-    'mujoco': 'MuJoCo, deepest corner',
-}
-MEASURED_AS = {'mujoco': {'contestant': 'MuJoCo mj_collision', 'point': 'deepest'}}
-"""Rows of the frontier for a contestant that is measured by its library's own call."""
-SHOWN = ('AVX-512', 'AVX2')  # instruction sets, the README's first
-CONTAINER = 12_192.0  # longest edge [mm]
+class Choice(NamedTuple):
+    """A row of the README's table: a name, and what the reports call its measurements."""
+
+    name: str
+    contestant: str  # of frontier.csv
+    native: str = ''  # of native.csv, without `, single`; of an engine, the call that is fastest
+    rest: str = 'settled'  # set of goods at rest in frontier.csv
+
+
+CHOICES = (
+    Choice("polygon soup on FCL, the paper's rival", 'soup-8'),
+    Choice("`paper`, the paper's network", 'paper', 'paper', rest='settled cubes'),
+    Choice('`mlp`, a network for boxes of any sizes', 'mlp', 'mlp volume'),
+    Choice('`exact`, the default', 'exact', 'exact volume'),
+    Choice('MuJoCo', 'MuJoCo mj_collision', 'mjc_BoxBox'),
+    Choice('Bullet', 'PyBullet getContactPoints', 'Bullet btBoxBoxDetector'),
+    Choice('Coal', 'Coal ComputeCollision, contact patch', 'Coal ComputeContactPatch'),
+)
+"""From what the paper replaced to what this package has, then the engines."""
+SHOWN = {'avx512': 'AVX-512', 'avx2': 'AVX2'}
+"""Instruction sets as native.csv and frontier.csv call them, the README's first."""
+AT_REST, SWAY = 'settled by PatchForces', 'containers'  # sets of native.csv
+RATIOS = re.compile(r'^contact / echo .*$', re.MULTILINE)
+"""The first line that the bench prints."""
+MEDIAN = re.compile(r'^\| *contact(?: \| *[\d.]+){3} \| *([\d.]+)', re.MULTILINE)
+"""The median latency of the contact node [ms]."""
 SETS = {
     'landings': 'containers that land on each other',
     'settled': 'goods at rest',
@@ -59,52 +77,57 @@ def cell(row: Row, column: str, unit: float = 1.0, digits: int = 3) -> str:
     return number(float(f'{float(row[column] or "nan") / unit:.{digits}g}'), digits)
 
 
+def fastest(found: list[Row], column: str = 'instruction_set') -> Row | None:
+    """Return the row with the README's instruction set; None of none."""
+    return next((row for name in (*SHOWN, *SHOWN.values()) for row in found
+                 if row[column] == name), found[0] if found else None)
+
+
+def point_error(choice: Choice, of_set: str) -> str:
+    """Return within what 99 % of the points are [% of the edge], by the best way to make one."""
+    p99 = [float(row['point_p99']) for row in rows(
+        'frontier.csv', contestant=choice.contestant, set=of_set, **{'class': 'all'})
+        if row['point_p99']]
+    return number(float(f'{min(p99):.2g}'), 2) if p99 else '–'
+
+
+def from_c(choice: Choice, way: str, of_set: str) -> str:
+    """Return the median time of a pair from C [ns]."""
+    row = fastest(rows('native.csv', set=of_set, contestant=f'{choice.native}, {way}'))
+    return cell(row, 'p50_ns', digits=3) if row else '–'
+
+
 def models() -> str:
-    """Return how far each model is off on containers, what it costs, and where `mlp` lost."""
+    """Return what each way to find the contact point costs, and how far it is off."""
     body = []
-    for model, name in CHOICES.items():
-        measured = rows('frontier.csv', set='containers', **{'class': 'all'},
-                        **MEASURED_AS.get(model, {'contestant': model}))
-        by_set = {row['instruction_set']: row for row in measured}
-        shown = next((by_set[each] for each in SHOWN if each in by_set), measured[0])
-        # A number stands in one table: that of 100,000 pairs, where the model has one.
-        errors = rows('accuracy.csv', model=model, set='containers', part='all', quantity='point')
-        judged, prefix = (errors[0], '') if errors else (shown, 'point_')
-        body.append([name, *(cell(judged, f'{prefix}{column}', 100.0 / CONTAINER, digits=2)
-                             for column in ('p50', 'p99')),
-                     cell(shown, 'call_p50', 1e3), cell(shown, 'batch_p50', 1e3)])
+    for choice in CHOICES:
+        call = fastest(rows('frontier.csv', contestant=choice.contestant, set=SWAY,
+                            **{'class': 'all'}))
+        assert call
+        body.append([choice.name, cell(call, 'call_p50', 1e3),
+                     *(from_c(choice, 'single', of_set) for of_set in (AT_REST, SWAY)),
+                     from_c(choice, 'batch', SWAY),
+                     *(point_error(choice, of_set) for of_set in (choice.rest, 'landings', SWAY))])
     table = markdown_table(
-        ['Model', 'half of the points within [mm]', '99 % within [mm]', 'a call [µs]',
-         'a million pairs [s]'], body)
-    return (f'{table}\n\nMedian times on one core with {SHOWN[0]}, called from Python: '
-            f'{processor()}. {hot_calls()}\n\n{network_by_exact()}')
+        ['', 'Python: a call [µs]', 'C: a call [ns], goods at rest', 'containers',
+         'C: a pair in a batch [ns]', '99 % of points within [%], goods at rest', 'landings',
+         'containers'], body)
+    where = fastest(rows('native.csv', set=SWAY, contestant='exact volume, single'))
+    assert where
+    return (f'{table}\n\nMedian times on one core with {SHOWN[where["instruction_set"]]}, '
+            f'{where["processor"]}; calls from Python and batches are of swaying 40 ft containers. '
+            "Errors are in % of the smaller box's longest edge. `paper` is trained for one pair of "
+            'sizes: for cubes, and here for containers.')
 
 
-def hot_calls() -> str:
-    """Return what other work between two calls does to them, from the speed report."""
-    exact = rows('speed_cold.csv', name='exact')[-1]
-    return (f'Calls run one after another: after work that touches {float(exact["megabytes"]):g} '
-            f'MB, a call of `exact` takes {cell(exact, "call_p50", 1e3, digits=2)} µs, '
-            f'{cell(exact, "call_by_unit", digits=2)} of `mj_geomDistance` '
-            '([Speed](docs/results/speed.md)).')
-
-
-def network_by_exact() -> str:
-    """Return the times of `mlp` relative to `exact` on containers, by instruction set."""
-    by_set = {row['instruction_set']: row for row in rows(
-        'frontier.csv', set='containers', contestant='mlp', **{'class': 'all'})}
-    ratios = [(name, by_set[name]) for name in SHOWN if name in by_set]
-    lost = all(float(row[column]) > 1.0 for _, row in ratios
-               for column in ('call_by_exact', 'batch_by_exact'))
-    words = '; '.join(f'{cell(row, "call_by_exact")} per call and {cell(row, "batch_by_exact")} '
-                      f'in a batch with {name}' for name, row in ratios)
-    return (f'{"On these poses, the network lost. It" if lost else "The network"} has an error. '
-            f'Its time divided by that of `exact` is {words}.')
-
-
-def processor() -> str:
-    """Return the processor of the frontier's run, with its generation."""
-    return rows('frontier.csv', contestant='exact')[0]['processor']
+def bench() -> str:
+    """Return the command of the bench with the ratios that it printed for `mlp`."""
+    found = RATIOS.search((RESULTS / 'bench_mlp.md').read_text('utf-8'))
+    median = MEDIAN.search((RESULTS / 'bench_exact.md').read_text('utf-8'))
+    assert found and median
+    return (f'`box_contact_bench --model mlp` compares nodes over ROS. At 1 kHz it printed '
+            f'`{found[0]}`: see [the report](docs/results/bench_mlp.md). With `exact`, the median '
+            f'answer takes {median[1]} ms.')
 
 
 def mlp_errors() -> str:
@@ -120,7 +143,7 @@ def mlp_errors() -> str:
     return markdown_table(['Set', 'point: p99', 'worst', 'volume: p99', 'covariance: p99'], body)
 
 
-TABLES = {'models': models, 'mlp-errors': mlp_errors}
+TABLES = {'models': models, 'bench': bench, 'mlp-errors': mlp_errors}
 
 
 def filled(text: str) -> str:
