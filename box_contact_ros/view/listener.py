@@ -155,7 +155,8 @@ class Track:
 
     def at(self, stamp: int) -> np.ndarray:
         """Return the last poses (m, 7) up to a stamp, the first ones where all are newer."""
-        return next((poses for at, poses in reversed(self.kept) if at <= stamp), self.kept[0][1])
+        kept = tuple(self.kept)  # in one go: another thread goes on appending
+        return next((poses for at, poses in reversed(kept) if at <= stamp), kept[0][1])
 
 
 class Listener(GuardedNode):

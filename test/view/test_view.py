@@ -8,6 +8,7 @@ import io
 import math
 import re
 import signal
+import threading
 import time
 from contextlib import closing
 from dataclasses import replace
@@ -49,6 +50,7 @@ from box_contact_ros.view.listener import (
     DrawnTick,
     Listener,
     SceneRows,
+    Track,
     read_touching,
 )
 from box_contact_ros.view.page import CUBE as CUBE_CORNERS
@@ -170,6 +172,24 @@ def test_a_body_carries_its_boxes(make_node, tmp_path):
     poses_of = node.tick().poses
     assert poses_of.shape == (3, 7)
     assert np.allclose(poses_of[:, :3], [[0, 0, 0], [10, 0, 0], [7, 0, 0]])
+
+
+def test_poses_come_while_they_are_looked_up():
+    """The page reads in one thread what the node hears in another."""
+    track, pose = Track([0]), np.zeros((1, 7))
+    ended = threading.Event()
+
+    def hear() -> None:
+        for stamp in range(20_000):
+            track.append(stamp, pose)
+        ended.set()
+
+    track.append(0, pose)
+    thread = threading.Thread(target=hear)
+    thread.start()
+    while not ended.is_set():
+        assert track.at(-1) is not None
+    thread.join()
 
 
 def test_contacts_of_another_scene_are_refused():
