@@ -35,7 +35,8 @@ inline PyObject* mlp_inputs(PyObject*, PyObject* const* args, Py_ssize_t count) 
   auto axes = make<double>({n, 3, 3}), middle = make<double>({n, 3}), half = make<double>({n, 3});
   auto features = make<double>({n, features_count});
   each_query(pairs, [&](const Query<double>& q, long row) {
-    mlp::Patches<double> patches(q);
+    const Query<double>* queries[] = {&q};
+    mlp::Patches<double> patches(queries);
     mlp::Cuts<float> cuts(patches.box);
     std::copy_n(cuts.told, features_count, features.numbers + features_count * row);
     Triple<double> place = patches.place(patches.box.centre, 0);

@@ -67,15 +67,13 @@ struct Overlap {
 template <class T>
 struct Patches {
   using F = Floats<T>;
-  const Query<T>* queries[together<T>];
+  Queries<T> queries;
   Meeting<T> meetings[together<T>];
   Frame<F> frame;
   Origin<T> origins[together<T>];
   PatchBox<F> box;
 
-  template <class... Queries>
-  BC_INLINE explicit Patches(const Queries&... of)
-      : queries{&of...}, meetings{Meeting<T>(of)...}, frame(queries, meetings), box(located()) {}
+  BC_INLINE explicit Patches(Queries<T> of) : queries(of), frame(queries, meet()), box(located()) {}
 
   // A place in A's frame, from its coordinates along x, y and z about the origin [unit].
   BC_INLINE Triple<T> place(const F (&from_origin)[3], int block) const {
@@ -89,6 +87,10 @@ struct Patches {
   }
 
  private:
+  BC_INLINE const Meeting<T> (&meet())[together<T>] {
+    for (int n = 0; n < together<T>; ++n) meetings[n] = Meeting<T>(*queries[n]);
+    return meetings;
+  }
   BC_INLINE PatchBox<F> located() {
     for (int n = 0; n < together<T>; ++n)
       origins[n] = {*queries[n], meetings[n], doubles<T>(frame.p_is_b, n),
@@ -126,32 +128,15 @@ BC_INLINE Sym<T> covariance(const Patches<T>& patches, const Overlap<Floats<T>>&
 
 // `FoundOf`: Moments, or PointAndVolume.
 template <template <class> class FoundOf>
-struct MlpModelOf {
-  Network network;
-
+struct ByCuts {
   template <class T>
   using Found = FoundOf<T>;
 
-  BC_INLINE unsigned solve(const Query<double>& query, Found<double>& found,
-                           detail::Counts&) const {
-    Found<double>* all[1] = {&found};
-    solve_all<double>(all, query);
-    return 0;
-  }
-  // Two blocks of pairs at once.
   template <class T>
-  BC_INLINE void solve_two(const Query<T>& query, const Query<T>& other, Found<T>& found,
-                           Found<T>& other_found) const {
-    Found<T>* all[2] = {&found, &other_found};
-    solve_all<T>(all, query, other);
-  }
-
- private:
-  template <class T, class... Queries>
-  [[gnu::noinline]] void solve_all(Found<T>* const (&found)[together<T>],
-                                   const Queries&... queries) const {
+  [[gnu::noinline]] static void solve(const Network& network, Queries<T> queries,
+                                      Answers<Found<T>, T> found) {
     using F = Floats<T>;
-    mlp::Patches<T> patches(queries...);
+    mlp::Patches<T> patches(queries);
     const mlp::PatchBox<F>& box = patches.box;
     mlp::Cuts<F> cuts(box);
     mlp::Overlap<F> overlap(network, cuts);
@@ -175,7 +160,7 @@ struct MlpModelOf {
   }
 };
 
-using MlpModel = MlpModelOf<Moments>;
-using MlpPointModel = MlpModelOf<PointAndVolume>;
+using MlpModel = NetworkModel<ByCuts<Moments>>;
+using MlpPointModel = NetworkModel<ByCuts<PointAndVolume>>;
 
 }  // namespace box_contact::BOX_CONTACT_SET

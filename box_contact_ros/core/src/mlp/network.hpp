@@ -1,12 +1,13 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// Multilayer perceptrons with two hidden layers, of rectified units or of tanh. The weights are in
-// memory, so one function runs networks of all sizes.
+// Multilayer perceptrons with two hidden layers, of rectified units or of tanh, and models that ask
+// them. The weights are in memory, so one function runs networks of all sizes.
 #pragma once
 
 #include "../kernel.hpp"
 #include "../lanes/floats.hpp"
+#include "../query.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
 
@@ -117,5 +118,31 @@ template <class F>
   numbers = layer(numbers, first, count, units, hidden, second);
   layer(numbers, second, units, up_to_fours(network.outputs), Activation::none, outputs);
 }
+
+// What is solved together: a pair alone, or two blocks of pairs.
+template <class T>
+using Queries = const Query<T>* const (&)[together<T>];
+template <class Found, class T>
+using Answers = Found* const (&)[together<T>];
+
+// A model that asks a network. `Way` has Found<T>, and solve<T>(network, Queries<T>, Answers<Found<T>, T>).
+template <class Way>
+struct NetworkModel {
+  Network network;
+
+  template <class T>
+  using Found = typename Way::template Found<T>;
+
+  BC_INLINE unsigned solve(const Query<double>& query, Found<double>& found,
+                           detail::Counts&) const {
+    Way::template solve<double>(network, {&query}, {&found});
+    return 0;
+  }
+  template <class T>
+  BC_INLINE void solve_two(const Query<T>& query, const Query<T>& other, Found<T>& found,
+                           Found<T>& other_found) const {
+    Way::template solve<T>(network, {&query, &other}, {&found, &other_found});
+  }
+};
 
 }  // namespace box_contact::BOX_CONTACT_SET

@@ -125,52 +125,36 @@ struct PointAndNormal : PointAndVolume<T> {
   Vec<T> normal;  // from the caller's A, common frame
 };
 
-struct PaperModel {
-  Network network;
-
+struct ByImpact {
   template <class T>
   using Found = PointAndNormal<T>;
 
-  BC_INLINE unsigned solve(const Query<double>& query, Found<double>& found,
-                           detail::Counts&) const {
-    Found<double>* all[1] = {&found};
-    solve_all<double>(all, query);
-    return 0;
-  }
   template <class T>
-  BC_INLINE void solve_two(const Query<T>& query, const Query<T>& other, Found<T>& found,
-                           Found<T>& other_found) const {
-    Found<T>* all[2] = {&found, &other_found};
-    solve_all<T>(all, query, other);
-  }
-
- private:
-  template <class T, class... Queries>
-  [[gnu::noinline]] void solve_all(Found<T>* const (&found)[together<T>],
-                                   const Queries&... of) const {
+  [[gnu::noinline]] static void solve(const Network& network, Queries<T> queries,
+                                      Answers<Found<T>, T> found) {
     using F = Floats<T>;
-    const Query<T>* queries[] = {&of...};
-    paper::Touching<T> pairs[] = {paper::Touching<T>(of, network.in_half_edges)...};
+    paper::Touching<T> pairs[together<T>];
+    for (int n = 0; n < together<T>; ++n) pairs[n] = {*queries[n], network.in_half_edges};
     auto vector = [&](auto get) {
-      auto number = [&](int k) { return floats<T>([&](int n) { return T(get(pairs[n])[k]); }); };
-      return Vec<F>{number(0), number(1), number(2)};
+      return components<F>(triple_of_floats<T>([&](int n) { return get(pairs[n]); }));
     };
     Vec<F> columns[3];
     for (int k = 0; k < 3; ++k)
       columns[k] = vector([k](const auto& pair) { return pair.rotation[k]; });
     paper::Impact<F> impact(network, vector([](const auto& pair) { return pair.offset; }), columns,
                             vector([](const auto& pair) { return pair.half; }));
-    for (int n = 0; n < together<T>; ++n) {
-      auto doubled = [&](const Vec<F>& x) {
-        return triple(Vec<T>{doubles<T>(x[0], n), doubles<T>(x[1], n), doubles<T>(x[2], n)});
-      };
-      place(*queries[n], pairs[n], doubled(impact.point), doubled(impact.normal), *found[n]);
-    }
+    Triple<F> point = triple(impact.point), normal = triple(impact.normal);
+    for (int n = 0; n < together<T>; ++n)
+      place(network, *queries[n], pairs[n], triple_of_doubles<T>(point, n),
+            triple_of_doubles<T>(normal, n), *found[n]);
   }
+
+ private:
   // To the common frame.
   template <class T>
-  BC_INLINE void place(const Query<T>& q, const paper::Touching<T>& touching,
-                       const Triple<T>& point, const Triple<T>& said, Found<T>& found) const {
+  BC_INLINE static void place(const Network& network, const Query<T>& q,
+                              const paper::Touching<T>& touching, const Triple<T>& point,
+                              const Triple<T>& said, Found<T>& found) {
     const Pair<T>& pair = q.pair;
     Columns<T> axes = select<T>(touching.first_is_b, pair.axes_b, pair.axes_a);
     Triple<T> origin = select(touching.first_is_b, pair.origin_b, pair.origin_a);
@@ -186,5 +170,7 @@ struct PaperModel {
     found.normal = components<T>(normal);
   }
 };
+
+using PaperModel = NetworkModel<ByImpact>;
 
 }  // namespace box_contact::BOX_CONTACT_SET

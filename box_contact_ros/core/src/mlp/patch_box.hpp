@@ -18,9 +18,7 @@
 // places are measured from an origin near the patch, which float64 finds in both boxes' frames.
 #pragma once
 
-#include "../lanes/floats.hpp"
 #include "../minimum_depth.hpp"
-#include "../query.hpp"
 #include "network.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::mlp {
@@ -45,47 +43,24 @@ template <class F>
 BC_INLINE F least_of(const Triple<F>& x) {
   return min<F>(min<F>(x[0], x[1]), x[2]);
 }
-template <class F>
-BC_INLINE F most_of(const Triple<F>& x) {
-  return max<F>(max<F>(x[0], x[1]), x[2]);
-}
 
-// The place of the largest of three numbers. No processor predicts which: a pair alone has an index.
-template <class F, bool = is_scalar<F>>
+// The place of the largest of three numbers.
+template <class F>
 struct LargestOf {
   Mask<F> first, second;
 
   BC_INLINE explicit LargestOf(const Triple<F>& x)
       : first(x[0] >= max<F>(x[1], x[2])), second(x[1] >= x[2]) {}
   BC_INLINE F of(const Triple<F>& x) const {
-    return select<F>(first, x[0], select<F>(second, x[1], x[2]));
+    return either<F>(first, x[0], either<F>(second, x[1], x[2]));
   }
   BC_INLINE Triple<F> column(const Columns<F>& m) const {
     return select(first, m[0], select(second, m[1], m[2]));
   }
   BC_INLINE Triple<F> axis() const {
-    F one = splat<F>(1.0F), not_first = select<F>(first, F{}, one);
-    F is_second = select<F>(second, not_first, F{});
-    return {one - not_first, is_second, not_first - is_second};
-  }
-};
-template <class F>
-struct LargestOf<F, true> {
-  int place;
-
-  BC_INLINE explicit LargestOf(const Triple<F>& x)
-      : place((2 - int(x[1] >= x[2])) * int(x[0] < max<F>(x[1], x[2]))) {}
-  BC_INLINE F of(const Triple<F>& x) const {
-    F numbers[4];
-    std::memcpy(numbers, &x, sizeof numbers);
-    return numbers[place];
-  }
-  BC_INLINE Triple<F> column(const Columns<F>& m) const { return m[place]; }
-  BC_INLINE Triple<F> axis() const {
-    static constexpr F axes[3][4] = {{1}, {0, 1}, {0, 0, 1, 1}};
-    Triple<F> found;
-    std::memcpy(&found, axes[place], sizeof found);
-    return found;
+    F one = splat<F>(1.0F), not_first = either<F>(first, F{}, one);
+    F is_second = either<F>(second, not_first, F{});
+    return triple(Vec<F>{one - not_first, is_second, not_first - is_second});
   }
 };
 
@@ -146,8 +121,7 @@ struct Frame {
   Triple<F> along_edge;        // from P's corner along its edge to near Q, in A's frame
 
   template <class T>
-  BC_INLINE Frame(const Query<T>* const (&queries)[together<T>],
-                  const Meeting<T> (&meetings)[together<T>]) {
+  BC_INLINE Frame(Queries<T> queries, const Meeting<T> (&meetings)[together<T>]) {
     auto length = [&](auto get) {
       return triple_of_floats<T>([&](int n) { return meetings[n].by_unit * get(n); });
     };
@@ -201,7 +175,7 @@ struct Frame {
     // Of two edges that cross, the place on P's that is closest to Q's.
     Triple<F> gap_b = transpose(b_in_a) * gap;
     Triple<F> from_q = select(is_b, gap, -gap_b), edge_q = select(is_b, edge_a, edge_b);
-    auto is_edge = across_q >= uniform(most_of<F>(across_q));
+    auto is_edge = across_q >= uniform(largest(across_q));
     Triple<F> across = choose(is_edge, zero, edge_q);
     F place = -dot(across, from_q) / max<F>(dot(across, across), splat<F>(least_component));
     F inwards = edge.of(select(is_b, choose(b_up, one, -one), choose(a_up, -one, one)));
@@ -391,8 +365,8 @@ struct Cuts {
       for (int i = 0; i < 4; ++i) {
         Triple<F> here = max(corners[i] - of_box.plus, -corners[i] - of_box.minus);
         Triple<F> there = max(-corners[i] - of_box.plus, corners[i] - of_box.minus);
-        told[11 + i] = max(told[11 + i], most_of<F>(here));
-        told[18 - i] = max(told[18 - i], most_of<F>(there));
+        told[11 + i] = max(told[11 + i], largest(here));
+        told[18 - i] = max(told[18 - i], largest(there));
       }
     }
     for (int i = 11; i < features; ++i) told[i] = min(told[i], splat<F>(2.0F));
