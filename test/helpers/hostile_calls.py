@@ -20,9 +20,6 @@ from typing import Any
 
 import numpy as np
 
-sys.path.append(str(Path(__file__).parent))  # tests start Python with a safe path
-import poses  # noqa: E402
-
 if 'EXTENSION' in os.environ:  # loaded before the package looks for its own
     name = 'box_contact_ros.core._native'
     spec = importlib.util.spec_from_file_location(name, os.environ['EXTENSION'])
@@ -30,8 +27,13 @@ if 'EXTENSION' in os.environ:  # loaded before the package looks for its own
     sys.modules[name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(sys.modules[name])
 
+sys.path.append(str(Path(__file__).parent))  # tests start Python with a safe path
+import poses  # noqa: E402  imports the package
+
 from box_contact_ros import ContactSolver  # noqa: E402
 from box_contact_ros.core import native  # noqa: E402
+
+assert native.__file__ == os.environ.get('EXTENSION', native.__file__), native.__file__
 
 POSE = np.array([0.0, 0, 0, 0, 0, 0, 1])
 ABOVE = np.array([0.1, 0.2, 0.9, 0, 0, 0, 1])
@@ -148,11 +150,11 @@ def bounds_without_an_order() -> None:
     assert len(phase.find(place, 10**9)[0]) == n - 1
 
 
-def a_network(rng: np.random.Generator | None = None) -> np.ndarray:
+def a_network(rng: np.random.Generator | None = None, inputs: int = native.FEATURES,
+              outputs: int = native.OUTPUTS) -> np.ndarray:
     """Return the numbers of a network with eight units in each hidden layer: random, or zeros."""
-    header = [native.FEATURES, 8, 8, native.OUTPUTS, 0, 0]
-    inputs = -(-native.FEATURES // 4) * 4
-    count = 8 * (1 + inputs) + 8 * 9 + 16 * 9
+    header = [inputs, 8, 8, outputs, 0, 0]
+    count = 8 * (1 + -(-inputs // 4) * 4) + 8 * 9 + -(-outputs // 8) * 8 * 9
     numbers = np.zeros(count) if rng is None else rng.uniform(-1e4, 1e4, count)
     return np.concatenate([header, numbers]).astype(np.float32)
 
@@ -171,6 +173,13 @@ def networks_that_no_file_has() -> None:
             network[place] = number
             refused(ValueError, native.Mlp, network)
     refused(ValueError, native.Paper, a_network())
+
+
+def outputs_that_fill_no_group() -> None:
+    """Pairs alone, whose units are computed in eights."""
+    for model in (native.Mlp(a_network()), native.Paper(a_network(None, 6, 4)),
+                  native.Paper(a_network(None, 6, 3))):
+        assert native.PairSolver(model, UNIT, UNIT)(POSE, ABOVE).colliding
 
 
 def threads_that_are_none() -> None:
@@ -323,7 +332,8 @@ def random_calls(seed: int, rounds: int) -> None:
 
 if __name__ == '__main__':
     for attack in (places_of_no_box, rows_of_no_array, bodies_that_rows_lack, arrays_too_short,
-                   bounds_without_an_order, networks_that_no_file_has, threads_that_are_none,
-                   extreme_numbers, pairs_changed_meanwhile):
+                   bounds_without_an_order, networks_that_no_file_has,
+                   outputs_that_fill_no_group, threads_that_are_none, extreme_numbers,
+                   pairs_changed_meanwhile):
         attack()
     random_calls(*map(int, sys.argv[1:]))

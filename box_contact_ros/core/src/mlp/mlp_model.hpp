@@ -37,7 +37,7 @@ struct Overlap {
   F root[6];   // lower triangle L of the covariance L Lᵀ: xx, yy, zz, yx, zx, zy [half extents]
 
   BC_INLINE Overlap(const Network& network, const Cuts<F>& cuts) {
-    F said[up_to_fours(detail::network_outputs)];
+    F said[up_to_eights(detail::network_outputs)];
     answer(network, cuts.told, said);
     auto within = [](F x, float least, float most) {
       return min<F>(splat<F>(most), max<F>(splat<F>(least), x));

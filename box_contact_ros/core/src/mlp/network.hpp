@@ -29,6 +29,8 @@ inline Network view(const float* numbers) {
 }
 
 BC_INLINE constexpr int up_to_fours(int units) { return (units + 3) & ~3; }
+// Room for outputs: of a pair alone, a group is written as a whole.
+BC_INLINE constexpr int up_to_eights(int units) { return (units + 7) & ~7; }
 
 // tanh, to 1.2e-6: a rational function between ±7, fitted to the least largest error.
 template <class F>
@@ -104,7 +106,7 @@ BC_INLINE const float* layer(const float* numbers, const F* inputs, int count, i
     const float* weights = numbers + 8 * (1 + count) * (u / 8) + u % 8;
     some_units(weights, inputs, count, activation, outputs + u);
   }
-  return numbers + 8 * (1 + count) * ((units + 7) / 8);
+  return numbers + (1 + count) * up_to_eights(units);
 }
 
 // Inputs up to a multiple of four are zeros. Not inlined: all models share it.

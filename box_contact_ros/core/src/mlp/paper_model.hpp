@@ -93,7 +93,7 @@ struct Impact {
 
   BC_INLINE Impact(const Network& network, const Vec<F>& t, const Vec<F> (&r)[3],
                    const Vec<F>& half) {
-    F m[3], told[up_to_fours(detail::paper_inputs)], said[up_to_fours(detail::paper_outputs)];
+    F m[3], told[up_to_fours(detail::paper_inputs)], said[up_to_eights(detail::paper_outputs)];
     for (int i = 0; i < 3; ++i) m[i] = sign(t[i]), told[i] = abs(t[i]);
     // r: columns of R. Cosines of yaw and of roll are not below 0.
     F nx = sign<F>(m[0] * r[0][0]), nz = sign<F>(m[2] * r[2][2]);
