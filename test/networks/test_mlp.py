@@ -4,7 +4,9 @@
 """Model `mlp`: what it promises whatever its network says, and how good its network is."""
 from __future__ import annotations
 
+import ctypes
 import json
+import platform
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -211,6 +213,16 @@ def test_extreme_sizes(mlp: ContactSolver, size_a: tuple, size_b: tuple) -> None
     found = pairs.contacts(mlp)
     assert found.colliding.all()
     assert_sound(pairs, found)
+
+
+@pytest.mark.skipif(platform.machine() != 'x86_64', reason='flags of other processors differ')
+def test_nothing_underflows(mlp: ContactSolver, named_set: tuple[str, Pairs]) -> None:
+    """Denormal numbers take a hundred times as long, and cost would depend on the pose."""
+    _, (pose_a, pose_b, size_a, size_b) = named_set
+    underflow, libm = 0x10, ctypes.CDLL('libm.so.6')
+    libm.feclearexcept(underflow)
+    mlp.batch(pose_a, pose_b, size_a=size_a, size_b=size_b)
+    assert not libm.fetestexcept(underflow)
 
 
 # --- laws -----------------------------------------------------------------------------------------

@@ -23,7 +23,7 @@
 
 namespace box_contact::BOX_CONTACT_SET::mlp {
 
-// Least component of a unit vector by which is divided; the product of three is a float.
+// Least component of a unit vector, and what is divided by; the product of three is a float.
 constexpr float least_component = 1e-12F;
 // Component of the normal below which either end of a box is as deep as the other, to a thousandth of
 // the least depth.
@@ -38,6 +38,12 @@ template <class F>
 BC_INLINE Triple<F> inverses(const Triple<F>& x) {
   Triple<F> beside = rotated(x) * rotated_back(x);
   return (1.0F / (x[0] * beside[0])) * beside;
+}
+// Numbers below `least` become 0. Products of what rounding leaves of zeros would be denormal numbers,
+// which take a hundred times as long.
+template <class F>
+BC_INLINE Triple<F> significant(const Triple<F>& x, float least) {
+  return choose(abs(x) >= uniform(splat<F>(least)), x, Triple<F>{});
 }
 template <class F>
 BC_INLINE F least_of(const Triple<F>& x) {
@@ -125,8 +131,11 @@ struct Frame {
     auto length = [&](auto get) {
       return triple_of_floats<T>([&](int n) { return meetings[n].by_unit * get(n); });
     };
-    Triple<F> normal_a = triple_of_floats<T>([&](int n) { return meetings[n].normal; });
-    Triple<F> normal_b = triple_of_floats<T>([&](int n) { return meetings[n].normal_b; });
+    auto normal = [&](auto get) {
+      return significant<F>(triple_of_floats<T>(get), least_component);
+    };
+    Triple<F> normal_a = normal([&](int n) { return meetings[n].normal; });
+    Triple<F> normal_b = normal([&](int n) { return meetings[n].normal_b; });
     Triple<F> corner_a = length([&](int n) { return meetings[n].corner; });
     Triple<F> corner_b = length([&](int n) { return meetings[n].corner_b; });
     half_a = abs(corner_a);
@@ -163,8 +172,11 @@ struct Frame {
     F along = edge.of(normal_p);
     F by = 1.0F / sqrt(max(1.0F - along * along, splat<F>(least_component)));
     Triple<F> edge_p = edge.axis();
-    Triple<F> edge_a = select(is_b, edge.column(b_in_a), edge_p);
-    Triple<F> edge_b = select(is_b, edge_p, edge.column(transpose(b_in_a)));
+    auto other = [&](const Columns<F>& axes) {
+      return significant<F>(edge.column(axes), least_component);
+    };
+    Triple<F> edge_a = select(is_b, other(b_in_a), edge_p);
+    Triple<F> edge_b = select(is_b, edge_p, other(transpose(b_in_a)));
     in_a[2] = normal_a;
     in_b[2] = normal_b;
     in_a[0] = by * (edge_a - along * normal_a);
@@ -315,8 +327,7 @@ struct PatchBox {
 //
 // Axes are mirrored so that 0–2 are not above 0.
 constexpr int features = 19;
-// A smaller share [1] of the sum of three counts as none. The digits of float32 end before it, and
-// products of the least cuts with it would be denormal numbers, which take a hundred times as long.
+// A smaller share [1] of the sum of three counts as none: the digits of float32 end before it.
 constexpr float least_share = 1e-8F;
 
 template <class F>
@@ -331,10 +342,7 @@ struct Cuts {
     for (int n = 0; n < 2; ++n) {
       Triple<F>(&share)[3] = slabs[n].share;
       Triple<F> scale = inverses<F>((abs(share[0]) + abs(share[1])) + abs(share[2]));
-      for (int i = 0; i < 3; ++i) {
-        share[i] = scale * share[i];
-        share[i] = choose(abs(share[i]) >= uniform(splat<F>(least_share)), share[i], zero);
-      }
+      for (int i = 0; i < 3; ++i) share[i] = significant<F>(scale * share[i], least_share);
       slabs[n].plus = scale * slabs[n].plus;
       slabs[n].minus = scale * slabs[n].minus;
       auto cut = [&](const Triple<F>& side) { return min(whole, max(one - side, zero)); };
