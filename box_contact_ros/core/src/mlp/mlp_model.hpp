@@ -29,27 +29,25 @@ constexpr float most_deviation = 0.577350269F;
 constexpr int moves_inwards = 2;
 constexpr float way_inwards = 1.5F;
 
+// Outputs of the point and the volume, the first ones. The others are of the covariance.
+constexpr int point_outputs = 4;
+
+template <class F>
+BC_INLINE F within(F x, float least, float most) {
+  return min<F>(splat<F>(most), max<F>(splat<F>(least), x));
+}
+
 // What the network says of an overlap.
 template <class F>
 struct Overlap {
+  F said[up_to_eights(detail::network_outputs)];
   F point[3];  // −1 to 1 between the bounds
   F volume;    // of the patch box's
-  F root[6];   // lower triangle L of the covariance L Lᵀ: xx, yy, zz, yx, zx, zy [half extents]
 
-  BC_INLINE Overlap(const Network& network, const Cuts<F>& cuts) {
-    F said[up_to_eights(detail::network_outputs)];
-    answer(network, cuts.told, said);
-    auto within = [](F x, float least, float most) {
-      return min<F>(splat<F>(most), max<F>(splat<F>(least), x));
-    };
-    for (int i = 0; i < 3; ++i) {
-      int j = i == 2 ? 1 : 0, k = i == 0 ? 1 : 2;  // of yx, zx, zy
-      point[i] = cuts.flip[i] * within(said[i], -1.0F, 1.0F);
-      root[i] = within(said[4 + i], least_deviation, most_deviation);
-      root[3 + i] =
-          (cuts.flip[j] * cuts.flip[k]) * within(said[7 + i], -most_deviation, most_deviation);
-    }
-    volume = within(said[3] * said[3], least_volume, 1.0F);
+  BC_INLINE Overlap(const Network& network, const Cuts<F>& cuts, int outputs) {
+    answer(network, cuts.told, outputs, said);
+    for (int i = 0; i < 3; ++i) point[i] = cuts.flip[i] * within<F>(said[i], -1.0F, 1.0F);
+    volume = within<F>(said[3] * said[3], least_volume, 1.0F);
   }
   // Move a point that is outside of a box inwards, within the bounds.
   BC_INLINE void move_into(const Slabs<F>& slabs, const F (&by_half2)[3]) {
@@ -58,7 +56,7 @@ struct Overlap {
     Triple<F> off = min(slabs.plus, max(-slabs.minus, at)) - at;
     for (int i = 0; i < 3; ++i) {
       F moved = point[i] + (way_inwards * by_half2[i]) * dot(slabs.share[i], off);
-      point[i] = min<F>(splat<F>(1.0F), max<F>(splat<F>(-1.0F), moved));
+      point[i] = within<F>(moved, -1.0F, 1.0F);
     }
   }
 };
@@ -104,14 +102,22 @@ struct Patches {
   }
 };
 
-// The covariance L Lᵀ of a root L, in the common frame.
+// The covariance L Lᵀ, in the common frame. The network says the lower triangle L: xx, yy, zz, yx, zx, zy
+// [half extents].
 template <class T>
-BC_INLINE Sym<T> covariance(const Patches<T>& patches, const Overlap<Floats<T>>& overlap,
-                            int block) {
+BC_INLINE Sym<T> covariance(const Patches<T>& patches, const Cuts<Floats<T>>& cuts,
+                            const Overlap<Floats<T>>& overlap, int block) {
   using F = Floats<T>;
   Triple<F> axis[3];
-  for (int i = 0; i < 3; ++i) axis[i] = patches.box.half[i] * patches.frame.in_a[i];
-  const F(&root)[6] = overlap.root;
+  F root[6];
+  for (int i = 0; i < 3; ++i) {
+    int j = i == 2 ? 1 : 0, k = i == 0 ? 1 : 2;  // of yx, zx, zy
+    const F* said = overlap.said + point_outputs;
+    axis[i] = patches.box.half[i] * patches.frame.in_a[i];
+    root[i] = within<F>(said[i], least_deviation, most_deviation);
+    root[3 + i] =
+        (cuts.flip[j] * cuts.flip[k]) * within<F>(said[3 + i], -most_deviation, most_deviation);
+  }
   Triple<F> columns[3] = {(root[0] * axis[0] + root[3] * axis[1]) + root[4] * axis[2],
                           root[1] * axis[1] + root[5] * axis[2], root[2] * axis[2]};
   Triple<T> c[3];
@@ -139,7 +145,8 @@ struct ByCuts {
     mlp::Patches<T> patches(queries);
     const mlp::PatchBox<F>& box = patches.box;
     mlp::Cuts<F> cuts(box);
-    mlp::Overlap<F> overlap(network, cuts);
+    constexpr bool patch = std::is_same_v<Found<T>, Moments<T>>;
+    mlp::Overlap<F> overlap(network, cuts, patch ? detail::network_outputs : mlp::point_outputs);
     F by_half2[3], from_origin[3];
     for (int i = 0; i < 3; ++i) by_half2[i] = 1.0F / (box.half[i] * box.half[i]);
     for (int n = 0; n < mlp::moves_inwards; ++n) {
@@ -154,8 +161,7 @@ struct ByCuts {
       found[n]->centroid =
           components<T>(point_in_common_frame(query.pair, patches.place(from_origin, n)));
       found[n]->volume = unit3 * doubles<T>(volume, n);
-      if constexpr (std::is_same_v<FoundOf<T>, Moments<T>>)
-        found[n]->covariance = mlp::covariance(patches, overlap, n);
+      if constexpr (patch) found[n]->covariance = mlp::covariance(patches, cuts, overlap, n);
     }
   }
 };

@@ -109,16 +109,17 @@ BC_INLINE const float* layer(const float* numbers, const F* inputs, int count, i
   return numbers + (1 + count) * up_to_eights(units);
 }
 
-// Inputs up to a multiple of four are zeros. Not inlined: all models share it.
+// The first outputs, so many as are wanted. Inputs up to a multiple of four are zeros. Not inlined: all
+// models share it.
 template <class F>
-[[gnu::noinline]] void answer(const Network& network, const F* inputs, F* outputs) {
+[[gnu::noinline]] void answer(const Network& network, const F* inputs, int wanted, F* outputs) {
   F first[network_units_max], second[network_units_max];
   Activation hidden = network.is_tanh ? Activation::tanh : Activation::rectified;
   int count = up_to_fours(network.inputs), units = up_to_fours(network.first);
   const float* numbers = layer(network.numbers, inputs, count, units, hidden, first);
   count = units, units = up_to_fours(network.second);
   numbers = layer(numbers, first, count, units, hidden, second);
-  layer(numbers, second, units, up_to_fours(network.outputs), Activation::none, outputs);
+  layer(numbers, second, units, wanted, Activation::none, outputs);
 }
 
 // What is solved together: a pair alone, or two blocks of pairs.

@@ -103,7 +103,7 @@ struct Impact {
     told[4] = angle<F>(sine_of_pitch, sqrt(cosine2));
     told[5] = angle<F>(m[1] * r[0][1] * nx, abs(r[0][0]));
     told[6] = told[7] = F{};
-    answer(network, told, said);
+    answer(network, told, network.outputs, said);
     if (network.outputs == detail::paper_places) {  // the point, in half of the longest edge
       F longest = max<F>(max<F>(half[0], half[1]), half[2]);
       for (int i = 0; i < 3; ++i) point[i] = longest * (m[i] * said[i]), normal[i] = F{};
