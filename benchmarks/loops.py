@@ -145,8 +145,7 @@ def near_pairs(boxes: Boxes, margin: float) -> np.ndarray:
     low, high = pose[:, :3] - half - margin, pose[:, :3] + half
     near = np.triu((low[:, None] <= high).all(axis=2) & (low <= high[:, None]).all(axis=2), 1)
     moves = boxes.mass[body] > 0
-    pairs = np.argwhere(near & (moves[:, None] | moves) & (body[:, None] != body))
-    return np.ascontiguousarray(pairs)  # a transposed array takes the slow way through Python
+    return np.argwhere(near & (moves[:, None] | moves) & (body[:, None] != body))
 
 
 def corner_speeds(boxes: Boxes) -> np.ndarray:

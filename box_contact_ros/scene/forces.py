@@ -228,10 +228,11 @@ class PatchForces:
         if poses is None:
             raise ValueError('poses must be those of the question, not None')
         times = as_number(age, 'age'), as_number(period, 'period')
-        if self._native.hold(pairs, contacts.separation, contacts.normal, contacts.point,
-                             contacts.volume, contacts.covariance, poses, friction,
-                             surface_velocity, stiffness, *times):
-            return  # all are plain arrays
+        rows = (contacts.separation, contacts.normal, contacts.point, contacts.volume,
+                contacts.covariance, poses, friction, surface_velocity, stiffness, *times)
+        # Where all are plain arrays, no time is lost to checks; pairs alone often are not.
+        if self._native.hold(pairs, *rows) or self._native.hold(as_pairs(pairs, 'pairs'), *rows):
+            return
         self._native.hold(
             as_pairs(pairs, 'pairs'), _as_rows(contacts.separation, 'separation'),
             _as_rows(contacts.normal, 'normal', 3), _as_rows(contacts.point, 'point', 3),

@@ -15,6 +15,7 @@ from ..core import THREADS_MAX, native
 from .checks import (
     as_floats,
     as_number,
+    as_pairs,
     as_places,
     as_size,
     as_whole,
@@ -116,6 +117,9 @@ class ContactSolver(native.PairSolver):
             if poses_b is not None or size_a is not None or size_b is not None:
                 raise ValueError('pairs are places in poses and sizes: batch(poses, sizes=…, '
                                  'pairs=…) has neither poses_b nor size_a nor size_b')
+            plain = as_pairs(pairs, 'pairs')
+            if plain is not pairs:  # often all that C++ could not read
+                return self.batch(poses_a, sizes=sizes, pairs=plain, threads=threads, patch=patch)
             poses = as_floats(poses_a, 'poses', 'poses (m, 7) of rows x y z qx qy qz qw', (None, 7))
             rows_a = self._sizes(sizes, 'sizes', self._size_a, len(poses))
             rows_b = self._sizes(sizes, 'sizes', self._size_b, len(poses))

@@ -14,7 +14,9 @@ import numpy as np
 import pytest
 
 from box_contact_ros import Body, Contacts, ContactSolver, PatchForces
+from box_contact_ros.scene import forces
 from box_contact_ros.scene.forces import GRAVITY
+from box_contact_ros.solver import contact_solver
 from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
 
 STEP = 0.001  # [s]
@@ -507,6 +509,18 @@ def test_reset_forgets_all() -> None:
     world = World(pose(z=0.5)).run(50)
     world.forces.reset()
     assert np.abs(world.wrenches()).max() < 1e-9
+
+
+@pytest.mark.parametrize('layout', [
+    np.asfortranarray, lambda pairs: pairs.astype(np.int32), np.ndarray.tolist],
+    ids=['as of argwhere', 'int32', 'list'])
+def test_of_pairs_in_another_layout_nothing_else_is_converted(layout, monkeypatch) -> None:
+    world = World(pose(z=0.5), pose(z=1.5))
+    plain, world.pairs = world.contacts(), layout(world.pairs)
+    for module in (forces, contact_solver):
+        monkeypatch.setattr(module, 'as_floats', None)
+    assert np.array_equal(world.contacts().separation, plain.separation)
+    world.hold()
 
 
 # --- other frames and units -----------------------------------------------------------------------

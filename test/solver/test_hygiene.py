@@ -19,7 +19,14 @@ from hypothesis import strategies as st
 
 from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.core import LENGTH_MAX, LENGTH_MIN, QUATERNION_MAX, QUATERNION_MIN
-from box_contact_ros.solver.checks import absent_poses, are_poses, pose_fault, size_fault
+from box_contact_ros.solver.checks import (
+    absent_poses,
+    are_poses,
+    as_floats,
+    as_wholes,
+    pose_fault,
+    size_fault,
+)
 
 MODELS = ('exact', 'mlp')  # input is checked before a model sees it; answers are each model's
 SOLVERS = {model: ContactSolver(poses.CUBE, poses.CUBE, model=model) for model in MODELS}
@@ -269,6 +276,14 @@ def test_rows_of_any_layout(layout):
     found = solver.batch(layout(a), layout(b), size_a=layout(sizes), size_b=layout(sizes))
     for mine, theirs in zip(*map(poses.fields, (found, wanted))):
         assert np.array_equal(mine, theirs, equal_nan=True) and type(mine) is np.ndarray
+
+
+def test_plain_arrays_are_taken_as_they_are():
+    numbers, rows = np.zeros((2, 7)), np.zeros((2, 2), np.int64)
+    assert as_floats(numbers, 'numbers', '', (None, 7)) is numbers
+    assert as_wholes(rows, 'rows', 2) is rows
+    with pytest.raises(ValueError, match='rows must be whole numbers'):
+        as_wholes(rows, 'rows', 3)
 
 
 @every_model
