@@ -15,25 +15,25 @@ from .solver.contact_solver import ContactSolver
 if TYPE_CHECKING:
     from .models import make_model
     from .node.contact_node import ContactNode as ContactNode  # noqa: F401
-    from .node.read_contacts import ReadContacts as ReadContacts  # noqa: F401
-    from .node.read_contacts import read_contacts as read_contacts  # noqa: F401
     from .scene.contacts_of import contacts_of
     from .scene.forces import Body, PatchForces
+    from .scene.read_contacts import ReadContacts, read_contacts
     from .scene.scene import Box, Frame, Pair, Scene
     from .scene.scene_file import read_scene
     from .scene.scene_solver import SceneSolver
     from .scene.support import support
 
 __all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Frame', 'Pair', 'PatchForces',
-           'Scene', 'SceneSolver', 'contacts_of', 'make_model', 'patch_area', 'patch_areas',
-           'read_scene', 'support']  # those of `node` need ROS: `import *` does without
+           'ReadContacts', 'Scene', 'SceneSolver', 'contacts_of', 'make_model', 'patch_area',
+           'patch_areas', 'read_contacts', 'read_scene', 'support']
+# `ContactNode` needs ROS, and `import *` does without.
 
 _LOADED_WHEN_USED = {
     'models': ('make_model',),
     'node.contact_node': ('ContactNode',),
-    'node.read_contacts': ('ReadContacts', 'read_contacts'),
     'scene.contacts_of': ('contacts_of',),
     'scene.forces': ('Body', 'PatchForces'),
+    'scene.read_contacts': ('ReadContacts', 'read_contacts'),
     'scene.scene_file': ('read_scene',),
     'scene.scene': ('Box', 'Frame', 'Pair', 'Scene'),
     'scene.scene_solver': ('SceneSolver',),

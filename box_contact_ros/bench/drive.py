@@ -26,9 +26,9 @@ from rclpy.serialization import deserialize_message, serialize_message
 from box_contact_msgs.msg import Contacts as ContactsMessage
 
 from ..node.messages import make_header, pose_message
-from ..node.read_contacts import read_contacts
 from ..node.runtime import GuardedNode, spin_for
 from ..node.topics import DEEP_RELIABLE
+from ..scene.read_contacts import read_contacts
 from ..scene.scene import CONTAINER
 from ..solver.contact_solver import ContactSolver
 from .echo_node import FRAME, raw_stamp, with_stamp

@@ -18,19 +18,9 @@ from std_msgs.msg import Header
 from box_contact_msgs.msg import Contact as ContactMessage
 
 from ..core import native
+from ..scene.message_bytes import NANOSECONDS
+from ..scene.read_contacts import UPPER
 from ..solver.contact import Contact, Contacts
-
-NANOSECONDS = 1_000_000_000
-UPPER = np.triu_indices(3)
-"""Places of the six numbers of a message's covariance: xx xy xz yy yz zz."""
-
-
-class MessageError(ValueError):
-    """A message that is not taken; `reason` is what it is counted as."""
-
-    def __init__(self, reason: str, text: str) -> None:
-        super().__init__(text)
-        self.reason = reason
 
 
 def make_header(stamp: int, frame_id: str) -> Header:

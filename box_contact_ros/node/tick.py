@@ -15,13 +15,20 @@ from typing import Any
 
 import numpy as np
 
+from ..scene.message_bytes import (
+    NANOSECONDS,
+    VECTOR_BYTES,
+    ContactWriter,
+    MessageError,
+    PoseReader,
+    aligned,
+    header_bytes,
+)
 from ..scene.pairing import OVERTAKEN, PAIRINGS, Pairing, StampedPose, Tick
 from ..scene.scene import ALL_BOXES
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import absent_poses, are_poses, pose_fault
 from .diagnostics import TickMonitor
-from .message_bytes import VECTOR_BYTES, ContactWriter, PoseReader, aligned, header_bytes
-from .messages import NANOSECONDS, MessageError
 from .parameters import reason_of
 from .topics import PoseCallback, SceneTopics
 

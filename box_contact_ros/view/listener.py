@@ -24,13 +24,12 @@ from rclpy.qos import QoSProfile
 from box_contact_msgs.msg import Contacts as ContactsMessage
 
 from ..node.contact_node import PARAMETERS as CONTACT_PARAMETERS
-from ..node.message_bytes import PoseReader
-from ..node.messages import MessageError
 from ..node.parameters import Setting, declare, warn_of_unknown
-from ..node.read_contacts import ReadContacts, read_contacts
 from ..node.runtime import GuardedNode
 from ..node.topics import pose_qos
+from ..scene.message_bytes import MessageError, PoseReader
 from ..scene.pairing import StampedPose
+from ..scene.read_contacts import ReadContacts, read_contacts
 from ..scene.scene import ALL_BOXES, ALONE, Scene, two_boxes
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import Answer

@@ -27,7 +27,7 @@ import viser
 import websockets.asyncio.server
 from websockets import Headers
 
-from ..node.messages import NANOSECONDS
+from ..scene.message_bytes import NANOSECONDS
 from ..scene.scene_solver import Answer
 from ..solver.pose import rotation_matrix
 from . import style

@@ -31,8 +31,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.serialization import deserialize_message
 from typed_messages import read_pose, read_poses
 
-from box_contact_ros.node.message_bytes import PoseReader
-from box_contact_ros.node.messages import MessageError
+from box_contact_ros.scene.message_bytes import MessageError, PoseReader
 from box_contact_ros.scene.pairing import StampedPose
 
 MESSAGES = 100_000

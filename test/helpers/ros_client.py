@@ -24,8 +24,9 @@ from rclpy.qos import QoSProfile
 from typed_messages import pose_stamped
 
 from box_contact_msgs.msg import Contacts
-from box_contact_ros.node.messages import NANOSECONDS, contacts_by_pair
+from box_contact_ros.node.messages import contacts_by_pair
 from box_contact_ros.node.rclpy_workarounds import ends_within
+from box_contact_ros.scene.message_bytes import NANOSECONDS
 from box_contact_ros.solver.contact import Contact
 
 TWO_BOXES = {'box_a': 'box_a/pose', 'box_b': 'box_b/pose'}

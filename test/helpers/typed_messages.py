@@ -23,9 +23,10 @@ from std_msgs.msg import Header
 
 from box_contact_msgs.msg import Box, BoxPair, Contacts
 from box_contact_msgs.msg import Contact as ContactMessage
-from box_contact_ros.node.messages import NANOSECONDS, UPPER, MessageError, make_header
-from box_contact_ros.node.read_contacts import ReadContacts, read_contacts
+from box_contact_ros.node.messages import make_header
+from box_contact_ros.scene.message_bytes import NANOSECONDS, MessageError
 from box_contact_ros.scene.pairing import StampedPose
+from box_contact_ros.scene.read_contacts import UPPER, ReadContacts, read_contacts
 from box_contact_ros.scene.scene import Pair
 from box_contact_ros.solver.checks import pose_fault
 from box_contact_ros.solver.contact import FIELDS, Contact, patch_area

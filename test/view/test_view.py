@@ -40,8 +40,9 @@ from websockets.sync.client import connect
 from box_contact_ros import ContactSolver
 from box_contact_ros.demo.crane import CraneScenario
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.messages import NANOSECONDS, MessageError, make_header
+from box_contact_ros.node.messages import make_header
 from box_contact_ros.node.topics import contact_qos
+from box_contact_ros.scene.message_bytes import NANOSECONDS, MessageError
 from box_contact_ros.scene.scene import Box, Pair, Scene, two_boxes
 from box_contact_ros.solver.pose import rotation_matrix
 from box_contact_ros.view import listener

@@ -28,9 +28,15 @@ from typed_messages import (
 
 from box_contact_msgs.msg import Contacts as ContactsMessage
 from box_contact_ros import ContactSolver
-from box_contact_ros.node.message_bytes import ContactWriter, PoseReader, aligned, header_bytes
-from box_contact_ros.node.messages import MessageError, contacts_by_pair, make_header
-from box_contact_ros.node.read_contacts import read_contacts
+from box_contact_ros.node.messages import contacts_by_pair, make_header
+from box_contact_ros.scene.message_bytes import (
+    ContactWriter,
+    MessageError,
+    PoseReader,
+    aligned,
+    header_bytes,
+)
+from box_contact_ros.scene.read_contacts import read_contacts
 from box_contact_ros.scene.scene import Pair, two_boxes
 from box_contact_ros.scene.scene_solver import Answer
 from box_contact_ros.solver.contact import Contact, Contacts

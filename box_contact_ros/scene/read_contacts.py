@@ -19,12 +19,15 @@ from .message_bytes import (
     ENCAPSULATION,
     FRAME_AT,
     MOST_NAMES,
+    NANOSECONDS,
     PADDING,
+    MessageError,
     parse_frame,
     parse_head,
 )
-from .messages import NANOSECONDS, UPPER, MessageError
 
+UPPER = np.triu_indices(3)
+"""Places of the six numbers of a message's covariance: xx xy xz yy yz zz."""
 NAMES = 3  # that a contact begins with: those of the pair and of its boxes
 
 

@@ -15,12 +15,12 @@ from functools import lru_cache
 import numpy as np
 
 from ..core import native
-from ..scene.pairing import StampedPose
-from ..scene.scene import Pair, Scene
-from ..scene.scene_solver import Answer
 from ..solver.checks import MOST_NAME_BYTES, pose_fault
-from .messages import NANOSECONDS, MessageError
+from .pairing import StampedPose
+from .scene import Pair, Scene
+from .scene_solver import Answer
 
+NANOSECONDS = 1_000_000_000
 ENCAPSULATION = 4
 """Bytes before the body: two name its kind, two are options, which say nothing about a pose."""
 LITTLE = b'\0\1'
@@ -43,6 +43,14 @@ MOST_NAMES = 2**16
 FRAME_AT = _HEAD.size + 4
 """Where frame_id's characters are: behind stamp and length."""
 _new_tuple = tuple.__new__  # a named tuple's own constructor is Python code
+
+
+class MessageError(ValueError):
+    """A message that is not taken; `reason` is what it is counted as."""
+
+    def __init__(self, reason: str, text: str) -> None:
+        super().__init__(text)
+        self.reason = reason
 
 
 def numbers_at(length: int) -> int:
