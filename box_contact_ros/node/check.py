@@ -9,6 +9,7 @@ from collections import Counter, deque
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 
@@ -74,7 +75,7 @@ class Checker:
                              f'at most {MOST_CONTACTS}: ask for fewer boxes, or name pairs')
         messages = self._kept.fill([self._check.names_of(a, b) for a, b in pairs.tolist()],
                                    contacts)
-        touching = int(contacts.colliding.sum())
+        touching = np.count_nonzero(contacts.colliding)
         listed = response.contacts
         listed.header = request.header
         listed.contacts, listed.near = messages[:touching], messages[touching:]
@@ -94,7 +95,8 @@ class CheckService:
         self._counts = counts
         self._until = 0.0  # end of the pause, by the steady clock [s]
         self._cheap = 0  # number of boxes and pairs that are not costly
-        self._waiting: deque[tuple[float, Check.Request, Send]] = deque()  # when each came [s]
+        self._waiting: deque[tuple[float, Check.Request, Check.Response, Send]] = deque()
+        """When each came [s], and what `_answer` takes."""
         self._times: deque[float] = deque(maxlen=KEPT_TIMES)  # from taking to answering [s]
         self._filled = node.answered(answer, '~/check')
         self._timer = node.create_timer(LONG, self._answer_next, clock=Clock(
@@ -108,19 +110,20 @@ class CheckService:
         self._times.clear()
         return times
 
-    def _take(self, request: Check.Request, send: Send) -> None:
+    def _take(self, request: Check.Request, response: Check.Response, send: Send) -> None:
         """Answer a request now or, if it is costly in a pause, later."""
         now = time.monotonic()
         is_costly = len(request.boxes) + len(request.pairs) > self._cheap
         if not is_costly or not (self._waiting or now < self._until):
-            self._answer(now, request, send)
+            self._answer(now, request, response, send)
         elif len(self._waiting) < MOST_WAITING:
-            self._waiting.append((now, request, send))
+            self._waiting.append((now, request, response, send))
             self._wait()
         else:
             self._counts['checks refused'] += 1
-            send(Check.Response(message=f'busy: {MOST_WAITING} costly requests wait, as ticks come '
-                                        'first; ask again later'))
+            response.message = (f'busy: {MOST_WAITING} costly requests wait, as ticks come first; '
+                                'ask again later')
+            send(response)
 
     def _answer_next(self) -> None:
         """Answer the first that waits, as its pause is over."""
@@ -135,10 +138,11 @@ class CheckService:
         self._timer.timer_period_ns = max(1, round(1e9 * (self._until - time.monotonic())))
         self._timer.reset()
 
-    def _answer(self, came: float, request: Check.Request, send: Send) -> None:
+    def _answer(self, came: float, request: Check.Request, response: Check.Response,
+                send: Send) -> None:
         """Answer a request that came at a time [s]."""
         began, used = time.monotonic(), time.thread_time()
-        response = self._filled(request, Check.Response())
+        response = self._filled(request, response)
         send(response)
         ended, cost = time.monotonic(), time.thread_time() - used
         self._counts['checks answered' if response.success else 'checks refused'] += 1

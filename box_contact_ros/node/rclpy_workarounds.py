@@ -68,8 +68,8 @@ def with_info(callback: CallbackWithInfo) -> Callable[..., None]:
     return call
 
 
-def answer_later(service: Service, take: Callable[[Any, Send], None]) -> None:
-    """Let `take` have the requests of a service, and for each one a function that sends its answer.
+def answer_later(service: Service, take: Callable[[Any, Any, Send], None]) -> None:
+    """Let `take` have each request of a service, its empty response, and a function that sends it.
 
     Symptom: the callback of a service has to return its answer at once, and nobody can measure how
     long sending it takes. Not reported.
@@ -77,11 +77,11 @@ def answer_later(service: Service, take: Callable[[Any, Send], None]) -> None:
     """
     send = service.send_response
 
-    def keep(request: Any, _: Any) -> Any:
-        return request  # rclpy hands it to `send_response`
+    def keep(request: Any, response: Any) -> Any:
+        return request, response  # rclpy hands them to `send_response`
 
-    def answer(request: Any, header: Any) -> None:
-        take(request, lambda response: send(response, header))
+    def answer(kept: tuple[Any, Any], header: Any) -> None:
+        take(kept[0], kept[1], lambda response: send(response, header))
     service.callback = keep
     service.send_response = answer  # type: ignore[assignment, method-assign]
 

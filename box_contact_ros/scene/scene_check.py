@@ -15,8 +15,8 @@ from itertools import product
 
 import numpy as np
 
-from ..core import LENGTH_MAX, LENGTH_MIN, native
-from ..solver.checks import are_poses, name_fault, nearest_name, pose_fault, short_repr, size_fault
+from ..core import LENGTH_MAX, native
+from ..solver.checks import name_fault, nearest_name, pose_fault, short_repr, size_fault
 from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver
 from .contacts_of import in_contact
@@ -83,14 +83,12 @@ class SceneCheck:
         if not 0.0 <= margin <= LENGTH_MAX:
             raise ValueError(f'margin must lie within 0 and {LENGTH_MAX:g} m, not {margin:g}')
         broad_phase, solver = self._made_for(margin)
-        rows = self._take(names, poses, sizes)
-        moving = np.array([row for name, row in rows.items() if name not in self._fixed], np.int64)
+        rows, moving, resized = self._take(names, poses, sizes)
         try:
             self._place_bodies()
             if pairs:
                 places = self._places(rows, pairs)
             else:
-                resized = moving[moving < len(self._poses)]
                 broad_phase.resize(resized, self._sizes[resized])
                 places = broad_phase.find(self._poses, self.most_near)[0]
             if len(places) > self.most_near:
@@ -116,38 +114,37 @@ class SceneCheck:
             self._scene.place_boxes(self._rows[MOST_BOXES:])
 
     def _take(self, names: Sequence[str], poses: Sequence[Row], sizes: Sequence[Row],
-              ) -> dict[str, int]:
-        """Take the poses and sizes of a question; return the row of each name."""
+              ) -> tuple[dict[str, int], np.ndarray, np.ndarray]:
+        """Take the poses and sizes of a question.
+
+        Returns the row of each name, the rows (k,) of what moves, and those of them that are boxes.
+        """
         if not 1 <= len(names) <= MOST_BOXES:
             raise ValueError(f'boxes: a request has 1 to {MOST_BOXES} boxes, not {len(names)}')
         rows: dict[str, int] = {}
-        all_poses, all_sizes = list(poses), list(sizes)
-        for number, name in enumerate(names):
+        moved: dict[int, Row] = {}  # poses by row
+        resized: dict[int, Row] = {}  # sizes of boxes by row
+        for number, (name, pose, size) in enumerate(zip(names, poses, sizes)):
             if fault := name_fault(name):
                 raise ValueError(f'boxes[{number}].name: {fault}')
             if name in rows:
                 raise ValueError(f'boxes[{number}]: {short_repr(name)} is the name of '
                                  f'boxes[{names.index(name)}], too')
-            known = self._scene.row_of.get(name)
-            rows[name] = number if known is None else MOST_BOXES + known
-            if known is None:
-                self._names[number] = name
             try:
-                all_poses[number], all_sizes[number] = self._of_scene(
-                    name, poses[number], sizes[number])
+                pose, size = self._of_scene(name, pose, size)
             except ValueError as error:
                 raise ValueError(f'boxes[{number}] {short_repr(name)} {error}') from None
-        pose_rows, size_rows = np.array(all_poses), np.array(all_sizes)
-        if not (are_poses(pose_rows).all() and np.all(
-                (size_rows >= LENGTH_MIN) & (size_rows <= LENGTH_MAX))):
-            for number, (pose, size) in enumerate(zip(pose_rows, size_rows)):
-                if fault := pose_fault(pose) or size_fault(size):
-                    raise ValueError(f'boxes[{number}] {short_repr(names[number])}: {fault}')
-        taken = np.array(list(rows.values()))
-        self._rows[taken] = pose_rows
-        is_box = taken < len(self._poses)
-        self._sizes[taken[is_box]] = size_rows[is_box]
-        return rows
+            if fault := pose_fault(pose) or size_fault(size):
+                raise ValueError(f'boxes[{number}] {short_repr(name)}: {fault}')
+            known = self._scene.row_of.get(name)
+            row = rows[name] = number if known is None else MOST_BOXES + known
+            if known is None:
+                self._names[number] = name
+            if name not in self._fixed:
+                moved[row] = pose
+                if row < len(self._poses):
+                    resized[row] = size
+        return (rows, _write(self._rows, moved), _write(self._sizes, resized))
 
     def _of_scene(self, name: str, pose: Row, size: Row) -> tuple[Row, Row]:
         """Return pose and size of a box or body: its own, or those that the scene has.
@@ -202,3 +199,11 @@ class SceneCheck:
             places += product(boxes_of(a, f'pairs[{number}].box_a'),
                               boxes_of(b, f'pairs[{number}].box_b'))
         return np.array(places)
+
+
+def _write(table: np.ndarray, rows: dict[int, Row]) -> np.ndarray:
+    """Write numbers into the rows of a table; return these rows (k,)."""
+    places = np.array(list(rows), np.int64)
+    if rows:
+        table[places] = list(rows.values())
+    return places

@@ -88,14 +88,14 @@ def are_poses(poses: np.ndarray) -> np.ndarray:
 def size_fault(size: Sequence[float] | np.ndarray) -> str | None:
     """Return why three full extents [m] are not a size, or None."""
     extents = [float(value) for value in size]
+    if all(LENGTH_MIN <= value <= LENGTH_MAX for value in extents):
+        return None
     text = '(' + ', '.join(f'{value:g}' for value in extents) + ')'
     if not all(math.isfinite(value) for value in extents):
         return f'{text} is not finite'
     if min(extents) <= 0.0:
         return f'{text} is not positive'
-    if min(extents) < LENGTH_MIN or max(extents) > LENGTH_MAX:
-        return f'{text} is outside {LENGTH_MIN:g} to {LENGTH_MAX:g} m'
-    return None
+    return f'{text} is outside {LENGTH_MIN:g} to {LENGTH_MAX:g} m'
 
 
 def as_number(value: Any, name: str) -> float:

@@ -392,7 +392,8 @@ class Bench:
         def send(response: Check.Response) -> None:
             self.now += seconds
             self.sent.append(name if response.success else f'{name}: {response.message[:4]}')
-        self.service._take(SimpleNamespace(name=name, boxes=range(boxes), pairs=()), send)
+        request = SimpleNamespace(name=name, boxes=range(boxes), pairs=())
+        self.service._take(request, Check.Response(), send)
 
 
 def test_a_pause_is_five_times_as_long_as_its_request(monkeypatch: pytest.MonkeyPatch) -> None:
