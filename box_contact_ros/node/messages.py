@@ -61,7 +61,8 @@ class KeptMessages:
 
         They are overwritten by the next call.
         """
-        for row in self._covariance[len(self._messages):len(names)]:
+        while len(self._messages) < len(names):
+            row = self._covariance[len(self._messages)]
             self._messages.append(ContactMessage(covariance=row))
         numbers = native.message_numbers(contacts.point, contacts.normal, contacts.separation,
                                          contacts.volume, contacts.covariance)

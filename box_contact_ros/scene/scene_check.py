@@ -30,7 +30,7 @@ Row = tuple[float, ...]  # numbers of one box
 NO_POSE: Row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 NO_SIZE: Row = (0.0, 0.0, 0.0)
 """Pose and size of a new message: of a fixed box, only the name is given."""
-A_BODY: Row = (1.0, 1.0, 1.0)  # instead of the size of a body
+A_BODY = A_GUEST = (1.0, 1.0, 1.0)  # instead of the size of a body, or of a guest that is absent
 
 
 class SceneCheck:
@@ -46,17 +46,23 @@ class SceneCheck:
         scene = self._scene
         self._names = ['' for _ in range(MOST_BOXES)] + list(scene.names)
         self._size_of = {name: tuple(box.size) for name, box in scene.boxes.items()}
-        self._sizes = np.concatenate((np.ones((MOST_BOXES, 3)), list(self._size_of.values())))
+        self._size_rows = [A_GUEST for _ in range(MOST_BOXES)] + list(self._size_of.values())
+        self._sizes = np.array(self._size_rows)
         fixed = scene.fixed_poses()
         self._fixed = {name: tuple(pose) for name, pose in zip(scene.row_of, fixed.tolist())
                        if not np.isnan(pose[0])}
         self._rows = np.concatenate((np.full((MOST_BOXES, 7), np.nan), fixed))
         self._poses = self._rows[:len(self._names)]
         self._is_fixed = np.concatenate((np.zeros(MOST_BOXES, bool), scene.is_fixed))
-        self._made_for = lru_cache(KEPT_MARGINS)(self._make)
+        self._by_margin: dict[float, tuple[native.BroadPhase, ContactSolver]] = {}
+        self._label_of = lru_cache(MOST_PAIRS)(lambda a, b: scene.pair_of(a, b).label)
 
-    def _make(self, margin: float) -> tuple[native.BroadPhase, ContactSolver]:
+    def _made_for(self, margin: float) -> tuple[native.BroadPhase, ContactSolver]:
         """Return what finds the pairs up to a separation [m], and what solves them."""
+        if margin in self._by_margin:
+            return self._by_margin[margin]
+        if len(self._by_margin) == KEPT_MARGINS:
+            self._by_margin.pop(next(iter(self._by_margin)))
         group, allowed = self._scene.groups
         count = max(1, len(allowed))
         meets = np.zeros((count + 1, count + 1), np.uint8)
@@ -64,9 +70,11 @@ class SceneCheck:
         meets[1:1 + len(allowed), 1:1 + len(allowed)] = allowed
         groups, bodies = (np.concatenate((np.full(MOST_BOXES, guest), of_boxes)).astype(np.int32)
                           for guest, of_boxes in ((0, group + 1), (-1, self._scene.body_of)))
-        return (native.BroadPhase(self._sizes, self._is_fixed, margin,
-                                  self._scene.rows + MOST_BOXES, groups, meets, bodies),
-                ContactSolver(model=self.solver.model, margin=margin))
+        made = self._by_margin[margin] = (
+            native.BroadPhase(self._sizes, self._is_fixed, margin, self._scene.rows + MOST_BOXES,
+                              groups, meets, bodies),
+            ContactSolver(model=self.solver.model, margin=margin))
+        return made
 
     def __call__(self, names: Sequence[str], poses: Sequence[Row], sizes: Sequence[Row],
                  pairs: Sequence[tuple[str, str]] = (), margin: float = 0.0,
@@ -83,13 +91,12 @@ class SceneCheck:
         if not 0.0 <= margin <= LENGTH_MAX:
             raise ValueError(f'margin must lie within 0 and {LENGTH_MAX:g} m, not {margin:g}')
         broad_phase, solver = self._made_for(margin)
-        rows, moving, resized = self._take(names, poses, sizes)
+        rows, moving = self._take(names, poses, sizes)
         try:
             self._place_bodies()
             if pairs:
                 places = self._places(rows, pairs)
             else:
-                broad_phase.resize(resized, self._sizes[resized])
                 places = broad_phase.find(self._poses, self.most_near)[0]
             if len(places) > self.most_near:
                 raise ValueError(f'pairs: more than {self.most_near} are asked for and near, and '
@@ -97,7 +104,7 @@ class SceneCheck:
                                  'matter')
             contacts = solver.batch(self._poses, sizes=self._sizes, pairs=places)
         finally:
-            self._rows[moving] = np.nan
+            native.write_poses(self._rows, moving, [None] * len(moving))
             self._place_bodies()
         return in_contact(places, contacts, margin)
 
@@ -106,7 +113,7 @@ class SceneCheck:
         name_a, name_b = self._names[a], self._names[b]
         if min(a, b) < MOST_BOXES:
             return f'{name_a}_{name_b}', name_a, name_b
-        return self._scene.pair_of(a - MOST_BOXES, b - MOST_BOXES).label, name_a, name_b
+        return self._label_of(a - MOST_BOXES, b - MOST_BOXES), name_a, name_b
 
     def _place_bodies(self) -> None:
         """Write the poses of boxes by those of their bodies."""
@@ -114,16 +121,16 @@ class SceneCheck:
             self._scene.place_boxes(self._rows[MOST_BOXES:])
 
     def _take(self, names: Sequence[str], poses: Sequence[Row], sizes: Sequence[Row],
-              ) -> tuple[dict[str, int], np.ndarray, np.ndarray]:
+              ) -> tuple[dict[str, int], np.ndarray]:
         """Take the poses and sizes of a question.
 
-        Returns the row of each name, the rows (k,) of what moves, and those of them that are boxes.
+        Returns the row of each name, and the rows (k,) of what moves.
         """
         if not 1 <= len(names) <= MOST_BOXES:
             raise ValueError(f'boxes: a request has 1 to {MOST_BOXES} boxes, not {len(names)}')
         rows: dict[str, int] = {}
         moved: dict[int, Row] = {}  # poses by row
-        resized: dict[int, Row] = {}  # sizes of boxes by row
+        resized: dict[int, Row] = {}  # sizes by row, where they differ from those before
         for number, (name, pose, size) in enumerate(zip(names, poses, sizes)):
             if fault := name_fault(name):
                 raise ValueError(f'boxes[{number}].name: {fault}')
@@ -142,9 +149,21 @@ class SceneCheck:
                 self._names[number] = name
             if name not in self._fixed:
                 moved[row] = pose
-                if row < len(self._poses):
+                if row < len(self._size_rows) and size != self._size_rows[row]:
                     resized[row] = size
-        return (rows, _write(self._rows, moved), _write(self._sizes, resized))
+        if resized:
+            self._resize(resized)
+        moving = np.array(list(moved), np.int64)
+        native.write_poses(self._rows, moving, list(moved.values()))
+        return rows, moving
+
+    def _resize(self, sizes: dict[int, Row]) -> None:
+        """Give boxes other sizes, by their rows."""
+        for row, size in sizes.items():
+            self._sizes[row] = self._size_rows[row] = size
+        places, numbers = np.array(list(sizes), np.int64), np.array(list(sizes.values()))
+        for broad_phase, _ in self._by_margin.values():
+            broad_phase.resize(places, numbers)
 
     def _of_scene(self, name: str, pose: Row, size: Row) -> tuple[Row, Row]:
         """Return pose and size of a box or body: its own, or those that the scene has.
@@ -199,11 +218,3 @@ class SceneCheck:
             places += product(boxes_of(a, f'pairs[{number}].box_a'),
                               boxes_of(b, f'pairs[{number}].box_b'))
         return np.array(places)
-
-
-def _write(table: np.ndarray, rows: dict[int, Row]) -> np.ndarray:
-    """Write numbers into the rows of a table; return these rows (k,)."""
-    places = np.array(list(rows), np.int64)
-    if rows:
-        table[places] = list(rows.values())
-    return places

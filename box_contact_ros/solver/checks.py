@@ -87,9 +87,9 @@ def are_poses(poses: np.ndarray) -> np.ndarray:
 
 def size_fault(size: Sequence[float] | np.ndarray) -> str | None:
     """Return why three full extents [m] are not a size, or None."""
-    extents = [float(value) for value in size]
-    if all(LENGTH_MIN <= value <= LENGTH_MAX for value in extents):
+    if all(LENGTH_MIN <= extent <= LENGTH_MAX for extent in size):
         return None
+    extents = [float(value) for value in size]
     text = '(' + ', '.join(f'{value:g}' for value in extents) + ')'
     if not all(math.isfinite(value) for value in extents):
         return f'{text} is not finite'

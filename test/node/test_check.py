@@ -80,10 +80,12 @@ def test_boxes_of_the_scene_need_no_size(checker: Checker) -> None:
 
 
 def test_a_size_of_its_own_lasts_for_one_question(checker: Checker) -> None:
-    """A box that moves may have another size than in the scene."""
-    for size, found in (((2, 2, 1), []), ((0, 0, 0), ['landing']), ((2, 2, 1), [])):
-        assert labels(asked(checker, a_box('load', TOUCHING, size), a_box('stack', ORIGIN))
-                      ) == found
+    """A box that moves may have another size than in the scene, whatever the margins are."""
+    low, own = (2, 2, 1), (0, 0, 0)
+    for size, margin, found in ((low, 0.0, []), (own, 0.0, ['landing']), (low, 0.0, []),
+                                (own, 0.1, ['landing']), (own, 0.0, ['landing']), (low, 0.1, [])):
+        assert labels(asked(checker, a_box('load', TOUCHING, size), a_box('stack', ORIGIN),
+                            margin=margin)) == found
 
 
 FIXED = (10, 0, 1, 0, 0, 0, 1)
