@@ -100,23 +100,47 @@ print(answer.names[0][0], round(-answer.contacts.separation[0], 6))
 """
 
 
-def test_cpp_with_ros(program, tmp_path: Path) -> None:
-    """The client of ~/check prints what it says, and the node answers as a contact node does."""
+@pytest.fixture(scope='module')
+def cpp_with_ros(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of the C++ examples, built with ROS."""
     cmake = shutil.which('cmake')
     prefixes = [sys.prefix, *os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)]
     if not cmake or not any(Path(prefix, 'share/rclcpp/cmake').is_dir() for prefix in prefixes):
         pytest.skip('rclcpp is not installed')
-    for words in ((cmake, '-S', EXAMPLES / 'cpp', '-B', tmp_path), (cmake, '--build', tmp_path)):
+    built = tmp_path_factory.mktemp('cpp')
+    for words in ((cmake, '-S', EXAMPLES / 'cpp', '-B', built), (cmake, '--build', built)):
         subprocess.run(words, check=True, timeout=PATIENCE)
-    program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready')
-    printed = subprocess.run([tmp_path / 'check_client'], check=True, capture_output=True,
-                             text=True, timeout=PATIENCE).stdout
-    assert f'//   {printed}' in (EXAMPLES / 'cpp/check_client.cpp').read_text('utf-8')
-    with subprocess.Popen([tmp_path / 'ros_node', '--ros-args', '-r', '__ns:=/cpp']) as node:
+    return built
+
+
+def test_cpp_node(cpp_with_ros: Path) -> None:
+    """The node in C++ answers as a contact node does."""
+    with subprocess.Popen([cpp_with_ros / 'ros_node', '--ros-args', '-r', '__ns:=/cpp']) as node:
         try:
             asked = subprocess.run(
                 [sys.executable, '-c', ASK_ONCE, '--ros-args', '-r', '__ns:=/cpp'], check=True,
-                cwd=EXAMPLES, capture_output=True, text=True, timeout=PATIENCE)
+                env=os.environ | {'PYTHONPATH': str(EXAMPLES)}, stdout=subprocess.PIPE, text=True,
+                timeout=PATIENCE)
         finally:
             node.terminate()
     assert asked.stdout == 'box_a_box_b 0.01\n'
+
+
+def test_cpp_client(cpp_with_ros: Path, program) -> None:
+    """The client of ~/check prints what it says."""
+    program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready')
+    printed = subprocess.run([cpp_with_ros / 'check_client'], check=True, capture_output=True,
+                             text=True, timeout=PATIENCE).stdout
+    assert f'//   {printed}' in (EXAMPLES / 'cpp/check_client.cpp').read_text('utf-8')
+
+
+def test_cpp_client_without_node(cpp_with_ros: Path) -> None:
+    """Ctrl-C ends a client that waits for its node, with status 1."""
+    with subprocess.Popen([cpp_with_ros / 'check_client'], stderr=subprocess.PIPE) as client:
+        try:
+            assert b'waits' in client.stderr.readline()
+            time.sleep(1.0)  # rclcpp aborts if its context ends while it begins to wait
+            client.send_signal(signal.SIGINT)
+            assert client.wait(PATIENCE) == 1, client.stderr.read()
+        finally:
+            client.kill()

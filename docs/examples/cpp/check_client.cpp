@@ -17,7 +17,8 @@ int main(int argc, char** argv) {
   rclcpp::init(argc, argv);
   const auto node = rclcpp::Node::make_shared("check_client");
   const auto client = node->create_client<Check>("contact_node/check");
-  client->wait_for_service();
+  RCLCPP_INFO(node->get_logger(), "waits for a contact node");
+  if (!client->wait_for_service()) return 1;  // Ctrl-C
 
   const auto request = std::make_shared<Check::Request>();
   request->boxes.resize(2);  // two 40 ft containers; a new pose is upright, at the origin
@@ -26,8 +27,10 @@ int main(int argc, char** argv) {
   request->boxes[1].name = "stack";
 
   auto future = client->async_send_request(request);
-  rclcpp::spin_until_future_complete(node, future);
-  for (const auto& message : future.get()->contacts.contacts) {
+  if (rclcpp::spin_until_future_complete(node, future) != rclcpp::FutureReturnCode::SUCCESS)
+    return 1;
+  const auto answer = future.get();  // owns the contacts below
+  for (const auto& message : answer->contacts.contacts) {
     const box_contact::Contact contact = box_contact::from_message(message);
     std::printf("%s: %.1f mm deep, %.3f m3\n", message.pair.c_str(), -1e3 * contact.separation,
                 contact.volume);
