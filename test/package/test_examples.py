@@ -92,11 +92,22 @@ def test_record(program, tmp_path: Path) -> None:
 
 ASK_ONCE = """
 import sys, numpy, rclpy
-from lockstep_client import LockstepClient
+from lockstep_client import LockstepClient, PoseStamped
+stamps = set()
+class Client(LockstepClient):
+    def receive(self, data):
+        super().receive(data)
+        stamps.add(self.answer.stamp)
 rclpy.init(args=sys.argv)
+client = Client()
+while not (client.poses[0].get_subscription_count() and client.count_publishers('contacts')):
+    rclpy.spin_once(client, timeout_sec=0.05)
+for _ in range(10):  # the node may not have met this client yet
+    client.poses[0].publish(PoseStamped())  # box B has no pose
+    rclpy.spin_once(client, timeout_sec=0.05)
 stack = numpy.array([0, 0, 0, 0, 0, 0, 1])
-answer = LockstepClient().ask(10**9, stack + numpy.array([0, 0, 2.581, 0, 0, 0, 0]), stack)
-print(answer.names[0][0], round(-answer.contacts.separation[0], 6))
+answer = client.ask(10**9, stack + numpy.array([0, 0, 2.581, 0, 0, 0, 0]), stack)
+print(answer.names[0][0], round(-answer.contacts.separation[0], 6), stamps)
 """
 
 
@@ -123,7 +134,7 @@ def test_cpp_node(cpp_with_ros: Path) -> None:
                 timeout=PATIENCE)
         finally:
             node.terminate()
-    assert asked.stdout == 'box_a_box_b 0.01\n'
+    assert asked.stdout == 'box_a_box_b 0.01 {1000000000}\n'
 
 
 def test_cpp_client(cpp_with_ros: Path, program) -> None:

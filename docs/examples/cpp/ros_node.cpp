@@ -22,21 +22,22 @@ class BoxContactNode : public rclcpp::Node {
     for (int side = 0; side < 2; ++side)
       subscriptions_[side] = create_subscription<PoseStamped>(
           side ? "box_b/pose" : "box_a/pose", rclcpp::SensorDataQoS(),
-          [this, side](const PoseStamped& message) { take(side, message); });
+          [this, side](PoseStamped::ConstSharedPtr message) { take(side, message); });
   }
 
  private:
   static box_contact::Box box_at(const PoseStamped& message) {
-    const auto& [p, q] = std::tie(message.pose.position, message.pose.orientation);
+    const auto& [p, q] = message.pose;
     return {{{p.x, p.y, p.z}, {q.x, q.y, q.z, q.w}}, {12.192, 2.438, 2.591}};
   }
 
-  void take(int side, const PoseStamped& message) try {
+  void take(int side, PoseStamped::ConstSharedPtr message) try {
     last_[side] = message;
-    if (last_[0].header != last_[1].header) return;
+    const auto& [a, b] = last_;
+    if (!a || !b || a->header != b->header) return;
     Contacts answer;
-    answer.header = message.header;
-    const auto contact = box_contact::collide(box_at(last_[0]), box_at(last_[1]));
+    answer.header = message->header;
+    const auto contact = box_contact::collide(box_at(*a), box_at(*b));
     if (contact.colliding)
       answer.contacts.push_back(box_contact::to_message(contact, "box_a_box_b", "box_a", "box_b"));
     contacts_->publish(answer);
@@ -44,7 +45,7 @@ class BoxContactNode : public rclcpp::Node {
     RCLCPP_WARN(get_logger(), "refused: %s", error.what());
   }
 
-  PoseStamped last_[2];
+  PoseStamped::ConstSharedPtr last_[2];
   rclcpp::Publisher<Contacts>::SharedPtr contacts_;
   rclcpp::Subscription<PoseStamped>::SharedPtr subscriptions_[2];
 };
