@@ -152,7 +152,7 @@ def error_table(rows: Sequence[AccuracyRow]) -> str:
         if quantity not in row.errors:
             return ''
         errors = row.errors[quantity]['all']
-        return f'{errors.mean:.2g} / {errors.p99:.2g} / {errors.worst:.2g}'
+        return f'{errors.mean:.2g}, {errors.p99:.2g}, {errors.worst:.2g}'
 
     return markdown_table(
         ['model, set', *ContactErrors._fields],

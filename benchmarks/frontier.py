@@ -52,9 +52,8 @@ from .trials import (
 
 TIMED_SETS = {**SETS, 'just apart': apart, 'landings': landings, 'settled': settled.at_rest,
               'settled cubes': settled.cubes_at_rest}
-IN_SHORT = ('exact', 'mlp', 'mlp-16-16', 'mlp-8-8', 'mlp, idle', 'paper', 'paper-place',
-            'paper-at-rest', 'soup-1', 'soup-8', 'soup-22')
-"""Models in the first table."""
+IN_SHORT = ('exact', 'mlp', 'paper', 'paper-place', 'paper-at-rest', 'soup-1', 'soup-8', 'soup-22')
+"""Models in the short table; other sizes of `mlp` are in that of `traded`."""
 QUICK_MODELS = ('exact', 'mlp', 'paper', 'soup-1', 'soup-8')
 ODD_NORMAL = 10.0  # error of an engine's normal that is explained [deg]
 
@@ -94,21 +93,24 @@ def by_exact(row: FrontierRow, rows: Iterable[FrontierRow]) -> list[float]:
 
 
 def odd_answers(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> Iterator[str]:
-    """Yield a line with the cause for what is odd in the answers of other engines."""
+    """Yield a line per cause, with what is odd in the answers of other engines."""
     def oddness(row: FrontierRow, what: str) -> float:
         errors = row.errors
         return {'missed': errors.missed, 'invented': errors.invented,
                 'normal': 0.0 if math.isnan(errors.normal[1]) else errors.normal[1]}[what]
 
+    by_cause: dict[str, list[str]] = {}
     for engine in engines:
         mine = [row for row in rows if row.name == engine.name]
         for what in ('missed', 'invented', 'normal'):
             worst = max(mine, key=lambda row: oddness(row, what))
             amount = oddness(worst, what)
             if amount > (ODD_NORMAL if what == 'normal' else 0.0):
-                yield (f'{engine.name}, {worst.set}: {what} {amount:.3g}'
-                       f'{"°" if what == "normal" else ""}. '
-                       f'{engine.causes.get(what) or "Cause unknown."}')
+                by_cause.setdefault(engine.causes.get(what, 'Cause unknown.'), []).append(
+                    f'{engine.name}, {worst.set}: {what} {amount:.3g}'
+                    f'{"°" if what == "normal" else ""}')
+    for cause, found in by_cause.items():
+        yield f'{cause} {"; ".join(found)}.'
 
 
 def in_short(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> str:
@@ -126,7 +128,7 @@ def in_short(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> str:
                        if not math.isnan(row.errors.normal[1])]
             lines.append([
                 f'`{name}`, {instruction_set}' if name in CORE_MODELS else name,
-                f'{number(shown.single[0] / 1e3)} / {number(shown.single[1] / 1e3)}',
+                f'{number(shown.single[0] / 1e3)}, {number(shown.single[1] / 1e3)}',
                 number(shown.batch), shown.best if name in rivals else '–',
                 *[number(row.errors.points['all'].p99) if row and row.errors.points else '–'
                   for row in (shown, rest)],
@@ -135,16 +137,18 @@ def in_short(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> str:
                 f'{sum(row.judged for row in mine.values()):,}',
                 sum(row.errors.invented for row in mine.values())])
     return markdown_table(
-        ['', 'single call, p50 / p99 [µs]', 'batch [ns per pair]', 'best point',
+        ['', 'single call, p50, p99 [µs]', 'batch [ns per pair]', 'best point',
          'point error p99, containers [%]', 'settled [%]', 'normal, worst [°]', 'missed',
          'invented'], lines)
 
 
 def calls_table(engines: Iterable[Contestant]) -> str:
     """Return what is called of other engines, and what they return."""
-    return markdown_table(['', 'call', 'returns', 'volume or area', 'one point by'], [
-        [engine.name, f'`{engine.call}`', engine.returns, engine.patch, ', '.join(engine.choices)]
-        for engine in engines], words=5)
+    return markdown_table(['', 'call', 'returns', 'one point by'], [
+        [engine.name, f'`{engine.call}`',
+         engine.returns + ('' if engine.patch == Contestant.patch else f', {engine.patch}'),
+         'any' if engine.choices == Contestant.choices else ', '.join(engine.choices)]
+        for engine in engines], words=4)
 
 
 def write_page(folder: Path, args: Sequence[str] | None, rows: Sequence[FrontierRow],

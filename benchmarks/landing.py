@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
 from itertools import groupby, product
 from multiprocessing import Pool
@@ -120,6 +120,12 @@ def worst(results: Sequence[Landed], name: str, factor: float) -> str:
     return f'{factor * max(values):.2g}'
 
 
+def share(verdicts: Iterable[bool]) -> str:
+    """Return how many landings did something, and how many there are."""
+    listed = list(verdicts)
+    return f'{sum(listed)}/{len(listed)}'
+
+
 def grid_table(outcomes: Sequence[Outcome]) -> str:
     """Return a row per way, rate and latency: how many rest, and the worst of each figure.
 
@@ -138,14 +144,13 @@ def grid_table(outcomes: Sequence[Outcome]) -> str:
                 getattr(result, figure) for result in results) > max(
                 getattr(result, figure) for result in manifold)
             figures.append(f'**{text}**' if is_worse else text)
-        settled = sum(not math.isnan(result.settled) for result in results)
         rows.append([way.contacts,
                      *((f'{timing.rate_hz:g}', f'{1e3 * timing.latency:g}') if way.model
-                       else ('–', '–')), f'{settled} of {len(results)}',
-                     f'{sum(result.at_rest for result in results)} of {len(results)}',
-                     f'{sum(outcome.as_expected for outcome in landed)} of {len(results)}'
+                       else ('–', '–')),
+                     share(result.at_rest for result in results),
+                     share(outcome.as_expected for outcome in landed)
                      if name in PATCHES else '–', *figures])
-    return output.markdown_table(['contacts', 'rate [Hz]', 'latency [ms]', 'settle', 'at rest',
+    return output.markdown_table(['contacts', 'rate [Hz]', 'latency [ms]', 'at rest',
                                   'within limits', *SHOWN_WORST], rows)
 
 
@@ -162,12 +167,12 @@ def added_table(outcomes: Sequence[Outcome]) -> str:
         for way in ways:
             landed = [outcome for outcome in outcomes
                       if (outcome.way, outcome.planned.name) == (way, name)]
-            row.append(f'{sum(outcome.as_expected for outcome in landed)} of {len(landed)}')
-            row.append('' if planned.falls else ' / '.join(
+            row.append(share(outcome.as_expected for outcome in landed))
+            row.append('' if planned.falls else ', '.join(
                 worst([outcome.result for outcome in landed], *figure)
                 for figure in shown.items()))
         rows.append(row)
-    head = [cell for name in ways for cell in (WAYS[name].contacts, 'corner / tilt / depth')]
+    head = [cell for name in ways for cell in (WAYS[name].contacts, 'corner, tilt, depth')]
     return output.markdown_table(['landing', 'expected', *head], rows, words=2)
 
 

@@ -91,7 +91,7 @@ def fault(one: NamedFailure, found: Manifold, bound: float) -> str:
                       np.nan, np.full((3, 3), np.nan))
     along = judge(*pairs, Contacts.of([contact])).along[0]
     if along < one.separation - bound:  # NaN: no normal is given
-        return f'depth {-along:.3g} along the normal'
+        return f'normal {-along:.3g}'
     # Models press boxes that just touch in.
     reach = bound + max(0.0, -one.separation, depth) + PRESSED * size
     beyond = pairs.beyond(found.points).max()

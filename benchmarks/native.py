@@ -45,8 +45,6 @@ EACH = ('exact', 'mlp')
 PERCENTS = {'p50': 50, 'p99.9': 99.9, 'slowest': 100}
 MIXED = 'containers, 20 % touching'
 UNIT = 'mjc_BoxBox, single'
-PACKAGE = ('exact', 'mlp', 'paper')
-"""How the names of this package's contestants begin: they alone depend on the instruction set."""
 OURS = tuple(f'exact {finds}, {way}' for way in ('single', 'batch')
              for finds in ('volume', 'covariance'))
 ROOT = Path(__file__).parents[1]
@@ -340,26 +338,23 @@ def main(args: Sequence[str] | None = None) -> int:
                       for name, chosen in tqdm(by_scene.items(), desc='scenes', unit='scene')}
             del by_set[MIXED]  # its contacts are those of containers
             contacts = {name: each_contact(program, by_set, name, count, passes) for name in names}
-    every = list(dict.fromkeys(one for times in found[names[-1]].values() for one in times
+    best = names[-1]
+    every = list(dict.fromkeys(one for times in found[best].values() for one in times
                                if one != UNIT))
-    ours = [one for one in every if one.startswith(PACKAGE)]
-    shown = {name: every if name == names[-1] else ours for name in reversed(names)}
-    tables = '\n\n'.join(f'## {name}\n\n{sets_table(found[name], columns)}'
-                         for name, columns in shown.items())
+    table = f'## {best}\n\n{sets_table(found[best], every)}'
     versions = [f'MuJoCo {metadata.version("mujoco")}', *(
         f'{name.capitalize()} {package_config(name, "--modversion")}' for name in OPTIONAL
         if name not in missing)]
     output.write_page(
         folder, 'native', args, machine=output.machine(), rounds=rounds, calls=calls, pairs=pairs,
-        tables=tables, slowest=slowest_table(contacts[names[-1]]), slowest_set=names[-1],
-        scenes=scenes_table(by_scene, scenes),
+        table=table, slowest=slowest_table(contacts[best]), scenes=scenes_table(by_scene, scenes),
         passes=passes, code=calls_shown(missing), engines=', '.join(versions), missing=''.join(
             f'\n\nLeft out: {name.capitalize()} is not installed with its headers '
             f'(`{OPTIONAL[name]}`).' for name in missing))
-    found[names[-1]].update(scenes)
+    found[best].update(scenes)
     output.write_csv(folder / 'native.csv', [*csv_rows(found), *contact_rows(contacts)],
                      about=output.machine())
-    print(tables)
+    print(table)
     for name in missing:
         print(f'native: {name.capitalize()} is left out: {OPTIONAL[name]}', file=sys.stderr)
     return int(bool(missing) and not options.quick)

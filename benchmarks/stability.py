@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 
@@ -34,7 +34,10 @@ KNOWN = ('mlp', 'e5_needles', 'outside')
 MODELS = (*GATED, 'soup-8')
 QUICK = 10  # `--quick` asks every so-many-th family
 FAULTS = ('verdicts', 'normals', 'outside', 'not_finite')
-COUNTS, ERRORS = ('cases', 'contacts', *FAULTS), ('depth', 'point_worst', 'volume', 'covariance')
+COUNTED = {'cases': 'cases', 'contacts': 'contacts', 'verdicts': 'wrong verdicts',
+           'normals': 'wrong normals', 'outside': 'points outside', 'not_finite': 'NaN'}
+"""Columns of counts: what a table calls them."""
+ERRORS = ('depth', 'point_worst', 'volume', 'covariance')
 
 
 @dataclass(frozen=True)
@@ -93,16 +96,15 @@ def _worst(errors: np.ndarray) -> float:
     return 100.0 * float(errors.max(initial=0.0))
 
 
-def table(rows: Sequence[StabilityRow]) -> str:
-    """Return the rows as Markdown, families or models."""
+def table(rows: Sequence[StabilityRow], counts: Mapping[str, str] = COUNTED) -> str:
+    """Return the rows as Markdown, families or models; counts: columns, and their heads."""
     def cell(error: float) -> str:
         return '–' if math.isnan(error) else f'{error:.2g}'
 
     return output.markdown_table(
-        ['', 'cases', 'contacts', 'wrong verdicts', 'wrong normals', 'points outside', 'NaN',
-         'depth error [of the size]', 'point [% of the edge]', 'volume [%]',
+        ['', *counts.values(), 'depth error [of the size]', 'point [% of the edge]', 'volume [%]',
          'covariance [% of the trace]'],
-        [[row.family, *(getattr(row, name) for name in COUNTS),
+        [[row.family, *(getattr(row, name) for name in counts),
           *(cell(getattr(row, name)) for name in ERRORS)] for row in rows])
 
 
@@ -110,7 +112,7 @@ def over_all(rows: Sequence[StabilityRow]) -> StabilityRow:
     """Return a model on all families; its name stands where a family's does."""
     return StabilityRow(
         rows[0].model, f'`{rows[0].model}`', point_p99=max(row.point_p99 for row in rows),
-        **{name: sum(getattr(row, name) for row in rows) for name in COUNTS},
+        **{name: sum(getattr(row, name) for row in rows) for name in COUNTED},
         **{name: float(np.max([getattr(row, name) for row in rows])) for name in ERRORS})
 
 
@@ -143,7 +145,7 @@ def main(args: Sequence[str] | None = None) -> int:
     broken = gates(rows)
     output.write_page(
         folder, 'stability', args, machine=about, summary=summary, shown=MODELS[0],
-        families=table(by[MODELS[0]]),
+        families=table(by[MODELS[0]], {'contacts': 'contacts'}),
         verdict=f'Goals missed: {"; ".join(broken)}.' if broken else 'Of `exact` and `mlp`, every '
         'verdict and normal is right. Every point is in both boxes, but some of `mlp` of '
         f'`{KNOWN[1]}`.')

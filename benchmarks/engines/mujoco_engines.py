@@ -47,8 +47,7 @@ def distance(name: str, flags: str) -> Contestant:
         return manifold([(0.5 * (start + end), normal, -result)])
 
     return Contestant(name=f'MuJoCo mj_geomDistance{name}',
-                      call='data.qpos[:] = poses; mj_kinematics(model, data); '
-                      'mj_geomDistance(model, data, 0, 1, 1.0, fromto)'
+                      call='mj_geomDistance(model, data, 0, 1, 1.0, fromto)'
                       f'{flags and f", {flags}"}', returns='distance, two nearest points',
                       package='mujoco', choices=('its point',), boxes=boxes, at=as_qpos, read=read,
                       causes={'normal': _CCD_ENDS + ' The two nearest points coincide, and give no '
@@ -76,8 +75,7 @@ def collision(name: str, shape: Shape, flags: str, normal: str = '', **about: An
         return Manifold(np.array(found.pos), np.array(found.frame)[:, :3], -np.array(found.dist))
 
     return Contestant(name=f'MuJoCo mj_collision{name}',
-                      call='data.qpos[:] = poses; mj_kinematics(model, data); '
-                      f'mj_collision(model, data){flags and f", {flags}"}',
+                      call=f'mj_collision(model, data){flags and f", {flags}"}',
                       returns='up to 8 points with depths, normals',
                       package='mujoco', boxes=boxes, at=as_qpos, read=read, **about,
                       causes={'missed': _CCD_ENDS, 'normal': normal})

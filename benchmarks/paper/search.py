@@ -49,6 +49,7 @@ _CANDIDATES = 1001  # stream of random numbers
 QUICK_COUNTS = (400, 200, 200)  # patterns per set
 GROUP = 64  # candidates that are trained at once
 SHOWN = 1.5  # errors up to which networks are drawn [rad]: some diverge
+SHOWN_BEST = 4  # finalists on the page
 
 Scores = dict[str, float]
 """What is known of a network after a rung; 'error' is what candidates are ranked by."""
@@ -183,16 +184,15 @@ def section(search: Search) -> str:
     last = search.done[-1]
     ranked = ranking([one for one in search.candidates if one.number in last], last)
     rank = next(place for place, one in enumerate(ranked, start=1) if one.shipped)
-    shown = [one for place, one in enumerate(ranked) if place < 8 or one.shipped]
+    shown = [one for place, one in enumerate(ranked) if place < SHOWN_BEST or one.shipped]
     rows = [['-'.join(map(str, one.hidden)) + (', in use' if one.shipped else ''),
              *(f'{value:.4g}' for value in (*search.settings_of(one).values(),
                                             *last[one.number].values()))] for one in shown]
-    rungs = markdown_table(['rung', 'candidates', 'epochs', 'batch'], [
-        [number, f'{rung.candidates:,}', rung.epochs, search.settings.batch]
-        for number, rung in enumerate(search.rungs, start=1)], words=0)
+    rungs = ', '.join(f'{rung.candidates:,} for {rung.epochs}' for rung in search.rungs)
     found = markdown_table(['hidden units', *search.settings_of(ranked[0]), *last[0]], rows,
                            words=0)
-    return (f'\n## {search.name}\n\n{rungs}\n\nThe best finalists.\n\n{found}\n\n'
+    return (f'\n## {search.name}\n\nCandidates and epochs, by rung: {rungs}. A batch has '
+            f'{search.settings.batch} patterns. The best finalists:\n\n{found}\n\n'
             f'The settings in use are {rank} of {len(ranked)} finalists. The best has '
             f'{last[ranked[0].number]["error"]:.4g}, they have {last[0]["error"]:.4g}.\n')
 

@@ -250,14 +250,15 @@ def share_as_written(result: SoupResult, divisions: int) -> float:
 
 
 def table_of_errors(result: SoupResult) -> str:
-    """Return errors by N and regime, then the network's."""
+    """Return errors by N and regime, of coarse soups and the paper's ends, then the network's."""
     def cell(row: Row, column: str, unit: float, digits: int = 0) -> str:
         return f'{unit * row[column]:.{digits}f}' if column in row else ''
 
     head, regimes = ['N', 'misses at exact touch'], REGIMES[1:]
     for regime in regimes:
         head += [f'{regime}: point, mean', 'max', 'normal, mean', 'depth, mean']
-    found = {str(n): [result.soups[regime, n] for regime in regimes] for n in (*COARSE, *PAPER)}
+    found = {str(n): [result.soups[regime, n] for regime in regimes]
+             for n in (*COARSE, min(PAPER), max(PAPER))}
     found['`paper`'] = [result.network, {}]
     lines = []
     for label, (touching, parallel) in found.items():

@@ -96,13 +96,12 @@ def table_1(found: Trainings) -> str:
     return output.markdown_table(['set', '', 'paper', *found], rows, words=2)
 
 
-def by_output(found: Trainings) -> str:
+def by_output(seeds: Sequence[Errors]) -> str:
     """Return MAE and RMSE of each output on the external set."""
-    rows = [[title, figure, *[over_seeds([
+    rows = [[figure, *[over_seeds([
         figures(errors['external'][:, output])[figure] for errors in seeds])
-        for output in range(len(dataset.OUTPUTS))]]
-        for title, seeds in found.items() for figure in ('MAE', 'RMSE')]
-    return output.markdown_table(['', '', *dataset.OUTPUTS], rows, words=2)
+        for output in range(len(dataset.OUTPUTS))]] for figure in ('MAE', 'RMSE')]
+    return output.markdown_table(['', *dataset.OUTPUTS], rows)
 
 
 def spread_of_outputs(seeds: Sequence[Errors]) -> float:
@@ -156,8 +155,8 @@ def sections_1_and_2(tables: Collection[int], step: int) -> list[str]:
         found = {title: list(evaluate(name, step).values()) for title, name in TABLE_1.items()}
         card = with_sets(TABLE_1['mixture'])[0].card
         shares = card['data']['kept']
-        sections.append(_page('table_1', table=table_1(found), by_output=by_output(found),
-                              seeds=len(card['data']['seeds']),
+        sections.append(_page('table_1', table=table_1(found), seeds=len(card['data']['seeds']),
+                              by_output=by_output(found['mixture']),
                               inside=100 * shares[0], beyond=100 * shares[2],
                               spread=spread_of_outputs(found['mixture']),
                               starts=card['training']['seed_1']['starts']))

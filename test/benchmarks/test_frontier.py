@@ -125,7 +125,7 @@ def test_contacts_that_an_engine_misses_are_odd() -> None:
     assert cubes.errors.points['all'].worst == 0.0 and (cubes.rounds[:, 0] > 0.0).all()
     assert containers.errors.missed == containers.judged > 10 and cubes.calls > 30
     line, = frontier.odd_answers(rows, [engine])
-    assert line == f'blind, containers: missed {containers.judged}. Planted.'
+    assert line == f'Planted. blind, containers: missed {containers.judged}.'
 
 
 def test_the_centroid_of_a_polygon() -> None:

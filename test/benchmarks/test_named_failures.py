@@ -59,8 +59,7 @@ def test_every_fault_is_found() -> None:
                        np.array([0.01, 2.01]))
     assert fault(one, phantom, 1e-9) == 'depth 2.01'
     for normal, depth in ((-right.normals, 0.39), (np.array([[1.0, 0, 0]]), 1.1)):
-        assert fault(one, right._replace(normals=normal), 1e-9) == (
-            f'depth {depth:.3g} along the normal')
+        assert fault(one, right._replace(normals=normal), 1e-9) == f'normal {depth:.3g}'
     assert 'outside' in fault(one, right._replace(points=right.points + [0, 0, 0.1]), 1e-9)
     apart = replace(one, pose_b=[0, 0, 0.4, 0, 0, 0, 1], separation=0.1)
     assert fault(apart, right, 1e-9) == 'invented'
