@@ -48,7 +48,8 @@ constexpr double covariance_diagonal_share = 0.25;
 template <class T>
 struct Certificate {
   Mask<T> holds;  // they are
-  Mask<T> closes;  // no piece is lost, and none has too long a lever: only digits may be missing
+  Mask<T>
+      closes;  // the areas of the planes agree: no piece is lost, and only digits may be missing
 };
 
 // The twelve equations, and that no line has too long a lever. `x_n`, `normal` and `size` as in Surface,
@@ -72,8 +73,8 @@ BC_INLINE Certificate<T> certificate(const Columns<T>& x_n, const Triple<T>& nor
   Triple<T> own = abs(entries[0] + (-volume)) * uniform(pair_size);
   Triple<T> beside = max(abs(entries[1]), abs(entries[2]));
   Mask<T> closes = all_of(abs(normal) * uniform(pair_size) <= closure * size);
-  closes &= rounding_of_size * pair_size * lever <= lever_share * error * volume;
   Mask<T> holds = closes & (volume > 0.0);
+  holds &= rounding_of_size * pair_size * lever <= lever_share * error * volume;
   holds &= all_of((own <= uniform(diagonal * volume)) & (beside <= off_diagonal * size));
   return {holds, closes};
 }
