@@ -127,18 +127,19 @@ class Paper:
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
               threads: int = 1) -> tuple[Contacts, int]:
         """Return contacts for poses (n, 7), sizes (n or 1, 3), and the first refused row or −1."""
-        size_a, size_b = (np.broadcast_to(size, (len(a), 3)) for size in (size_a, size_b))
+        size_a, size_b = (size[:1] if np.array_equal(size[1:], size[:-1]) else size
+                          for size in (size_a, size_b))  # many rows of one size are checked once
         fits = np.array([weights.fits(size_a, size_b) for weights in self._weights])
         which = fits.argmax(axis=0)
         first, *others = np.unique(which) if len(which) else (0,)
         contacts, refused = self._weights[first].model.solve(a, b, size_a, size_b, threads, False)
-        misfits = np.flatnonzero(~fits.any(axis=0))
+        misfits = np.flatnonzero(~fits.any(axis=0))[:len(a)]
         if len(misfits) and not 0 <= refused < misfits[0]:
             refused = int(misfits[0])
         for number in others if refused < 0 else ():
             rows = np.flatnonzero(which == number)
-            part, _ = self._weights[number].model.solve(a[rows], b[rows], size_a[rows],
-                                                        size_b[rows], threads, False)
+            sizes = (size[rows] if len(size) > 1 else size for size in (size_a, size_b))
+            part, _ = self._weights[number].model.solve(a[rows], b[rows], *sizes, threads, False)
             contacts.point[rows], contacts.normal[rows] = part.point, part.normal
         return contacts, refused
 

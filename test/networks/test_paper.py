@@ -178,6 +178,20 @@ def test_sizes_and_places_of_rows(name):
         assert np.array_equal(other.normal, many.normal)
 
 
+def test_each_row_by_the_weights_for_its_size():
+    """Cubes and containers in one batch; and no rows at all, whatever their size."""
+    solver = ContactSolver(model=make_model('paper'))
+    parts = [(*touching(np.array(size), n=50, depth=0.05), np.tile(size, (50, 1)))
+             for size in MODELS.values()]
+    a, b, sizes = map(np.concatenate, zip(*parts))
+    found = solver.batch(a, b, size_a=sizes, size_b=sizes)
+    for rows, (a, b, size) in zip((slice(50), slice(50, 100)), parts):
+        alone = solver.batch(a, b, size_a=size[0], size_b=size)
+        assert np.array_equal(found.point[rows], alone.point)
+        assert np.array_equal(found.normal[rows], alone.normal)
+    assert not len(solver.batch(a[:0], b[:0], size_a=(1, 2, 3), size_b=(1, 2, 3)))
+
+
 @pytest.mark.parametrize('sizes, words', [
     (((2, 2, 2), (3, 3, 3)), 'no weights for boxes of 2 × 2 × 2 m and 3 × 3 × 3 m'),
     (((1, 2, 3), (1, 2, 3)), "no weights for boxes of 1 × 2 × 3 m and .*model 'exact'")])
