@@ -36,16 +36,16 @@ inline PyObject* mlp_inputs(PyObject*, PyObject* const* args, Py_ssize_t count) 
   auto features = make<double>({n, features_count});
   each_query(pairs, [&](const Query<double>& q, long row) {
     const Query<double>* queries[] = {&q};
-    mlp::Patches<double> patches(queries);
-    mlp::Cuts<float> cuts(patches.box);
+    mlp::PatchBox<double> box(queries);
+    mlp::Cuts<float> cuts(box);
     std::copy_n(cuts.told, features_count, features.numbers + features_count * row);
-    Triple<double> place = patches.place(patches.box.centre, 0);
+    Triple<double> place = box.point(box.centre, 0);
     write(components<double>(point_in_common_frame(q.pair, place)), middle.numbers + 3 * row);
     Columns<double> common;
     for (int k = 0; k < 3; ++k) {
-      auto axis = k == 2 ? q.axis.normal : triple_of_doubles<double>(patches.frame.in_a[k], 0);
+      auto axis = k == 2 ? q.axis.normal : triple_of_doubles<double>(box.a.axes[k], 0);
       common[k] = q.pair.axes_a * (double(cuts.flip[k]) * axis);
-      half.numbers[3 * row + k] = patches.meetings[0].unit * patches.box.half[k];
+      half.numbers[3 * row + k] = box.meetings[0].unit * box.half[k];
     }
     write(matrix(common), axes.numbers + 9 * row);
   });

@@ -50,7 +50,7 @@ struct Overlap {
     volume = within<F>(said[3] * said[3], least_volume, 1.0F);
   }
   // Move a point that is outside of a box inwards, within the bounds.
-  BC_INLINE void move_into(const Slabs<F>& slabs, const F (&by_half2)[3]) {
+  BC_INLINE void move_into(const Side<F>& slabs, const F (&by_half2)[3]) {
     Triple<F> at =
         (point[0] * slabs.share[0] + point[1] * slabs.share[1]) + point[2] * slabs.share[2];
     Triple<F> off = min(slabs.plus, max(-slabs.minus, at)) - at;
@@ -61,51 +61,10 @@ struct Overlap {
   }
 };
 
-// The patch boxes of one pair, or of two blocks of pairs.
-template <class T>
-struct Patches {
-  using F = Floats<T>;
-  Queries<T> queries;
-  Meeting<T> meetings[together<T>];
-  Frame<F> frame;
-  Origin<T> origins[together<T>];
-  PatchBox<F> box;
-
-  BC_INLINE explicit Patches(Queries<T> of) : queries(of), frame(queries, meet()), box(located()) {}
-
-  // A place in A's frame, from its coordinates along x, y and z about the origin [unit].
-  BC_INLINE Triple<T> place(const F (&from_origin)[3], int block) const {
-    const Meeting<T>& meeting = meetings[block];
-    Triple<F> beside = from_origin[0] * frame.in_a[0] + from_origin[1] * frame.in_a[1];
-    // Axes of float32 are not at right angles to the last digit: z comes from the normal.
-    Triple<T> across = triple_of_doubles<T>(beside, block);
-    T along = doubles<T>(from_origin[2], block) - dot(across, meeting.normal);
-    return (meeting.corner + origins[block].from_a) +
-           meeting.unit * (across + along * meeting.normal);
-  }
-
- private:
-  BC_INLINE const Meeting<T> (&meet())[together<T>] {
-    for (int n = 0; n < together<T>; ++n) meetings[n] = Meeting<T>(*queries[n]);
-    return meetings;
-  }
-  BC_INLINE PatchBox<F> located() {
-    for (int n = 0; n < together<T>; ++n)
-      origins[n] = {*queries[n], meetings[n], doubles<T>(frame.p_is_b, n),
-                    triple_of_doubles<T>(frame.along_edge, n)};
-    auto length = [&](auto get) {
-      return triple_of_floats<T>([&](int n) { return meetings[n].by_unit * get(origins[n]); });
-    };
-    return {frame, length([](const Origin<T>& origin) { return origin.from_a; }),
-            length([](const Origin<T>& origin) { return origin.from_b; }),
-            floats<T>([&](int n) { return meetings[n].by_unit * origins[n].top; })};
-  }
-};
-
 // The covariance L Lᵀ, in the common frame. The network says the lower triangle L: xx, yy, zz, yx, zx, zy
 // [half extents].
 template <class T>
-BC_INLINE Sym<T> covariance(const Patches<T>& patches, const Cuts<Floats<T>>& cuts,
+BC_INLINE Sym<T> covariance(const PatchBox<T>& box, const Cuts<Floats<T>>& cuts,
                             const Overlap<Floats<T>>& overlap, int block) {
   using F = Floats<T>;
   Triple<F> axis[3];
@@ -113,7 +72,7 @@ BC_INLINE Sym<T> covariance(const Patches<T>& patches, const Cuts<Floats<T>>& cu
   for (int i = 0; i < 3; ++i) {
     int j = i == 2 ? 1 : 0, k = i == 0 ? 1 : 2;  // of yx, zx, zy
     const F* said = overlap.said + point_outputs;
-    axis[i] = patches.box.half[i] * patches.frame.in_a[i];
+    axis[i] = box.half[i] * box.a.axes[i];
     root[i] = within<F>(said[i], least_deviation, most_deviation);
     root[3 + i] =
         (cuts.flip[j] * cuts.flip[k]) * within<F>(said[3 + i], -most_deviation, most_deviation);
@@ -122,8 +81,8 @@ BC_INLINE Sym<T> covariance(const Patches<T>& patches, const Cuts<Floats<T>>& cu
                           root[1] * axis[1] + root[5] * axis[2], root[2] * axis[2]};
   Triple<T> c[3];
   for (int i = 0; i < 3; ++i)
-    c[i] = patches.meetings[block].unit *
-           (patches.queries[block]->pair.axes_a * triple_of_doubles<T>(columns[i], block));
+    c[i] = box.meetings[block].unit *
+           (box.queries[block]->pair.axes_a * triple_of_doubles<T>(columns[i], block));
   // Products of floats are exact in float64, so no eigenvalue is below 0 but for the last digit.
   Triple<T> squares = (c[0] * c[0] + c[1] * c[1]) + c[2] * c[2];
   Triple<T> beside = (c[0] * rotated(c[0]) + c[1] * rotated(c[1])) + c[2] * rotated(c[2]);
@@ -142,8 +101,7 @@ struct ByCuts {
   [[gnu::noinline]] static void solve(const Network& network, Queries<T> queries,
                                       Answers<Found<T>, T> found) {
     using F = Floats<T>;
-    mlp::Patches<T> patches(queries);
-    const mlp::PatchBox<F>& box = patches.box;
+    mlp::PatchBox<T> box(queries);
     mlp::Cuts<F> cuts(box);
     constexpr bool patch = std::is_same_v<Found<T>, Moments<T>>;
     mlp::Overlap<F> overlap(network, cuts, patch ? detail::network_outputs : mlp::point_outputs);
@@ -156,12 +114,12 @@ struct ByCuts {
     for (int i = 0; i < 3; ++i) from_origin[i] = box.centre[i] + box.half[i] * overlap.point[i];
     F volume = (8.0F * ((box.half[0] * box.half[1]) * box.half[2])) * overlap.volume;
     for (int n = 0; n < together<T>; ++n) {
-      const Query<T>& query = *patches.queries[n];
-      T unit = patches.meetings[n].unit, unit3 = (unit * unit) * unit;
+      const Query<T>& query = *queries[n];
+      T unit = box.meetings[n].unit, unit3 = (unit * unit) * unit;
       found[n]->centroid =
-          components<T>(point_in_common_frame(query.pair, patches.place(from_origin, n)));
+          components<T>(point_in_common_frame(query.pair, box.point(from_origin, n)));
       found[n]->volume = unit3 * doubles<T>(volume, n);
-      if constexpr (patch) found[n]->covariance = mlp::covariance(patches, cuts, overlap, n);
+      if constexpr (patch) found[n]->covariance = mlp::covariance(box, cuts, overlap, n);
     }
   }
 };

@@ -83,28 +83,36 @@ BC_INLINE T power_of_two(T x, bool inverse) {
   return x;
 }
 
-// Where two boxes meet, in float64 and in A's frame.
+// Where two boxes meet, in float64. Of A is at 0, of B at 1, each in the frame of its box.
 template <class T>
 struct Meeting {
-  Triple<T> normal, normal_b;  // from A to B, in the frame of either box
-  Triple<T> corner, corner_b;  // of A, deepest in B, from A's centre; of B in A, in B's frame [m]
-  Triple<T> gap;               // from there to the corner of B that is deepest in A [m]
-  T depth, least;              // of the boxes, pressed to the least where they hardly overlap [m]
-  T unit, by_unit;             // about the size [m], and its inverse
+  Triple<T> normal[2];     // from A to B
+  Triple<T> corner[2];     // deepest in the other box, from the box's centre [m]
+  Triple<T> gap;           // from A's corner to B's, in A's frame [m]
+  T depth, least;          // of the boxes, pressed to the least where they hardly overlap [m]
+  T unit, by_unit;         // about the size [m], and its inverse
+  Triple<T> to_origin[2];  // near the patch, from the corners [m]
+  T top;                   // of A along the normal, from the origin [m]
 
   Meeting() = default;
   BC_INLINE explicit Meeting(const Query<T>& query) {
     const Pair<T>& pair = query.pair;
     least = depth_floor * pair.size;
     T pressed = max(least + query.axis.separation, T{});
-    normal = query.axis.normal;
-    normal_b = pair.a_in_b * normal;
-    corner = towards(normal, pair.offset_a, pair.half_a);
-    corner_b = -towards(normal_b, pair.offset_b, pair.half_b);
-    gap = pair.offset_a + pair.b_in_a * corner_b - corner - pressed * normal;
+    normal[0] = query.axis.normal;
+    normal[1] = pair.a_in_b * normal[0];
+    corner[0] = towards(normal[0], pair.offset_a, pair.half_a);
+    corner[1] = -towards(normal[1], pair.offset_b, pair.half_b);
+    gap = pair.offset_a + pair.b_in_a * corner[1] - corner[0] - pressed * normal[0];
     depth = max(-query.axis.separation, least);
     unit = power_of_two(pair.size, false);
     by_unit = power_of_two(pair.size, true);
+  }
+  // Put the origin at P's corner, or along its edge from there [unit, A's frame].
+  BC_INLINE void place_origin(const Query<T>& query, T p_is_b, const Triple<T>& along_edge) {
+    to_origin[0] = p_is_b * gap + unit * along_edge;
+    to_origin[1] = query.pair.a_in_b * (to_origin[0] - gap);
+    top = -dot(normal[0], to_origin[0]);
   }
 
  private:
@@ -116,116 +124,30 @@ struct Meeting {
   }
 };
 
-// The axes of the patch box, and what of either box may be in it. Lengths are in units.
+// A box as its patch box meets it, in its own frame. Lengths are in units.
 template <class F>
-struct Frame {
-  Triple<F> in_a[3], in_b[3];  // x, y and z in the frame of either box
-  Triple<F> half_a, half_b;    // half extents of the boxes
-  Triple<F> reach_a, reach_b;  // half of what a box has within the depth, along its axes
-  Flags<F> a_up, b_up;         // directions of A's and of B's axes along the normal
-  F depth, least, p_is_b;      // p_is_b: 0 or 1
-  Triple<F> along_edge;        // from P's corner along its edge to near Q, in A's frame
-
-  template <class T>
-  BC_INLINE Frame(Queries<T> queries, const Meeting<T> (&meetings)[together<T>]) {
-    auto length = [&](auto get) {
-      return triple_of_floats<T>([&](int n) { return meetings[n].by_unit * get(n); });
-    };
-    auto normal = [&](auto get) {
-      return significant<F>(triple_of_floats<T>(get), least_component);
-    };
-    Triple<F> normal_a = normal([&](int n) { return meetings[n].normal; });
-    Triple<F> normal_b = normal([&](int n) { return meetings[n].normal_b; });
-    Triple<F> corner_a = length([&](int n) { return meetings[n].corner; });
-    Triple<F> corner_b = length([&](int n) { return meetings[n].corner_b; });
-    half_a = abs(corner_a);
-    half_b = abs(corner_b);
-    a_up = corner_a >= Triple<F>{};
-    b_up = -corner_b > Triple<F>{};
-    depth = floats<T>([&](int n) { return meetings[n].by_unit * meetings[n].depth; });
-    least = floats<T>([&](int n) { return meetings[n].by_unit * meetings[n].least; });
-    Triple<F> gap = length([&](int n) { return meetings[n].gap; });
-    Columns<F> b_in_a;
-    for (int k = 0; k < 3; ++k)
-      b_in_a[k] = triple_of_floats<T>([&](int n) { return queries[n]->pair.b_in_a[k]; });
-    find(normal_a, normal_b, gap, b_in_a);
-  }
-
- private:
-  BC_INLINE Triple<F> reach(const Triple<F>& half, const Triple<F>& normal) {
-    Triple<F> steep = max(abs(normal), uniform(splat<F>(least_component)));
-    return min(half, (0.5F * depth) * inverses<F>(steep));
-  }
-  BC_INLINE void find(const Triple<F>& normal_a, const Triple<F>& normal_b, const Triple<F>& gap,
-                      const Columns<F>& b_in_a) {
-    Triple<F> zero{}, one = uniform(splat<F>(1.0F));
-    reach_a = reach(half_a, normal_a);
-    reach_b = reach(half_b, normal_b);
-    auto is_b = (reach_b[0] * reach_b[1]) * reach_b[2] < (reach_a[0] * reach_a[1]) * reach_a[2];
-    p_is_b = either<F>(is_b, splat<F>(1.0F), F{});
-    Triple<F> across_a = reach_a * (one - normal_a * normal_a);
-    Triple<F> across_b = reach_b * (one - normal_b * normal_b);
-    Triple<F> across_p = select(is_b, across_b, across_a),
-              across_q = select(is_b, across_a, across_b);
-    LargestOf<F> edge(across_p);
-    Triple<F> normal_p = select(is_b, normal_b, normal_a);
-    F along = edge.of(normal_p);
-    F by = 1.0F / sqrt(max(1.0F - along * along, splat<F>(least_component)));
-    Triple<F> edge_p = edge.axis();
-    auto other = [&](const Columns<F>& axes) {
-      return significant<F>(edge.column(axes), least_component);
-    };
-    Triple<F> edge_a = select(is_b, other(b_in_a), edge_p);
-    Triple<F> edge_b = select(is_b, edge_p, other(transpose(b_in_a)));
-    in_a[2] = normal_a;
-    in_b[2] = normal_b;
-    in_a[0] = by * (edge_a - along * normal_a);
-    in_b[0] = by * (edge_b - along * normal_b);
-    in_a[1] = cross_product<F>(in_a[2], in_a[0]);
-    in_b[1] = cross_product<F>(in_b[2], in_b[0]);
-
-    // Of two edges that cross, the place on P's that is closest to Q's.
-    Triple<F> gap_b = transpose(b_in_a) * gap;
-    Triple<F> from_q = select(is_b, gap, -gap_b), edge_q = select(is_b, edge_a, edge_b);
-    auto is_edge = across_q >= uniform(largest(across_q));
-    Triple<F> across = choose(is_edge, zero, edge_q);
-    F place = -dot(across, from_q) / max<F>(dot(across, across), splat<F>(least_component));
-    F inwards = edge.of(select(is_b, choose(b_up, one, -one), choose(a_up, -one, one)));
-    F farthest = 2.0F * edge.of(select(is_b, reach_b, reach_a));
-    place = min<F>(farthest, max<F>(inwards * place, F{}));
-    along_edge = (inwards * place) * edge_a;
-  }
-};
-
-// The origin near the patch, from the corners of both boxes, in float64.
-template <class T>
-struct Origin {
-  Triple<T> from_a, from_b;  // from A's corner in A's frame, and from B's in B's [m]
-  T top;                     // of A along the normal, from the origin [m]
-
-  Origin() = default;
-  BC_INLINE Origin(const Query<T>& query, const Meeting<T>& meeting, T p_is_b,
-                   const Triple<T>& along_edge) {
-    from_a = p_is_b * meeting.gap + meeting.unit * along_edge;
-    from_b = query.pair.a_in_b * (from_a - meeting.gap);
-    top = -dot(meeting.normal, from_a);
-  }
-};
-
-// Half-spaces of a box: −minus ≤ Σ share_i u_i ≤ plus for u from −1 to 1, one slab for each axis of the
-// box. `plus` is the side of the corner that is deepest in the other box. Lengths are in units.
-template <class F>
-struct Slabs {
+struct Side {
+  Triple<F> axes[3];  // x, y and z of the patch box
+  Triple<F> corner;   // deepest in the other box, from the centre: plus or minus the half extents
+  Triple<F> reach;    // half of what is within the depth, along the box's axes
+  // Its half-spaces, a slab for each of its axes: −minus ≤ Σ share_i u_i ≤ plus, u from −1 to 1. `plus`
+  // is the side of the corner.
   Triple<F> share[3], plus, minus;
 
-  Slabs() = default;
-  // corner: from the origin, in the box's frame.
-  BC_INLINE Slabs(const Triple<F> (&axes)[3], const Flags<F>& up, bool is_a, const Triple<F>& half,
-                  const Triple<F>& corner) {
-    auto towards = [&](const Triple<F>& x) { return is_a ? choose(up, x, -x) : choose(up, -x, x); };
-    for (int i = 0; i < 3; ++i) share[i] = towards(axes[i]);
-    plus = towards(corner);
-    minus = 2.0F * half - plus;
+  // Numbers along the box's axes, counted towards the corner.
+  BC_INLINE Triple<F> outwards(const Triple<F>& x) const {
+    return choose(corner >= Triple<F>{}, x, -x);
+  }
+  BC_INLINE F reach_volume() const { return (reach[0] * reach[1]) * reach[2]; }
+  // How far what is within the depth runs across the normal, for each axis.
+  BC_INLINE Triple<F> across() const {
+    return reach * (uniform(splat<F>(1.0F)) - axes[2] * axes[2]);
+  }
+  // Slabs about the origin. to_origin: from the corner.
+  BC_INLINE void find_slabs(const Triple<F>& to_origin) {
+    for (int i = 0; i < 3; ++i) share[i] = outwards(axes[i]);
+    plus = outwards(-to_origin);
+    minus = 2.0F * abs(corner) - plus;
   }
   // Go on from a place on axis i.
   BC_INLINE void move(int i, F place) {
@@ -233,10 +155,11 @@ struct Slabs {
     plus = plus - moved;
     minus = minus + moved;
   }
-  BC_INLINE Slabs moved(int i, F place) const {
-    Slabs there = *this;
-    there.move(i, place);
-    return there;
+  // Grow on both sides along axis i.
+  BC_INLINE void grow(int i, F more) {
+    Triple<F> grown = more * abs(share[i]);
+    plus = plus + grown;
+    minus = minus + grown;
   }
   // Reduce how far coordinate i may be above and below, where the others have half extents `half`.
   BC_INLINE void bound(int i, const F (&half)[3], F& above, F& below) const {
@@ -247,64 +170,146 @@ struct Slabs {
     above = min<F>(above, least_of<F>(by_share * (rest + choose(forwards, plus, minus))));
     below = min<F>(below, least_of<F>(by_share * (rest + choose(forwards, minus, plus))));
   }
-  // Grow on both sides along axis i.
-  BC_INLINE void grow(int i, F more) {
-    Triple<F> grown = more * abs(share[i]);
-    plus = plus + grown;
-    minus = minus + grown;
-  }
 };
 
-template <class F>
+// The patch box of one pair, or those of two blocks of pairs.
+template <class T>
 struct PatchBox {
+  using F = Floats<T>;
+  Queries<T> queries;
+  Meeting<T> meetings[together<T>];
+  Side<F> a, b;
   F centre[3], half[3];  // along x, y and z, from the origin [unit]
-  Slabs<F> a, b;
 
-  // from_a, from_b, top: of `Origin`.
-  BC_INLINE PatchBox(const Frame<F>& frame, const Triple<F>& from_a, const Triple<F>& from_b, F top)
-      : a(frame.in_a, frame.a_up, true, frame.half_a, -from_a),
-        b(frame.in_b, frame.b_up, false, frame.half_b, -from_b) {
-    // Beyond the far end of a box that is less thick than the depth there is no overlap.
-    auto beyond = [&](const Triple<F>& box_half, const Triple<F>& normal) {
-      return max<F>(frame.depth - 2.0F * dot(box_half, abs(normal)), F{});
-    };
-    F above_b = beyond(frame.half_b, frame.in_b[2]), below_a = beyond(frame.half_a, frame.in_a[2]);
-    F half_depth = 0.5F * max<F>((frame.depth - above_b) - below_a, frame.least);
-    Triple<F> into_a = choose(frame.a_up, -frame.reach_a, frame.reach_a) - from_a;
-    Triple<F> into_b = choose(frame.b_up, frame.reach_b, -frame.reach_b) - from_b;
-    for (int i = 0; i < 2; ++i) {
-      F at_a = dot(into_a, frame.in_a[i]), reach_a = dot(frame.reach_a, abs(frame.in_a[i]));
-      F at_b = dot(into_b, frame.in_b[i]), reach_b = dot(frame.reach_b, abs(frame.in_b[i]));
-      F low = max<F>(at_a - reach_a, at_b - reach_b), high = min<F>(at_a + reach_a, at_b + reach_b);
-      centre[i] = 0.5F * (low + high);
-      half[i] = max<F>(0.5F * (high - low), frame.least);
+  BC_INLINE explicit PatchBox(Queries<T> of) : queries(of) {
+    for (int n = 0; n < together<T>; ++n) meetings[n] = Meeting<T>(*queries[n]);
+    depth = length([](const auto& meeting) { return meeting.depth; });
+    least = length([](const auto& meeting) { return meeting.least; });
+    for (int s = 0; s < 2; ++s) {
+      Side<F>& side = s ? b : a;
+      side.axes[2] = significant<F>(
+          triple_of_floats<T>([&](int n) { return meetings[n].normal[s]; }), least_component);
+      side.corner = place([s](const auto& meeting) { return meeting.corner[s]; });
+      Triple<F> steep = max(abs(side.axes[2]), uniform(splat<F>(least_component)));
+      side.reach = min(abs(side.corner), (0.5F * depth) * inverses<F>(steep));
     }
-    centre[2] = (top - above_b) - half_depth;
-    half[2] = half_depth;
-    for (Slabs<F>* slabs : {&a, &b}) slabs->move(2, centre[2]), slabs->move(1, centre[1]);
-    // Faces of P that meet in the edge along x bound y, whatever x is.
-    F above = half[1], below = above;
-    bound(1, a.moved(0, centre[0]), b.moved(0, centre[0]), frame.least, above, below);
-    F shift = 0.5F * (above - below);
-    centre[1] = centre[1] + shift;
-    half[1] = 0.5F * max<F>(above + below, frame.least);
-    for (Slabs<F>* slabs : {&a, &b}) slabs->move(1, shift);
-    // x from the origin: edges that cross meet there, and the middle of the edges may be far.
-    above = half[0] + centre[0], below = half[0] - centre[0];
-    bound(0, a, b, frame.least, above, below);
-    centre[0] = 0.5F * (above - below);
-    half[0] = 0.5F * max<F>(above + below, frame.least);
-    for (Slabs<F>* slabs : {&a, &b}) {
-      slabs->move(0, centre[0]);
-      for (int i = 0; i < 3; ++i) slabs->share[i] = half[i] * slabs->share[i];
-    }
+    find_axes_and_origin();
+    bound_by_reach();
+    bound_by_slabs();
+    for (int i = 0; i < 3; ++i)
+      a.share[i] = half[i] * a.share[i], b.share[i] = half[i] * b.share[i];
+  }
+
+  // A point in A's frame, from its coordinates along x, y and z about the origin [unit].
+  BC_INLINE Triple<T> point(const F (&from_origin)[3], int block) const {
+    const Meeting<T>& meeting = meetings[block];
+    Triple<F> beside = from_origin[0] * a.axes[0] + from_origin[1] * a.axes[1];
+    // Axes of float32 are not at right angles to the last digit: z comes from the normal.
+    Triple<T> across = triple_of_doubles<T>(beside, block), normal = meeting.normal[0];
+    T along = doubles<T>(from_origin[2], block) - dot(across, normal);
+    return (meeting.corner[0] + meeting.to_origin[0]) + meeting.unit * (across + along * normal);
   }
 
  private:
+  F depth, least;  // [unit]
+
+  // What all meetings have, in units.
+  template <class Of>
+  BC_INLINE F length(const Of& of) const {
+    return floats<T>([&](int n) { return meetings[n].by_unit * of(meetings[n]); });
+  }
+  template <class Of>
+  BC_INLINE Triple<F> place(const Of& of) const {
+    return triple_of_floats<T>([&](int n) { return meetings[n].by_unit * of(meetings[n]); });
+  }
+
+  BC_INLINE void find_axes_and_origin() {
+    auto is_b = b.reach_volume() < a.reach_volume();
+    Triple<F> across_a = a.across(), across_b = b.across();
+    Triple<F> across_q = select(is_b, across_a, across_b);
+    LargestOf<F> edge(select(is_b, across_b, across_a));
+    F along = edge.of(select(is_b, b.axes[2], a.axes[2]));
+    F by = 1.0F / sqrt(max(1.0F - along * along, splat<F>(least_component)));
+    Columns<F> b_in_a;
+    for (int k = 0; k < 3; ++k)
+      b_in_a[k] = triple_of_floats<T>([&](int n) { return queries[n]->pair.b_in_a[k]; });
+    Columns<F> a_in_b = transpose(b_in_a);
+    auto seen = [&](const Columns<F>& axes) {
+      return significant<F>(edge.column(axes), least_component);
+    };
+    Triple<F> edge_a = select(is_b, seen(b_in_a), edge.axis());
+    Triple<F> edge_b = select(is_b, edge.axis(), seen(a_in_b));
+    a.axes[0] = by * (edge_a - along * a.axes[2]);
+    b.axes[0] = by * (edge_b - along * b.axes[2]);
+    for (Side<F>* side : {&a, &b}) side->axes[1] = cross_product<F>(side->axes[2], side->axes[0]);
+
+    // Of two edges that cross, the place on P's that is closest to Q's.
+    Triple<F> gap = place([](const auto& meeting) { return meeting.gap; });
+    Triple<F> from_q = select(is_b, gap, -(a_in_b * gap)), edge_q = select(is_b, edge_a, edge_b);
+    auto is_edge = across_q >= uniform(largest(across_q));
+    Triple<F> zero{}, one = uniform(splat<F>(1.0F)), across = choose(is_edge, zero, edge_q);
+    F on_edge = -dot(across, from_q) / max<F>(dot(across, across), splat<F>(least_component));
+    F inwards = edge.of(select(is_b, b.outwards(-one), a.outwards(-one)));
+    F farthest = 2.0F * edge.of(select(is_b, b.reach, a.reach));
+    on_edge = min<F>(farthest, max<F>(inwards * on_edge, F{}));
+    Triple<F> along_edge = (inwards * on_edge) * edge_a;
+    F p_is_b = either<F>(is_b, splat<F>(1.0F), F{});
+    for (int n = 0; n < together<T>; ++n)
+      meetings[n].place_origin(*queries[n], doubles<T>(p_is_b, n),
+                               triple_of_doubles<T>(along_edge, n));
+  }
+
+  // By what is within the depth.
+  BC_INLINE void bound_by_reach() {
+    Triple<F> to_origin_a = place([](const auto& meeting) { return meeting.to_origin[0]; });
+    Triple<F> to_origin_b = place([](const auto& meeting) { return meeting.to_origin[1]; });
+    a.find_slabs(to_origin_a);
+    b.find_slabs(to_origin_b);
+    // Beyond the far end of a box that is less thick than the depth there is no overlap.
+    auto beyond = [&](const Side<F>& side) {
+      return max<F>(depth - 2.0F * dot(abs(side.corner), abs(side.axes[2])), F{});
+    };
+    F above_b = beyond(b), below_a = beyond(a);
+    half[2] = 0.5F * max<F>((depth - above_b) - below_a, least);
+    centre[2] = (length([](const auto& meeting) { return meeting.top; }) - above_b) - half[2];
+    auto middle_of = [](const Side<F>& side, const Triple<F>& to_origin) {
+      return side.outwards(-side.reach) - to_origin;
+    };
+    Triple<F> middle_a = middle_of(a, to_origin_a), middle_b = middle_of(b, to_origin_b);
+    for (int i = 0; i < 2; ++i) {
+      F at_a = dot(middle_a, a.axes[i]), reach_a = dot(a.reach, abs(a.axes[i]));
+      F at_b = dot(middle_b, b.axes[i]), reach_b = dot(b.reach, abs(b.axes[i]));
+      F low = max<F>(at_a - reach_a, at_b - reach_b), high = min<F>(at_a + reach_a, at_b + reach_b);
+      centre[i] = 0.5F * (low + high);
+      half[i] = max<F>(0.5F * (high - low), least);
+    }
+  }
+
+  BC_INLINE void bound_by_slabs() {
+    move(2, centre[2]);
+    move(1, centre[1]);
+    // Faces of P that meet in the edge along x bound y, whatever x is.
+    Side<F> there_a = a, there_b = b;
+    there_a.move(0, centre[0]);
+    there_b.move(0, centre[0]);
+    F above = half[1], below = above;
+    bound(1, there_a, there_b, above, below);
+    F shift = 0.5F * (above - below);
+    centre[1] = centre[1] + shift;
+    move(1, shift);
+    // x from the origin: edges that cross meet there, and the middle of the edges may be far.
+    above = half[0] + centre[0], below = half[0] - centre[0];
+    bound(0, a, b, above, below);
+    centre[0] = 0.5F * (above - below);
+    move(0, centre[0]);
+  }
+  BC_INLINE void move(int i, F place) {
+    a.move(i, place);
+    b.move(i, place);
+  }
   // Reduce how far coordinate i may be above and below. Boxes that touch along several axes have no
   // overlap: B grows as far as the overlap lacks of the least width.
-  BC_INLINE void bound(int i, const Slabs<F>& of_a, const Slabs<F>& of_b, F least, F& above,
-                       F& below) {
+  BC_INLINE void bound(int i, const Side<F>& of_a, const Side<F>& of_b, F& above, F& below) {
     F above_b = above, below_b = below, least_above = -below, least_below = -above;
     of_a.bound(i, half, above, below);
     of_b.bound(i, half, above_b, below_b);
@@ -314,6 +319,7 @@ struct PatchBox {
     b.grow(i, lacking);
     above = min<F>(above, above_b + lacking);
     below = min<F>(below, below_b + lacking);
+    half[i] = 0.5F * max<F>(above + below, least);
   }
 };
 
@@ -334,9 +340,10 @@ template <class F>
 struct Cuts {
   F flip[3], told[up_to_fours(features)];
 
-  BC_INLINE explicit Cuts(const PatchBox<F>& box) {
+  template <class T>
+  BC_INLINE explicit Cuts(const PatchBox<T>& box) {
     for (F& number : told) number = F{};
-    Slabs<F> slabs[2] = {box.a, box.b};
+    Side<F> slabs[2] = {box.a, box.b};
     Triple<F> one = uniform(splat<F>(1.0F)), whole = uniform(splat<F>(2.0F)), zero{};
     Triple<F> depth[2], pull[2][3];
     for (int n = 0; n < 2; ++n) {
@@ -365,7 +372,7 @@ struct Cuts {
     told[8] = flip[0] * flip[1] * add_products(0, 1);
     told[9] = flip[0] * flip[2] * add_products(0, 2);
     told[10] = flip[1] * flip[2] * add_products(1, 2);
-    for (const Slabs<F>& of_box : slabs) {
+    for (const Side<F>& of_box : slabs) {
       Triple<F> a[3];
       for (int i = 0; i < 3; ++i) a[i] = flip[i] * of_box.share[i];
       Triple<F> along = a[0] + a[1], against = a[0] - a[1];
