@@ -154,17 +154,18 @@ class TickAnswerer:
         started = time.perf_counter_ns()
         answer = self.solver(tick.poses)
         took = time.perf_counter_ns() - started
-        header = head = header_bytes(tick.stamp, tick.frame_id)
+        header = header_bytes(tick.stamp, tick.frame_id)
+        head, end = aligned(header), 0
         touching, of_pair = answer.touching, self._topics.of_pair
         points, normals = answer.contacts.point.tobytes(), answer.contacts.normal.tobytes()
-        for row, (a, b) in enumerate(answer.pairs.tolist()[:touching] if of_pair else ()):
+        for a, b in answer.pairs.tolist()[:touching] if of_pair else ():
             if self._stamps_differ:
                 newest = max([tick.stamps[side] for side in self._sides[a, b]])
-                head = header_bytes(newest, tick.frame_id)
-            start, numbers = aligned(head), slice(VECTOR_BYTES * row, VECTOR_BYTES * (row + 1))
-            publishers = of_pair[a, b]
-            publishers[0].publish(start + points[numbers])
-            publishers[1].publish(start + normals[numbers])
+                head = aligned(header_bytes(newest, tick.frame_id))
+            begin, end = end, end + VECTOR_BYTES
+            point, normal = of_pair[a, b]
+            point.publish(head + points[begin:end])
+            normal.publish(head + normals[begin:end])
         self._topics.contacts.publish(self._writer.contacts(header, answer))
         # What nobody waits for comes last. A box that an array leaves out is not there: nobody
         # asks for its pairs.

@@ -140,13 +140,16 @@ class Tick(NamedTuple):
     def of(cls, scene: Scene, poses: TickPoses) -> Tick:
         """Return the tick of poses; raises FramesDiffer."""
         frame_id = scene.frame_id or None
+        numbers: list[Any] = []
+        stamps: list[int] = []
         for pose in poses:
-            if pose is not None and pose.frame_id != frame_id:
-                if frame_id is not None:
+            seven, frame, stamp = pose or (None, frame_id, NEVER)
+            if frame != frame_id:
+                if pose is not None and frame_id is not None:
                     raise FramesDiffer(scene, poses, pose)
-                frame_id = pose.frame_id
-        stamps = [NEVER if pose is None else pose.stamp for pose in poses]
-        numbers = [pose and pose.numbers for pose in poses]
+                frame_id = frame
+            numbers.append(seven)
+            stamps.append(stamp)
         return cls(max(stamps), frame_id or '', numbers[0] if scene.pose_array else numbers, stamps)
 
 
