@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -91,14 +92,14 @@ def test_record(program, tmp_path: Path) -> None:
 
 
 ASK_ONCE = """
-import sys, numpy, rclpy
+import numpy, rclpy
 from lockstep_client import LockstepClient, PoseStamped
 stamps = set()
 class Client(LockstepClient):
     def receive(self, data):
         super().receive(data)
         stamps.add(self.answer.stamp)
-rclpy.init(args=sys.argv)
+rclpy.init()
 client = Client()
 while not (client.poses[0].get_subscription_count() and client.count_publishers('contacts')):
     rclpy.spin_once(client, timeout_sec=0.05)
@@ -111,27 +112,53 @@ print(answer.names[0][0], round(-answer.contacts.separation[0], 6), stamps)
 """
 
 
+LOAD = """
+import sys, rclpy
+from composition_interfaces.srv import LoadNode
+rclpy.init()
+node = rclpy.create_node('loader')
+load = node.create_client(LoadNode, 'ComponentManager/_container/load_node')
+load.wait_for_service()
+future = load.call_async(LoadNode.Request(
+    package_name='box_contact_examples', plugin_name='BoxContactNode'))
+rclpy.spin_until_future_complete(node, future)
+sys.exit(future.result().error_message or 0)
+"""
+
+
 @pytest.fixture(scope='module')
-def cpp_with_ros(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of the C++ examples, built with ROS."""
-    cmake = shutil.which('cmake')
+def cpp_with_ros(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Return where the C++ examples are installed with ROS; processes find their libraries."""
     prefixes = [sys.prefix, *os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)]
-    if not cmake or not any(Path(prefix, 'share/rclcpp/cmake').is_dir() for prefix in prefixes):
+    cmake = shutil.which('cmake')
+    if not cmake or not any(Path(p, 'share/rclcpp_components/cmake').is_dir() for p in prefixes):
         pytest.skip('rclcpp is not installed')
-    built = tmp_path_factory.mktemp('cpp')
-    for words in ((cmake, '-S', EXAMPLES / 'cpp', '-B', built), (cmake, '--build', built)):
-        subprocess.run(words, check=True, timeout=PATIENCE)
-    return built
+    built = tmp_path_factory.mktemp('built')
+    installed = tmp_path_factory.mktemp('installed')
+    for words in (['-S', EXAMPLES / 'cpp', '-B', built, f'-DCMAKE_INSTALL_PREFIX={installed}'],
+                  ['--build', built], ['--install', built]):
+        subprocess.run([cmake, *words], check=True, timeout=PATIENCE)
+    with pytest.MonkeyPatch.context() as patch:
+        for name, place in (('LD_LIBRARY_PATH', f'{sys.prefix}/lib'),
+                            ('LD_LIBRARY_PATH', f'{installed}/lib'),
+                            ('AMENT_PREFIX_PATH', str(installed))):
+            patch.setenv(name, place, prepend=os.pathsep)
+        yield installed / 'lib/box_contact_examples'
 
 
-def test_cpp_node(cpp_with_ros: Path) -> None:
-    """The node in C++ answers as a contact node does."""
-    with subprocess.Popen([cpp_with_ros / 'ros_node', '--ros-args', '-r', '__ns:=/cpp']) as node:
+@pytest.mark.parametrize('name', ['ros_node', 'component_container'])
+def test_cpp_node(cpp_with_ros: Path, name: str) -> None:
+    """The node in C++ answers as a contact node does: as a program, and in a container."""
+    places = os.environ['AMENT_PREFIX_PATH'].split(os.pathsep)
+    programs = [cpp_with_ros / name, *(Path(p, 'lib/rclcpp_components', name) for p in places)]
+    with subprocess.Popen([next(filter(Path.exists, programs))]) as node:
         try:
+            if name == 'component_container':
+                subprocess.run([sys.executable, '-c', LOAD], check=True, timeout=PATIENCE)
             asked = subprocess.run(
-                [sys.executable, '-c', ASK_ONCE, '--ros-args', '-r', '__ns:=/cpp'], check=True,
-                env=os.environ | {'PYTHONPATH': str(EXAMPLES)}, stdout=subprocess.PIPE, text=True,
-                timeout=PATIENCE)
+                [sys.executable, '-c', ASK_ONCE], check=True, stdout=subprocess.PIPE, text=True,
+                env=os.environ | {'PYTHONPATH': os.pathsep.join(
+                    [str(EXAMPLES), os.environ.get('PYTHONPATH', '')])}, timeout=PATIENCE)
         finally:
             node.terminate()
     assert asked.stdout == 'box_a_box_b 0.01 {1000000000}\n'

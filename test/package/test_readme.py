@@ -233,7 +233,7 @@ def launch(words: list[str], **_) -> None:
 def elsewhere(words: list[str], **_) -> None:
     """Leave it to the tests that run it, or to who has ROS: files of the checkout exist."""
     for word in words:
-        name = re.sub(r'^(box_contact_ros/(?=box_contact_msgs|test)|-I|\w+=\$PWD/)', '', word)
+        name = re.sub(r'^(box_contact_ros/(?=box_contact_msgs|docs|test)|-I|\w+=\$PWD/)', '', word)
         if re.match(r'(docs|test|config|\.ci|box_contact_\w+)/', name):
             assert (ROOT / name).exists(), name
 
@@ -241,7 +241,7 @@ def elsewhere(words: list[str], **_) -> None:
 COMMANDS = {
     r'\.ci/lock( --upgrade)?': elsewhere,
     r'(mkdir -p build|g\+\+|build/first|cmake|ln -s).*': elsewhere,
-    r'(rosdep install|colcon|git subtree) .+': elsewhere,
+    r'(rosdep install|colcon|git subtree|ros2 run box_contact_examples) .+': elsewhere,
     r'(export|source|python3 -m venv) \S+': elsewhere,
     r'python (docs/examples|test/helpers)/\w+\.py( /tmp/\w+)?': elsewhere,
     r'(cd box_contact_ros && )?make [\w-]+( .*)?': make,

@@ -1,8 +1,8 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// A rclcpp node that answers in your own process, without the contact node: it publishes the
-// contacts of two 40 ft containers. It is a component where rclcpp_components is installed.
+// A component that answers in your own process, without the contact node: it publishes the contacts
+// of two 40 ft containers.
 //
 // It answers once the poses of both boxes are in with one stamp, and refuses what is no pose.
 #include <stdexcept>
@@ -11,6 +11,7 @@
 #include "box_contact_msgs/msg/contacts.hpp"
 #include "geometry_msgs/msg/pose_stamped.hpp"
 #include "rclcpp/rclcpp.hpp"
+#include "rclcpp_components/register_node_macro.hpp"
 
 using box_contact_msgs::msg::Contacts;
 using geometry_msgs::msg::PoseStamped;
@@ -50,13 +51,4 @@ class BoxContactNode : public rclcpp::Node {
   rclcpp::Subscription<PoseStamped>::SharedPtr subscriptions_[2];
 };
 
-#ifdef BOX_CONTACT_COMPONENT
-#include "rclcpp_components/register_node_macro.hpp"
 RCLCPP_COMPONENTS_REGISTER_NODE(BoxContactNode)
-#else
-int main(int argc, char** argv) {
-  rclcpp::init(argc, argv);
-  rclcpp::spin(std::make_shared<BoxContactNode>(rclcpp::NodeOptions()));
-  rclcpp::shutdown();
-}
-#endif
