@@ -20,9 +20,10 @@ class BoxContactNode : public rclcpp::Node {
  public:
   explicit BoxContactNode(const rclcpp::NodeOptions& options) : Node("box_contact", options) {
     contacts_ = create_publisher<Contacts>("contacts", 10);
+    const auto qos = rclcpp::SensorDataQoS().keep_last(100);  // 100 ms at 1 kHz
     for (int side = 0; side < 2; ++side)
       subscriptions_[side] = create_subscription<PoseStamped>(
-          side ? "box_b/pose" : "box_a/pose", rclcpp::SensorDataQoS(),
+          side ? "box_b/pose" : "box_a/pose", qos,
           [this, side](PoseStamped::ConstSharedPtr message) { take(side, message); });
   }
 
