@@ -114,7 +114,7 @@ EXTRAS = {
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Put the longest files first; leave out what has a make target of its own, unless -m asks."""
-    for marker in {'network', 'training'} - set(config.option.markexpr.split()):
+    for marker in {'arm', 'network', 'training'} - set(config.option.markexpr.split()):
         apart = [item for item in items if item.get_closest_marker(marker)]
         config.hook.pytest_deselected(items=apart)
         items[:] = [item for item in items if item not in apart]

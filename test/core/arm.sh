@@ -15,4 +15,4 @@ for program in aarch64-linux-gnu-g++ qemu-aarch64; do
         exit 1
     }
 done
-exec "${1:-.venv/bin/python}" -m pytest -n 0 -v test/core/test_builds.py -k arm
+exec "${1:-.venv/bin/python}" -m pytest -n 0 -v test/core/test_builds.py -m arm

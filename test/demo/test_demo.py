@@ -28,8 +28,7 @@ def test_an_unknown_model_ends_the_demo_before_it_starts(capsys):
     assert 'did you mean exact?' in capsys.readouterr().err
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize('stopped', [False, True])
+@pytest.mark.parametrize('number, stopped', [(signal.SIGINT, False), (signal.SIGTERM, True)])
 def test_a_signal_ends_the_demo_and_all_processes(number, stopped):
     """Also where they stand still, and whoever asks asks again and again."""
     with started_demo() as (running, output):

@@ -41,7 +41,7 @@ def landed(scenario, *, rate_hz=200.0, latency=0.002, lost=0.0, model='exact'):
 
 
 @pytest.mark.parametrize(('rate_hz', 'latency', 'tilt'), [
-    (50.0, 0.005, 0.06), (200.0, 0.0, 0.01), (200.0, 0.002, 0.01), (1000.0, 0.002, 0.003)])
+    (50.0, 0.005, 0.06), (200.0, 0.002, 0.01)])
 def test_the_held_patch_lands_flat_and_still(rate_hz, latency, tilt):
     """A load at 3° of rope and 3° of tilt; at rest it lies flatter the more often contacts come."""
     result = landed(HARD, rate_hz=rate_hz, latency=latency)
@@ -64,15 +64,14 @@ def test_lost_answers_are_bridged_by_the_patches_that_are_held():
     assert result.at_rest and result.corner_speed < 1e-7, f'\n{result}'
 
 
-@pytest.mark.parametrize('late_at', [5.0, 7.5])
-def test_one_late_answer_is_forgotten(late_at):
-    """Before or after the touch, at 7 s, one is 50 ms late: the load rests flat and not deep."""
+def test_one_late_answer_is_forgotten():
+    """Half a second after the touch, one is 50 ms late: the load rests flat and not deep."""
     scenario = CraneScenario()
     solver = ContactSolver(scenario.size, scenario.stack_size, model='exact')
     loop, came = ClosedLoop(scenario, 200.0), 0.0
     while not loop.record.ended:
         state = loop.ask()
-        came = max(came, state.time + (0.05 if state.tick == 200 * late_at else 0.001))
+        came = max(came, state.time + (0.05 if state.tick == 1500 else 0.001))
         loop.answer(state, {'pair': solver(state.pose, scenario.stack_pose)},
                     latency=came - state.time)
         loop.step()

@@ -213,9 +213,9 @@ def test_a_request_that_rclpy_cannot_read(node, client):
 
 @needs_proc
 def test_nothing_is_lost_at_1_kHz_and_memory_does_not_grow(node, client):
-    """5,000 ticks of two boxes; then some of which a third lacks a partner or has its own frame."""
+    """2,000 ticks of two boxes; then some of which a third lacks a partner or has its own frame."""
     stamps = []
-    for _ in rate_limited(5000, 1000):
+    for _ in rate_limited(2000, 1000):
         stamps.append(client.send_pair(ORIGIN, TOUCHING))
         client.keep_up(stamps)
         client.poll()

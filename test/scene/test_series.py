@@ -104,7 +104,7 @@ def frames(count: int, motions: int) -> tuple[np.ndarray, np.ndarray]:
 # --- the series -----------------------------------------------------------------------------------
 
 CRANE_RATE = 1000.0
-LANDED = {f'landed, case {number}': number for number in (0, 5, 17, 31)}
+LANDED = {f'landed, case {number}': number for number in (17, 31)}
 """Landings of the crane by number of `landing_ways.grid`, the hardest among them."""
 
 

@@ -56,7 +56,8 @@ def test_errors_are_wrapped() -> None:
 # --- what is shipped ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('name', ['paper', 'table-2-by-signs'])
+@pytest.mark.parametrize('name', [
+    'paper', pytest.param('table-2-by-signs', marks=pytest.mark.training)])
 def test_shipped_weights_are_what_their_card_says(name: str) -> None:
     """All sets made again from the seed give the card's figures; inputs lie in its ranges."""
     weights = load_weights(weights_path(name))
@@ -109,7 +110,7 @@ def cells(page: str) -> list[str]:
             for cell in line.split('|')]
 
 
-@pytest.mark.slow
+@pytest.mark.training
 def test_tables_in_the_docs_are_the_shipped_weights(tmp_path: Path) -> None:
     """The first tables of docs/results/paper_tables.md, 1 and 2, are the shipped weights'.
 
