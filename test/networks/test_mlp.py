@@ -39,7 +39,6 @@ from box_contact_ros.solver.contact import FIELDS, Contacts
 from box_contact_ros.solver.pose import rotation_matrix
 
 N = 4000
-UNIT = (1.0, 1.0, 1.0)
 ALL_SETS = {**SETS, **LOADS}
 
 
@@ -186,33 +185,8 @@ def test_the_network_is_really_asked() -> None:
         assert (getattr(one, name) != getattr(other, name)).any(axis=-1).mean() > 0.9, name
 
 
-def test_weights_that_are_no_numbers_are_refused() -> None:
-    """Behind the loader, which refuses them too."""
-    numbers = SHIPPED.copy()
-    numbers[0] = np.nan
-    with pytest.raises(ValueError, match='weight that is not within'):
-        with_numbers(drawn('containers', 8), numbers)
-
-
 def test_contacts_are_sound(mlp: ContactSolver, pairs: Pairs) -> None:
     assert_sound(pairs, pairs.contacts(mlp))
-
-
-@pytest.mark.parametrize('size_a, size_b', [((1e-9,) * 3, (1e-9,) * 3), ((1e9,) * 3, (1e9,) * 3),
-                                            (UNIT, (1e-6,) * 3), ((1e-50,) * 3, (1e-50,) * 3),
-                                            ((1e50,) * 3, (1e50,) * 3)])
-def test_extreme_sizes(mlp: ContactSolver, size_a: tuple, size_b: tuple) -> None:
-    """From the smallest to the largest that is accepted: nothing over- or underflows."""
-    n = 64
-    b = np.tile(poses.IDENTITY, (n, 1))
-    b[:, 2] = (0.5 * (size_a[2] + size_b[2])
-               - min(size_a[2], size_b[2]) * np.linspace(0.0, 0.2, n))
-    b[:, :2] = 0.1 * size_b[0]
-    pairs = Pairs(np.tile(poses.IDENTITY, (n, 1)), b, np.tile(size_a, (n, 1)),
-                  np.tile(size_b, (n, 1)))
-    found = pairs.contacts(mlp)
-    assert found.colliding.all()
-    assert_sound(pairs, found)
 
 
 @pytest.mark.skipif(platform.machine() != 'x86_64', reason='flags of other processors differ')
@@ -429,14 +403,6 @@ def test_weights_with_another_meaning_are_refused(
     """They would be taken without complaint, and answer nonsense."""
     with pytest.raises(WeightsError, match=words):
         make_model('mlp', weights=written(tmp_path / 'other', **change))
-
-
-@pytest.mark.parametrize('numbers', [SHIPPED[:-1], SHIPPED[2:], np.zeros(1, np.float32),
-                                     np.r_[np.float32(9), SHIPPED[1:]],
-                                     np.r_[SHIPPED[:1], np.float32(65), SHIPPED[2:]]])
-def test_numbers_that_are_no_network_are_refused(numbers: np.ndarray) -> None:
-    with pytest.raises(ValueError, match='the network does not fit'):
-        native.Mlp(numbers)
 
 
 @pytest.mark.parametrize('name', MLP_SIZES)

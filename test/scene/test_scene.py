@@ -183,24 +183,6 @@ def test_what_is_no_pose_is_refused(bad, pairs):
         SceneSolver(scene, model='exact')([bad] + [poses.IDENTITY] * pairs)
 
 
-@pytest.mark.parametrize('pairs', [1, 2])
-def test_as_many_poses_as_boxes_that_move(pairs):
-    boxes = {name: Box((1.0, 1.0, 1.0), pose_topic=name) for name in 'abc'[:pairs + 1]}
-    scene = Scene(boxes, (Pair('ab', 'a', 'b'), Pair('bc', 'b', 'c'))[:pairs])
-    solver = SceneSolver(scene, model='exact')
-    assert len(solver([None] * (pairs + 1)).stale) == pairs
-    for count in (pairs, pairs + 2):
-        with pytest.raises(ValueError, match=f'{count} poses, but {pairs + 1} boxes and bodies '
-                                             "move: .'a'"):
-            solver([poses.IDENTITY] * count)
-
-
-def test_a_pair_that_is_listed_twice_is_refused():
-    pair = Pair.between('a', 'b')
-    with pytest.raises(ValueError, match=r"pairs\[1\].name: the same name as that of 'a' and 'b'"):
-        Scene({name: Box((1, 1, 1)) for name in 'ab'}, (pair, pair))
-
-
 def test_a_name_is_no_longer_than_ros_takes():
     """Made names of pairs may be: they are two names."""
     def scene(a, name, frame_id=''):
@@ -248,13 +230,6 @@ def test_a_scene_file_refuses_a_box_in_the_words_of_box(tmp_path, key, value, re
         assert str(of_file.value) == f'{path}: boxes.b.{key}: {fault.reason}'
 
 
-def test_a_plan_in_which_nothing_moves_is_told_what_to_do():
-    fixed = {name: Box((1, 1, 1), (0, 0, 0, 0, 0, 0, 1)) for name in 'ab'}
-    for asked in ({'pairs': (Pair('ab', 'a', 'b'),)}, {'patterns': EVERY_PAIR}):
-        with pytest.raises(SceneError, match='leave `pose` out of a box that moves, and give its'):
-            Scene(fixed, **asked)
-
-
 def test_two_boxes_is_the_solver():
     rng = np.random.default_rng(2)
     solver = SceneSolver(two_boxes(poses.CUBE, poses.CONTAINER))
@@ -295,12 +270,3 @@ def test_models_that_do_not_know_a_size_refuse_the_scene():
         SceneSolver(yard(1, 2, 2), model='nothing')
     with pytest.raises(ValueError, match="use model 'exact'"):
         SceneSolver(two_boxes((1, 2, 3), (1, 2, 3)), model=make_model('paper'))
-
-
-@pytest.mark.parametrize('pairs, words', [
-    ((), 'pairs: a scene needs at least one pair'),
-    ((Pair('p', 'a', 'c'),), r"pairs\[0\].b: 'c' is none of the boxes")])
-def test_a_scene_made_in_python_is_checked_too(pairs, words):
-    boxes = {name: Box(poses.CUBE) for name in 'ab'}
-    with pytest.raises(ValueError, match=words):
-        Scene(boxes, pairs)

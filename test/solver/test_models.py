@@ -80,7 +80,7 @@ def test_what_is_no_model(model, words):
 
 @pytest.mark.parametrize('name', ['exact', 'mlp', 'paper', 'soup-2'])
 def test_a_model_answers_for_the_sizes_of_its_call(name):
-    """A solver without sizes is every solver with sizes, and a pickled model answers as before."""
+    """A solver without sizes is every solver with sizes, also in another process."""
     if name == 'soup-2':
         pytest.importorskip('fcl')
     model = make_model(name)
@@ -89,9 +89,10 @@ def test_a_model_answers_for_the_sizes_of_its_call(name):
     size = np.repeat(sizes, 2, axis=0)
     many = ContactSolver(model=model).batch(
         np.tile(pair, (2, 1)), sizes=size, pairs=[[2, 3], [0, 1], [3, 2]])
-    model = pickle.loads(pickle.dumps(model))
     for row, (a, b) in zip(many, ((2, 3), (0, 1), (3, 2))):
-        one = ContactSolver(size[a], size[b], model=model)(pair[a % 2], pair[b % 2])
+        solver = pickle.loads(pickle.dumps(ContactSolver(size[a], size[b], model=model)))
+        assert type(solver.model) is type(model)
+        one = solver(pair[a % 2], pair[b % 2])
         for mine, theirs in zip(*map(poses.fields, (row, one))):
             assert np.array_equal(mine, theirs, equal_nan=True)
     assert many.colliding.all()
@@ -104,9 +105,6 @@ def test_a_size_that_nobody_gave():
         ContactSolver(poses.CUBE).batch([poses.IDENTITY], [HIGHER])
     with pytest.raises(ValueError, match='^sizes is missing'):
         ContactSolver().batch(np.stack([poses.IDENTITY, HIGHER]), pairs=np.array([[0, 1]]))
-    with pytest.raises(ValueError, match=r'^pairs\[0\] is \(0, 2\), but there are 2 poses'):
-        ContactSolver(poses.CUBE, poses.CUBE).batch(
-            np.stack([poses.IDENTITY, HIGHER]), pairs=np.array([[0, 2]]))
 
 
 def test_programs_take_names_of_models():
