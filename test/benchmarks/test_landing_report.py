@@ -68,9 +68,12 @@ def test_the_hardest_of_the_grid_are_within_the_limits_of_held_patches(number, r
     assert result.point_step < 1e-7
 
 
-@pytest.mark.parametrize('planned', ADDED, ids=[planned.name for planned in ADDED])
+@pytest.mark.parametrize('planned', ADDED[1::2], ids=[planned.name for planned in ADDED[1::2]])
 def test_other_loads_and_stacks_do_what_is_expected(planned):
-    """One law, whose constants know the load's mass and inertia and no size."""
+    """One law, whose constants know the load's mass and inertia and no size.
+
+    The report lands the others, too, at nine rates and latencies.
+    """
     outcome = landing.run('exact', LoopTiming(200.0, 0.002), aimed(planned))
     assert outcome.as_expected, f'\n{outcome.result}'
 
@@ -142,13 +145,16 @@ def test_each_way_has_its_timings():
     assert WAYS['manifold'].timings(timings) == timings[-1:]
 
 
-@pytest.mark.parametrize(('way', 'status'), [('exact', 1), ('mlp', 0)])
-def test_what_is_not_as_expected_is_named(tmp_path, monkeypatch, capsys, way, status):
-    """A load that must rest falls: status 1 with the default model, a line with either."""
+def test_what_is_not_as_expected_is_named(tmp_path, monkeypatch, capsys):
+    """A load that must rest falls: status 1 by the default model's, a line with either."""
     falls = dataclasses.replace(ADDED[-1], falls=False, name=f'grid {landing.SHOWN}')
     monkeypatch.setattr(landing, 'grid', lambda: [*[None] * (landing.SHOWN % landing.QUICK), falls])
     monkeypatch.setattr(landing, 'ADDED', [])
     monkeypatch.setattr(landing, 'draw', lambda path, scenario: path.touch())
-    assert landing.main(['--quick', '--ways', way, '--out', str(tmp_path)]) == status
-    assert f'{way} at 200 Hz and 2 ms, grid 17: not as expected' in capsys.readouterr().err
-    assert '**0 of 1** landings by patches' in (tmp_path / 'landing.md').read_text()
+    assert landing.main(['--quick', '--ways', 'exact', 'mlp', '--out', str(tmp_path)]) == 1
+    told = capsys.readouterr().err
+    for way in ('exact', 'mlp'):
+        assert f'{way} at 200 Hz and 2 ms, grid 17: not as expected' in told
+    assert '**0 of 2** landings by patches' in (tmp_path / 'landing.md').read_text()
+    monkeypatch.setattr(landing, 'GATED', 'manifold')
+    assert landing.main(['--quick', '--ways', 'exact', '--out', str(tmp_path)]) == 0

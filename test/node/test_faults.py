@@ -39,7 +39,7 @@ HELPERS = Path(__file__).resolve().parents[1] / 'helpers'
 CUBES = ('--ros-args', '-p', 'size_a:=[2.0, 2.0, 2.0]', '-p', 'size_b:=[2.0, 2.0, 2.0]')
 LEAK = 8.0
 """Growth [MB] of a node's memory that is taken for none, as the allocator's arenas come in steps: a
-leak of 200 bytes a message in the storms below."""
+leak of 400 bytes a message in the storm below."""
 UNKNOWN_TYPE = 77  # of a parameter
 
 
@@ -117,10 +117,10 @@ def test_messages_that_are_none(node, client):
                 if number % 100 == 0:
                     client.poll()
 
-    storm(5_000)
+    storm(3_000)
     client.assert_answered()
     before = memory(node)
-    storm(45_000)
+    storm(20_000)
     client.assert_answered()
     assert memory(node) - before < LEAK
     assert node.process.poll() is None and 'Traceback' not in node.output

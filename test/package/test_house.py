@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -26,10 +27,16 @@ SOURCES = {*ROOT.glob('*.py'), *(path for folder in (NAME, *OUTSIDE, 'docs', 'la
 INSTALLED = sorted(path for path in SOURCES if (ROOT / NAME) in path.parents)
 
 
+@cache
+def nodes(file: Path) -> list[ast.AST]:
+    """Return the nodes of a file's syntax tree."""
+    return list(ast.walk(ast.parse(file.read_text('utf-8'))))
+
+
 def imported(file: Path) -> Iterator[str]:
     """Yield the dotted path of each module, or name of a module, that a file imports."""
     here = file.relative_to(ROOT).parent.parts
-    for node in ast.walk(ast.parse(file.read_text('utf-8'))):
+    for node in nodes(file):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -74,7 +81,7 @@ def test_nothing_installed_names_what_is_not() -> None:
 def test_all_nodes_are_guarded() -> None:
     """A class that derives from rclpy's node derives from GuardedNode first."""
     for file in INSTALLED:
-        for node in ast.walk(ast.parse(file.read_text('utf-8'))) if file.suffix == '.py' else ():
+        for node in nodes(file) if file.suffix == '.py' else ():
             if isinstance(node, ast.ClassDef) and node.name != 'GuardedNode':
                 bases = [base.id for base in node.bases if isinstance(base, ast.Name)]
                 assert bases[:1] == ['GuardedNode'] or not {'Node', 'LifecycleNode'} & set(bases), (
@@ -84,7 +91,7 @@ def test_all_nodes_are_guarded() -> None:
 def calls(folder: str) -> Iterator[tuple[str, str, list[ast.expr], dict[str | None, ast.expr]]]:
     """Yield the place, name, arguments and options of each call in Python below a folder."""
     for file in sorted((ROOT / folder).rglob('*.py')):
-        for node in ast.walk(ast.parse(file.read_text('utf-8'))):
+        for node in nodes(file):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
                 yield (f'{file}:{node.lineno}', node.func.attr, node.args,
                        {option.arg: option.value for option in node.keywords})

@@ -127,10 +127,3 @@ def test_tables_in_the_docs_are_the_shipped_weights(tmp_path: Path) -> None:
                 assert abs(float(one) - float(other)) < 1.5 * last
             except ValueError:
                 assert one == other
-
-
-def test_paper_program(tmp_path: Path) -> None:
-    """Quick: the paper's figures, a tenth of the patterns, said so."""
-    assert program.main(['--quick', '--table', '1', '--table', '2', '--out', str(tmp_path)]) == 0
-    page = (tmp_path / 'paper_tables.md').read_text('utf-8')
-    assert '0.5624' in page and '0.4523' in page and 'every 10th' in page
