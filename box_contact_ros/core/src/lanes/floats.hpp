@@ -16,16 +16,31 @@ template <class T>
 using Floats = typename std::conditional_t<is_scalar<T>, NumberOf<float>,
                                            LanesOf<float, is_scalar<T> ? 2 : 2 * width<T>>>::type;
 
+// The same numbers in the other precision. The instructions are named because g++ converts halves.
+template <class To, class From>
+BC_INLINE To converted(From x) {
+#if defined(__AVX512F__)
+  if constexpr (std::is_same_v<From, Lanes<float, 8>>)
+    return (To)_mm512_maskz_cvtps_pd(0xff, (__m256)x);
+  if constexpr (std::is_same_v<From, Lanes<double, 8>>)
+    return (To)_mm512_maskz_cvtpd_ps(0xff, (__m512d)x);
+#endif
+#if defined(__AVX__)
+  if constexpr (std::is_same_v<From, Lanes<float, 4>>) return (To)_mm256_cvtps_pd((__m128)x);
+  if constexpr (std::is_same_v<From, Lanes<double, 4>>) return (To)_mm256_cvtpd_ps((__m256d)x);
+#endif
+  return __builtin_convertvector(x, To);
+}
+
 template <class T, int... k>
 BC_INLINE Floats<T> joined(const T& a, const T& b, std::integer_sequence<int, k...>) {
   using Half = Lanes<float, width<T>>;
-  return __builtin_shufflevector(__builtin_convertvector(a, Half), __builtin_convertvector(b, Half),
-                                 k...);
+  return __builtin_shufflevector(converted<Half>(a), converted<Half>(b), k...);
 }
 template <class T, int... k>
 BC_INLINE T part(const Floats<T>& x, std::integer_sequence<int, k...>, bool second) {
-  return second ? __builtin_convertvector(__builtin_shufflevector(x, x, width<T> + k...), T)
-                : __builtin_convertvector(__builtin_shufflevector(x, x, k...), T);
+  return converted<T>(second ? __builtin_shufflevector(x, x, width<T> + k...)
+                             : __builtin_shufflevector(x, x, k...));
 }
 
 // A number of each block: `of(0)`, `of(1)`.
@@ -40,7 +55,7 @@ BC_INLINE Floats<T> floats(const Of& of) {
 template <class T, class Of>
 BC_INLINE Triple<Floats<T>> triple_of_floats(const Of& of) {
   if constexpr (packed<T>) {
-    return __builtin_convertvector(of(0), Lanes<float, 4>);
+    return converted<Lanes<float, 4>>(of(0));
   } else {
     auto number = [&](int k) { return floats<T>([&](int block) { return of(block)[k]; }); };
     return triple(Vec<Floats<T>>{number(0), number(1), number(2)});
@@ -58,7 +73,7 @@ BC_INLINE T doubles(const Floats<T>& x, int block) {
 template <class T>
 BC_INLINE Triple<T> triple_of_doubles(const Triple<Floats<T>>& x, int block) {
   if constexpr (packed<T>) {
-    return __builtin_convertvector(x, Triple<T>);
+    return converted<Triple<T>>(x);
   } else {
     return triple(
         Vec<T>{doubles<T>(x[0], block), doubles<T>(x[1], block), doubles<T>(x[2], block)});
