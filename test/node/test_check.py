@@ -50,18 +50,6 @@ def asked(checker: Checker, *boxes: Any, **fields: Any) -> Check.Response:
     return checker.answer(Check.Request(boxes=list(boxes), **fields), Check.Response())
 
 
-def test_boxes_of_own_sizes_are_answered_as_the_solver_does(checker: Checker) -> None:
-    """To the bit; pairs in order, under the names of their boxes."""
-    turned = np.array([0.5, 0.25, 1.875, 0.1, 0.2, 0, 1])
-    response = asked(checker, a_box('p', ORIGIN, (2, 3, 1)), a_box('q', turned, (1, 2, 3)))
-    contact = contacts_by_pair(response.contacts)['p_q']
-    wanted = ContactSolver((2, 3, 1), (1, 2, 3), model='exact')(ORIGIN, turned)
-    assert response.success and not response.message and not response.contacts.near
-    assert (contact.separation, contact.volume) == (wanted.separation, wanted.volume)
-    for name in ('point', 'normal', 'covariance'):
-        assert np.array_equal(getattr(contact, name), getattr(wanted, name))
-
-
 def labels(response: Check.Response) -> list[str]:
     """Return the names of the pairs in contact, in their order."""
     assert response.success, response.message
@@ -198,18 +186,20 @@ def test_a_question_is_answered_as_a_tick_of_the_scene_that_it_makes(margin: flo
     assert count > 500
 
 
-def test_messages_of_an_answer_are_filled_anew(checker: Checker) -> None:
-    """Those of a long answer serve the next, and a longer one gets more."""
+def test_boxes_of_own_sizes_are_answered_as_the_solver_does(checker: Checker) -> None:
+    """To the bit, under their names. Messages of a long answer serve the next, and get more."""
+    placed = [np.array([0, 0, 0.25 * n, 0.1 * n, 0.2, 0, 1]) for n in range(5)]
+    sizes = [(2.0 + 0.5 * n, 3.0, 1.0) for n in range(5)]
     for count in (3, 1, 5):
-        boxes = [a_box(f'p{n}', (0, 0, 0.25 * n, 0, 0, 0, 1), CUBE) for n in range(count)]
-        entries = asked(checker, *boxes).contacts.contacts
-        wanted = ContactSolver(CUBE, CUBE)
-        assert len(entries) == count * (count - 1) // 2
-        for entry in entries:
-            contact = wanted(*(np.array([0, 0, 0.25 * int(name[1:]), 0, 0, 0, 1])
-                               for name in (entry.box_a, entry.box_b)))
-            assert entry.volume == contact.volume and entry.point.z == contact.point[2]
-            assert entry.covariance[5] == contact.covariance[2, 2]
+        response = asked(checker, *(a_box(f'p{n}', placed[n], sizes[n]) for n in range(count)))
+        assert response.success and not response.message and not response.contacts.near
+        found = contacts_by_pair(response.contacts)
+        assert set(found) == {f'p{a}_p{b}' for b in range(count) for a in range(b)}
+        for name, contact in found.items():
+            a, b = (int(box[1:]) for box in name.split('_'))
+            wanted = ContactSolver(sizes[a], sizes[b])(placed[a], placed[b])
+            for field in ('separation', 'volume', 'point', 'normal', 'covariance'):
+                assert np.array_equal(getattr(contact, field), getattr(wanted, field))
 
 
 @pytest.mark.parametrize('place, depths', [(ABOVE_FIXED, [0.1]), ((0, 5, 1.9, 0, 0, 0, 1), [])])

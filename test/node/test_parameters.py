@@ -39,11 +39,6 @@ def test_a_refusal_names_the_parameter_and_the_value(check, value, words):
         check('p', value)
 
 
-def test_integers_are_as_good_as_floats():
-    assert parameters.number(0.0, 3.0)('p', 2) == 2.0
-    assert parameters.size('p', (1, 2, 3)) == (1.0, 2.0, 3.0)
-
-
 def test_an_unknown_name_is_logged_with_the_nearest_one(capfd):
     """And ignored: a file may be meant for several nodes, with names that are none of this one's.
 
