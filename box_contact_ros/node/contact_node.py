@@ -106,6 +106,17 @@ LIVE = {'model': live_model} | {
 touches a topic."""
 
 
+def scene_of(values: Mapping[str, Any]) -> Scene:
+    """Return the scene that checked parameters tell, or raise ValueError."""
+    if not values['scene']:
+        return two_boxes(values['size_a'], values['size_b'])
+    for name in ('size_a', 'size_b'):
+        if values[name] != PARAMETERS[name].default:
+            raise ValueError(f'{name} {short_repr(values[name])} has no effect while scene is set: '
+                             'write sizes into the scene file')
+    return read_scene(values['scene'])
+
+
 class ContactNode(GuardedNode, LifecycleNode):
     """Wires parameters, topics, ticks and diagnostics to the states of a lifecycle node.
 
@@ -208,14 +219,7 @@ class ContactNode(GuardedNode, LifecycleNode):
 
     def _configure(self) -> None:
         values = declare(self, self.parameters, live=LIVE)
-        if values['scene']:
-            for name in ('size_a', 'size_b'):
-                if values[name] != self.parameters[name].default:
-                    raise ValueError(f'{name} {short_repr(values[name])} has no effect while scene '
-                                     'is set: write sizes into the scene file')
-            scene = read_scene(values['scene'])
-        else:
-            scene = two_boxes(values['size_a'], values['size_b'])
+        scene = scene_of(values)
         solver = self._make_solver(values, scene)
         topics = SceneTopics(self, self.prefix, scene, pair_topics=values['pair_topics'])
         try:

@@ -216,12 +216,6 @@ def as_boxes(sizes: ArrayLike, poses: ArrayLike) -> tuple[np.ndarray, np.ndarray
     return sizes, poses
 
 
-def is_row(value: object, count: int) -> bool:
-    """Return whether a value is a tuple or list of so many real numbers."""
-    return isinstance(value, tuple | list) and len(value) == count and all(
-        isinstance(v, numbers.Real) and not isinstance(v, bool) for v in value)
-
-
 def as_size(size: ArrayLike, name: str) -> np.ndarray:
     """Return three full extents (3,) [m], checked, as (1, 3)."""
     array = as_floats(size, name, 'three full extents', (3,))

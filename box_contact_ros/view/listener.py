@@ -24,14 +24,14 @@ from rclpy.qos import QoSProfile
 from box_contact_msgs.msg import Contacts as ContactsMessage
 
 from ..node.contact_node import PARAMETERS as CONTACT_PARAMETERS
+from ..node.contact_node import scene_of
 from ..node.parameters import Setting, declare, warn_of_unknown
 from ..node.runtime import GuardedNode
 from ..node.topics import pose_qos
 from ..scene.message_bytes import MessageError, PoseReader
 from ..scene.pairing import StampedPose
 from ..scene.read_contacts import ReadContacts, read_contacts
-from ..scene.scene import ALL_BOXES, ALONE, Scene, two_boxes
-from ..scene.scene_file import read_scene
+from ..scene.scene import ALL_BOXES, ALONE, Scene
 from ..scene.scene_solver import Answer
 from ..solver.checks import are_poses, short_repr
 
@@ -170,8 +170,7 @@ class Listener(GuardedNode):
         super().__init__(name, context=context, **options)
         self.values = values = declare(self, settings)
         warn_of_unknown(self, settings)
-        scene = (read_scene(values['scene']) if values['scene'] else
-                 two_boxes(values['size_a'], values['size_b']))
+        scene = scene_of(values)
         self.rows = SceneRows(scene)
         self._tracks: list[Track] = []
         self._frame_id = ''

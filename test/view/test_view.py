@@ -97,6 +97,11 @@ def send(node, stamp, *poses_of_boxes):
                            serialize_message(pose_stamped(pose, 'yard', stamp)))
 
 
+def test_sizes_beside_a_scene_are_refused(make_node):
+    with pytest.raises(ValueError, match='^size_a .* has no effect while scene is set'):
+        make_node(Parameter('scene', value='config/scenes/two_boxes.yaml'), *SIZES)
+
+
 @pytest.mark.parametrize('answer_at', [0, 1, 2])
 def test_contacts_are_drawn_with_the_poses_that_they_answer(make_node, answer_at):
     """Whichever message comes first; newer poses, and an older one of b, change nothing."""
