@@ -25,6 +25,9 @@ boxes = [Box(name='load', size=container, pose=Pose(position=Point(z=2.581))),
          Box(name='stack', size=container)]  # a new pose is upright, at the origin
 future = check.call_async(Check.Request(boxes=boxes))
 rclpy.spin_until_future_complete(node, future)
-for contact in future.result().contacts.contacts:
+answer = future.result()
+if not answer.success:
+    raise SystemExit(answer.message)
+for contact in answer.contacts.contacts:
     print(f'{contact.pair}: {1e3 * contact.depth:.1f} mm deep, {contact.volume:.3f} m³')
 rclpy.shutdown()

@@ -12,7 +12,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -59,6 +59,20 @@ def test_example(name: str, program, tmp_path: Path) -> None:
         printed, expected = ([re.sub(r'[-\d.,]+', '#', line) for line in lines]
                              for lines in (printed, expected))
     assert printed == expected
+
+
+def refused(client: Sequence[str | Path], program) -> bool:
+    """Whether a client of ~/check says that a node refuses its frame, and ends with status 1."""
+    program('contact_node', '--ros-args', '-p', f'scene:={ROOT}/config/scenes/load_on_chassis.yaml',
+            '-p', 'model:=exact').wait_for_output('ready')
+    done = subprocess.run(client, capture_output=True, text=True, timeout=PATIENCE)
+    return done.returncode == 1 and not done.stdout and 'header.frame_id: ' in done.stderr
+
+
+def test_refused(program) -> None:
+    """A refused question is not taken for an answer without contacts."""
+    pytest.importorskip('box_contact_msgs.msg')
+    assert refused([sys.executable, EXAMPLES / 'check_client.py'], program)
 
 
 def test_record(program, tmp_path: Path) -> None:
@@ -170,6 +184,11 @@ def test_cpp_client(cpp_with_ros: Path, program) -> None:
     printed = subprocess.run([cpp_with_ros / 'check_client'], check=True, capture_output=True,
                              text=True, timeout=PATIENCE).stdout
     assert f'//   {printed}' in (EXAMPLES / 'cpp/check_client.cpp').read_text('utf-8')
+
+
+def test_cpp_client_refused(cpp_with_ros: Path, program) -> None:
+    """A refused question is not taken for an answer without contacts."""
+    assert refused([cpp_with_ros / 'check_client'], program)
 
 
 def test_cpp_client_without_node(cpp_with_ros: Path) -> None:

@@ -30,6 +30,10 @@ int main(int argc, char** argv) {
   if (rclcpp::spin_until_future_complete(node, future) != rclcpp::FutureReturnCode::SUCCESS)
     return 1;
   const auto answer = future.get();  // owns the contacts below
+  if (!answer->success) {
+    RCLCPP_ERROR(node->get_logger(), "%s", answer->message.c_str());
+    return 1;
+  }
   for (const auto& message : answer->contacts.contacts) {
     const box_contact::Contact contact = box_contact::from_message(message);
     std::printf("%s: %.1f mm deep, %.3f m3\n", message.pair.c_str(), -1e3 * contact.separation,
