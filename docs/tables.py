@@ -101,23 +101,22 @@ def models() -> str:
     """Return what each way to find the contact point costs, and how far it is off."""
     body = []
     for choice in CHOICES:
-        call = fastest(rows('frontier.csv', contestant=choice.contestant, set=SWAY,
+        call = fastest(rows('frontier.csv', contestant=choice.contestant, set=choice.rest,
                             **{'class': 'all'}))
         assert call
         body.append([choice.name, cell(call, 'call_p50', 1e3),
-                     *(from_c(choice, 'single', of_set) for of_set in (AT_REST, SWAY)),
-                     from_c(choice, 'batch', SWAY),
-                     *(point_error(choice, of_set) for of_set in (choice.rest, 'landings', SWAY))])
+                     *(from_c(choice, way, of_set) for way in ('single', 'batch')
+                       for of_set in (AT_REST, SWAY)),
+                     *(point_error(choice, of_set) for of_set in (choice.rest, 'landings'))])
     table = markdown_table(
-        ['', 'Python: a call [µs]', 'C: a call [ns], goods at rest', 'containers',
-         'C: a pair in a batch [ns]', '99 % of points within [%], goods at rest', 'landings',
-         'containers'], body)
+        ['', 'Python [µs]', 'C [ns], at rest', 'C [ns], swaying', 'C in a batch [ns], at rest',
+         'C in a batch [ns], swaying', 'Error [%], at rest', 'Error [%], landing'], body)
     where = fastest(rows('native.csv', set=SWAY, contestant='exact volume, single'))
     assert where
-    return (f'{table}\n\nMedian times on one core with {SHOWN[where["instruction_set"]]}, '
-            f'{where["processor"]}; calls from Python and batches are of swaying 40 ft containers. '
-            "Errors are in % of the smaller box's longest edge. `paper` is trained for one pair of "
-            'sizes: for cubes, and here for containers.')
+    return (f'{table}\n\nMedians of one pair on one core with '
+            f'{SHOWN[where["instruction_set"]]}, {where["processor"]}. Goods are at rest; '
+            'containers sway or land. The error is what 99 % of the points are within, in % of the '
+            "smaller box's longest edge. A dash: no such call, or no network for these sizes.")
 
 
 def bench() -> str:
@@ -125,9 +124,10 @@ def bench() -> str:
     found = RATIOS.search((RESULTS / 'bench_mlp.md').read_text('utf-8'))
     median = MEDIAN.search((RESULTS / 'bench_exact.md').read_text('utf-8'))
     assert found and median
-    return (f'`box_contact_bench --model mlp` compares nodes over ROS. At 1 kHz it printed '
-            f'`{found[0]}`: see [the report](docs/results/bench_mlp.md). With `exact`, the median '
-            f'answer takes {median[1]} ms.')
+    return (f'`box_contact_bench --model mlp` compares latencies over ROS: of the contact node, '
+            f'of one that echoes poses, and of one with the soup. At 1 kHz it printed '
+            f'`{found[0]}`, with 95 % intervals: see [the report](docs/results/bench_mlp.md). With '
+            f'`exact`, the median answer takes {median[1]} ms.')
 
 
 def mlp_errors() -> str:
