@@ -62,12 +62,10 @@ SIZES = (*MLP_SIZES, 'mlp')
 SHOWN = {'exact': ('exact', 'C0', 0), 'mlp-8-8': ('mlp, 8-8', 'C2', 4),
          'mlp-16-16': ('16-16', 'C2', 0), 'mlp': ('32-32', 'C2', -4),
          'mlp, idle': ('mlp without its network', 'C8', -9),
-         'paper': ("the paper's network", 'C4', 0),
-         'paper-at-rest': ('the same, for this scene', 'C4', 0),
-         'soup-1': ('polygon soup, N = 1', 'C5', 9),
-         'soup-8': ('N = 8', 'C5', -5),
-         'MuJoCo mj_collision': ('MuJoCo, best point', 'C1', -9),
-         'PyBullet getContactPoints': ('Bullet, best point', 'C6', 9)}
+         'paper': ('paper', 'C4', 0), 'paper-at-rest': ('paper, for this scene', 'C4', 0),
+         'soup-1': ('soup, N = 1', 'C5', 9), 'soup-8': ('N = 8', 'C5', -5),
+         'MuJoCo mj_collision': ('MuJoCo', 'C1', 9),
+         'PyBullet getContactPoints': ('Bullet', 'C6', 0)}
 """Contestant: how the picture calls it, its colour, and how much higher the name stands [pt]."""
 PANELS = {'Goods at rest': ('settled', 'settled cubes'),
           'A 12 m container on another, swaying': ('containers',)}
