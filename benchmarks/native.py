@@ -52,6 +52,8 @@ CALLS_FOLDER = Path(__file__).with_name('native_calls')
 LIBRARY = Path(sys.prefix, 'lib', 'libbox_contact.so')  # its headers are in include/
 OPTIONAL = {'coal': 'pip install coal cmeel-eigen', 'bullet': 'apt install libbullet-dev'}
 """By file of native_calls/ and by name for pkg-config: what brings headers and library."""
+RIVALS = ('mj', *(name.capitalize() for name in OPTIONAL))
+"""How the names of engines' contestants begin; they are the last columns."""
 CLEAR = 1e-6
 """Least gap or depth, of the size, at which verdicts are compared; Bullet's are single floats."""
 MOST_WRONG, MOST_OFF = 0.2, 0.1
@@ -339,8 +341,8 @@ def main(args: Sequence[str] | None = None) -> int:
             del by_set[MIXED]  # its contacts are those of containers
             contacts = {name: each_contact(program, by_set, name, count, passes) for name in names}
     best = names[-1]
-    every = list(dict.fromkeys(one for times in found[best].values() for one in times
-                               if one != UNIT))
+    every = sorted(dict.fromkeys(one for times in found[best].values() for one in times
+                                 if one != UNIT), key=lambda one: one.startswith(RIVALS))
     table = f'## {best}\n\n{sets_table(found[best], every)}'
     versions = [f'MuJoCo {metadata.version("mujoco")}', *(
         f'{name.capitalize()} {package_config(name, "--modversion")}' for name in OPTIONAL
