@@ -3,9 +3,10 @@
 
 """Program `native`: libbox_contact and other engines, C against C.
 
-`python -m benchmarks.native` compiles native_calls/, which calls all in turn in one process, and
-writes native.md and native.csv. MuJoCo's wheel has its headers and its library. Coal and Bullet are
-compiled in where pkg-config finds them; the exit status is 1 where one is left out.
+`python -m benchmarks.native` compiles native_calls/, which calls all in turn, and writes native.md
+and native.csv. It runs copies of the program, each with its own copy of the library, as times
+depend on where code lies in memory. MuJoCo's wheel has its headers and its library. Coal and Bullet
+are compiled in where pkg-config finds them; the exit status is 1 where one is left out.
 """
 from __future__ import annotations
 
@@ -36,8 +37,8 @@ from .output import markdown_table, percentiles
 from .pose_sets import FLUSH, LOADS, SETS, Pairs, drawn
 from .timing import by_round, pinned, usable_cores
 
-PAIRS, ROUNDS, CALLS = 20_000, 24, 2_000
-QUICK_PAIRS, QUICK_ROUNDS, QUICK_CALLS = 1_000, 2, 200
+COPIES, PAIRS, ROUNDS, CALLS = 7, 20_000, 11, 2_000
+QUICK_COPIES, QUICK_PAIRS, QUICK_ROUNDS, QUICK_CALLS = 2, 1_000, 1, 200
 CONTACTS, PASSES = 100_000, 30
 """Contacts of all sets, each timed alone in every pass; its time is the least of the passes."""
 QUICK_CONTACTS, QUICK_PASSES = 2_000, 3
@@ -64,7 +65,7 @@ Bullet's query in single precision misses up to a tenth of the shallow contacts 
 class Times(NamedTuple):
     """One contestant on one set."""
 
-    nanoseconds: np.ndarray  # (rounds,) of a pair
+    nanoseconds: np.ndarray  # (copies, rounds), of a pair
     missed: int
     invented: int
     judged: int  # pairs farther than `CLEAR` from touch
@@ -110,7 +111,7 @@ def library_flags(instruction_set: str) -> list[str]:
 def compiled(folder: Path, sets: Sequence[str]) -> tuple[Path, list[str]]:
     """Compile native_calls/ into a folder; return the program, and the rivals that are left out.
 
-    sets: the instruction sets that it is for.
+    The library lies beside the program. sets: the instruction sets that it is for.
 
     Raises `RuntimeError` with what the compiler reports.
     """
@@ -129,13 +130,21 @@ def compiled(folder: Path, sets: Sequence[str]) -> tuple[Path, list[str]]:
                       f'-DADD_NETWORKS=add_networks_{name}', str(CALLS_FOLDER / 'networks.cpp'),
                       '-o', made])
         flags += [f'-DWITH_{name.upper()}', made]
+    # Old tags: LD_LIBRARY_PATH must not replace the library beside the program by another.
     run_compiler(
-        [*compiler, '-O2', f'-I{mujoco / "include"}',
+        [*compiler, '-O2', f'-I{mujoco / "include"}', '-Wl,--disable-new-dtags',
          *[str(CALLS_FOLDER / f'{name}.cpp') for name in ('main', 'mujoco', 'ours', *rivals)],
-         '-o', str(folder / 'native'), str(LIBRARY),
-         str(next(mujoco.glob('libmujoco.so*'))), f'-Wl,-rpath,{LIBRARY.parent}',
+         '-o', str(folder / 'native'), shutil.copy(LIBRARY, folder),
+         str(next(mujoco.glob('libmujoco.so*'))), '-Wl,-rpath,$ORIGIN',
          f'-Wl,-rpath,{mujoco}', *flags])
     return folder / 'native', [name for name in OPTIONAL if name not in rivals]
+
+
+def copied(program: Path, folder: Path) -> Path:
+    """Return a copy of the program in a new folder, with a library of its own beside it."""
+    folder.mkdir()
+    shutil.copy(program.with_name(LIBRARY.name), folder)
+    return Path(shutil.copy(program, folder))
 
 
 def run_compiler(command: Sequence[str]) -> None:
@@ -217,7 +226,10 @@ def each_contact(program: Path, by_set: Mapping[str, Pairs], instruction_set: st
 
 
 def timed(program: Path, pairs: Pairs, instruction_set: str, *, rounds: int, calls: int) -> OnSet:
-    """Return times and errors of all contestants on one set, with one instruction set."""
+    """Return times and errors of all contestants on one set, in one process.
+
+    The times are those of one copy, (1, rounds).
+    """
     answers, networks = program.parent / 'answers', program.parent / 'networks'
     networks.write_bytes(networks_for(pairs))
     first, names, *lines = run(program, pairs, instruction_set, rounds, calls, answers, networks)
@@ -228,8 +240,14 @@ def timed(program: Path, pairs: Pairs, instruction_set: str, *, rounds: int, cal
         name, nanoseconds = line.split('\t')
         times[name].append(float(nanoseconds))
     separations = np.fromfile(answers).reshape(len(times), -1)
-    return {name: judged(name, np.array(times[name]), separation, pairs)
+    return {name: judged(name, np.array([times[name]]), separation, pairs)
             for name, separation in zip(times, separations)}
+
+
+def of_copies(runs: Sequence[OnSet]) -> OnSet:
+    """Return the runs of all copies as one, whose times have a row for each copy."""
+    return {name: one._replace(nanoseconds=np.concatenate([run[name].nanoseconds for run in runs]))
+            for name, one in runs[0].items()}
 
 
 def judged(name: str, nanoseconds: np.ndarray, separation: np.ndarray, pairs: Pairs) -> Times:
@@ -252,23 +270,57 @@ def judged(name: str, nanoseconds: np.ndarray, separation: np.ndarray, pairs: Pa
                  (p50, p99, worst))
 
 
-def ratio(times: OnSet, name: str) -> float:
-    """Return the median of the rounds' ratios to `UNIT`."""
-    return float(by_round(times[name].nanoseconds, times[UNIT].nanoseconds))
+class Ratio(NamedTuple):
+    """What one contestant's time is relative to another's: the median of the copies, and its range.
+
+    A copy's ratio is the median of its rounds' own. The range of seven copies holds the median of
+    all copies with a probability of 1 - 2 / 2**7, 98 %, whatever their distribution.
+    """
+
+    median: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, times: OnSet, name: str, unit: str = UNIT) -> Ratio:
+        """Return the ratio of two contestants."""
+        by_copy = by_round(times[name].nanoseconds.T, times[unit].nanoseconds.T)
+        return cls(*percentiles(by_copy, 50, 0, 100))
+
+    def __str__(self) -> str:
+        return f'{self.median:.2f} [{self.low:.2f}, {self.high:.2f}]'
+
+    def columns(self, name: str) -> dict[str, float]:
+        """Return the columns of the CSV file, whose names begin alike."""
+        return {name: self.median, f'{name}_low': self.low, f'{name}_high': self.high}
 
 
-def sets_table(by_set: Mapping[str, OnSet], contestants: Sequence[str]) -> str:
-    """Return a row per set: the time of `UNIT`, and the ratios of contestants to it."""
-    return markdown_table(['', '`mjc_BoxBox` [ns]', *contestants], [
-        [name, f'{np.median(times[UNIT].nanoseconds):.0f}',
-         *(f'{ratio(times, one):.2f}' if one in times else '–' for one in contestants)]
-        for name, times in by_set.items()])
+def sets_table(by_set: Mapping[str, OnSet], way: str) -> str:
+    """Return a row per set: the time of `UNIT`, and the ratios of contestants to it.
+
+    way: of those contestants, single or batch. Engines have the last columns.
+    """
+    every = sorted(dict.fromkeys(name for times in by_set.values() for name in times
+                                 if name != UNIT and name.endswith(f', {way}')),
+                   key=lambda name: name.startswith(RIVALS))
+    return markdown_table(
+        ['', '`mjc_BoxBox` [ns]', *(name.removesuffix(f', {way}') for name in every)],
+        [[of_set, f'{np.median(times[UNIT].nanoseconds):.0f}',
+          *(str(Ratio.of(times, name)) if name in times else '–' for name in every)]
+         for of_set, times in by_set.items()])
+
+
+def models_table(by_set: Mapping[str, OnSet]) -> str:
+    """Return a row per set: the ratios of `mlp` to `exact`."""
+    return markdown_table(['', *(name.replace('exact ', '') for name in OURS)], [
+        [of_set, *(str(Ratio.of(times, name.replace('exact', 'mlp'), name)) for name in OURS)]
+        for of_set, times in by_set.items()])
 
 
 def scenes_table(by_scene: Mapping[str, Pairs], times: Mapping[str, OnSet]) -> str:
     """Return a row per recorded scene: the ratios to `UNIT` of calls and batches of `exact`."""
     return markdown_table(['scene', 'contacts', *OURS], [
-        [name, f'{len(by_scene[name].size)}', *(f'{ratio(here, one):.2f}' for one in OURS)]
+        [name, f'{len(by_scene[name].size)}', *(str(Ratio.of(here, one)) for one in OURS)]
         for name, here in times.items()])
 
 
@@ -305,9 +357,11 @@ def csv_rows(found: Mapping[str, Mapping[str, OnSet]]) -> Iterator[dict[str, obj
             for contestant, one in times.items():
                 yield {'instruction_set': instruction_set, 'set': name, 'contestant': contestant,
                        'min_ns': one.nanoseconds.min(), 'p50_ns': float(np.median(one.nanoseconds)),
-                       'by_unit': ratio(times, contestant), 'judged': one.judged,
-                       'missed': one.missed, 'invented': one.invented,
-                       **dict(zip(('depth_p50', 'depth_p99', 'depth_worst'), one.depth_errors))}
+                       **Ratio.of(times, contestant).columns('by_unit'),
+                       'judged': one.judged, 'missed': one.missed, 'invented': one.invented,
+                       **dict(zip(('depth_p50', 'depth_p99', 'depth_worst'), one.depth_errors)),
+                       **(Ratio.of(times, contestant, contestant.replace('mlp', 'exact'))
+                          .columns('by_exact') if contestant.startswith('mlp ') else {})}
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -318,10 +372,12 @@ def main(args: Sequence[str] | None = None) -> int:
         'native', __doc__, quick='few pairs and rounds, to try it out', out='native.md, native.csv')
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
-    pairs, rounds, calls = ((QUICK_PAIRS, QUICK_ROUNDS, QUICK_CALLS) if options.quick
-                            else (PAIRS, ROUNDS, CALLS))
-    count, passes = (QUICK_CONTACTS, QUICK_PASSES) if options.quick else (CONTACTS, PASSES)
+    count, pairs, rounds, calls = (
+        (QUICK_COPIES, QUICK_PAIRS, QUICK_ROUNDS, QUICK_CALLS) if options.quick
+        else (COPIES, PAIRS, ROUNDS, CALLS))
+    most, passes = (QUICK_CONTACTS, QUICK_PASSES) if options.quick else (CONTACTS, PASSES)
     names = [name for name in instruction_sets() if name != 'baseline']
+    best = names[-1]
     found: dict[str, dict[str, OnSet]] = {name: {} for name in names}
     with tempfile.TemporaryDirectory() as made:
         try:
@@ -329,34 +385,36 @@ def main(args: Sequence[str] | None = None) -> int:
         except RuntimeError as error:
             print(f'native: {error}', file=sys.stderr)
             return 2
+        copies = [copied(program, Path(made, f'copy {number}')) for number in range(count)]
         with pinned({usable_cores()[-1]}):
-            # Sets outside, so that instruction sets take turns.
             by_set = sets(pairs)
             for of_set, chosen in tqdm(by_set.items(), desc='native', unit='set'):
+                # Copies outside, so that instruction sets take turns.
+                runs = [{name: timed(copy, chosen, name, rounds=rounds, calls=calls)
+                         for name in names} for copy in copies]
                 for name in names:
-                    found[name][of_set] = timed(program, chosen, name, rounds=rounds, calls=calls)
+                    found[name][of_set] = of_copies([run[name] for run in runs])
             by_scene = settled.by_scene(settled.read())
-            scenes = {name: timed(program, chosen, names[-1], rounds=rounds, calls=calls)
-                      for name, chosen in tqdm(by_scene.items(), desc='scenes', unit='scene')}
+            scenes = {of_scene: of_copies([timed(copy, chosen, best, rounds=rounds, calls=calls)
+                                           for copy in copies])
+                      for of_scene, chosen in tqdm(by_scene.items(), desc='scenes', unit='scene')}
             del by_set[MIXED]  # its contacts are those of containers
-            contacts = {name: each_contact(program, by_set, name, count, passes) for name in names}
-    best = names[-1]
-    every = sorted(dict.fromkeys(one for times in found[best].values() for one in times
-                                 if one != UNIT), key=lambda one: one.startswith(RIVALS))
-    table = f'## {best}\n\n{sets_table(found[best], every)}'
+            contacts = {name: each_contact(program, by_set, name, most, passes) for name in names}
+    tables = {way: sets_table(found[best], way) for way in ('single', 'batch')}
     versions = [f'MuJoCo {metadata.version("mujoco")}', *(
         f'{name.capitalize()} {package_config(name, "--modversion")}' for name in OPTIONAL
         if name not in missing)]
     output.write_page(
-        folder, 'native', args, machine=output.machine(), rounds=rounds, calls=calls, pairs=pairs,
-        table=table, slowest=slowest_table(contacts[best]), scenes=scenes_table(by_scene, scenes),
+        folder, 'native', args, machine=output.machine(), copies=count, rounds=rounds, calls=calls,
+        pairs=pairs, best=best, **tables, models=models_table(found[best]),
+        scenes=scenes_table(by_scene, scenes), slowest=slowest_table(contacts[best]),
         passes=passes, code=calls_shown(missing), engines=', '.join(versions), missing=''.join(
             f'\n\nLeft out: {name.capitalize()} is not installed with its headers '
             f'(`{OPTIONAL[name]}`).' for name in missing))
     found[best].update(scenes)
     output.write_csv(folder / 'native.csv', [*csv_rows(found), *contact_rows(contacts)],
                      about=output.machine())
-    print(table)
+    print(tables['single'], tables['batch'], sep='\n\n')
     for name in missing:
         print(f'native: {name.capitalize()} is left out: {OPTIONAL[name]}', file=sys.stderr)
     return int(bool(missing) and not options.quick)

@@ -48,8 +48,43 @@ def test_all_answer_as_exact(program: tuple[Path, list[str]], containers: Pairs)
     for name, one in found.items():
         assert (one.judged, one.missed, one.invented) == (n, 0, 0), name
         assert one.depth_errors[2] < 0.01, name
-        assert one.nanoseconds.shape == (1,) and one.nanoseconds.min() > 0.0
+        assert one.nanoseconds.shape == (1, 1) and one.nanoseconds.min() > 0.0
     assert max(found['exact covariance, batch'].depth_errors) == 0.0
+
+
+@needs_compiler
+def test_a_copy_has_a_library_of_its_own(program: tuple[Path, list[str]], containers: Pairs,
+                                         tmp_path: Path) -> None:
+    """Whatever LD_LIBRARY_PATH names: a broken one beside the program ends the run."""
+    copy = native.copied(program[0], tmp_path / 'copy')
+    best = instruction_sets()[-1]
+    assert native.UNIT in native.timed(copy, containers, best, rounds=1, calls=1)
+    copy.with_name(native.LIBRARY.name).write_bytes(b'')
+    with pytest.raises(RuntimeError, match=native.LIBRARY.name):
+        native.timed(copy, containers, best, rounds=1, calls=1)
+
+
+def planted(*rounds: list[float]) -> native.Times:
+    """Return the times of one copy for each list, with no errors."""
+    return native.Times(np.array(rounds), 0, 0, 1, (0.0, 0.0, 0.0))
+
+
+def test_a_ratio_has_the_range_of_the_copies() -> None:
+    """A copy counts by the median of its rounds' ratios, so one disturbed round moves nothing."""
+    unit = planted([100.0, 300.0, 100.0])
+    found = native.of_copies([{native.UNIT: unit, 'exact volume, single': planted(rounds)}
+                              for rounds in ([140.0, 420.0, 9e9], [120.0, 360.0, 120.0],
+                                             [150.0, 450.0, 150.0])])
+    assert found['exact volume, single'].nanoseconds.shape == (3, 3)
+    ratio = native.Ratio.of(found, 'exact volume, single')
+    assert str(ratio) == '1.40 [1.20, 1.50]'
+    assert native.Ratio.of(found, native.UNIT) == (1.0, 1.0, 1.0)
+    table = native.sets_table({'stacks': found, 'parcels': {
+        **found, 'Bullet contactPairTest, single': unit, 'exact volume, batch': unit,
+        'mlp volume, single': unit}}, 'single')
+    assert table.splitlines()[0] == (
+        '|  | `mjc_BoxBox` [ns] | exact volume | mlp volume | Bullet contactPairTest |')
+    assert table.splitlines()[2] == '| stacks | 100 | 1.40 [1.20, 1.50] | – | – |'
 
 
 @needs_compiler
@@ -73,15 +108,15 @@ def test_each_contact_has_its_time(program: tuple[Path, list[str]], containers: 
 def test_a_wrong_call_ends_the_run(containers: Pairs, planted: str) -> None:
     truth = containers.contacts().separation
     wrong = {'sign': -truth, 'size': truth - 0.1}[planted]
-    native.judged('planted', np.ones(1), truth, containers)
+    native.judged('planted', np.ones((1, 1)), truth, containers)
     with pytest.raises(RuntimeError, match='planted misses'):
-        native.judged('planted', np.ones(1), wrong, containers)
+        native.judged('planted', np.ones((1, 1)), wrong, containers)
 
 
 def test_a_wrong_verdict_is_counted(containers: Pairs) -> None:
     separation = containers.contacts().separation.copy()
     separation[3] = np.inf
-    found = native.judged('planted', np.ones(1), separation, containers)
+    found = native.judged('planted', np.ones((1, 1)), separation, containers)
     assert (found.missed, found.invented) == (1, 0)
 
 
@@ -96,7 +131,10 @@ def test_quick_run(tmp_path: Path, program: tuple[Path, list[str]],
     recorded = settled.read()
     assert {row['set'] for row in rows} == {
         *SETS, *LOADS, *FLUSH, native.MIXED, *settled.by_engine(recorded), *recorded.scene}
-    assert {row['by_unit'] for row in rows if row['contestant'] == native.UNIT} == {'1'}
+    assert {row[f'by_unit{end}'] for row in rows if row['contestant'] == native.UNIT
+            for end in ('', '_low', '_high')} == {'1'}
+    assert all(float(row['by_exact_low']) <= float(row['by_exact']) <= float(row['by_exact_high'])
+               for row in rows if row['contestant'] == 'mlp covariance, batch')
     text = (tmp_path / 'native.md').read_text('utf-8')
     for call in ('bc_collide(', 'bc_collide_rows(', 'mj_geomDistance(', 'box_box('):
         assert call in text
