@@ -31,7 +31,7 @@ class Choice(NamedTuple):
 
     name: str
     contestant: str  # of frontier.csv
-    native: str = ''  # of native.csv, without `, single`; of an engine, the call that is fastest
+    native: str = ''  # of native.csv, without `, single`
     rest: str = 'settled'  # set of goods at rest in frontier.csv
 
 
@@ -97,6 +97,18 @@ def from_c(choice: Choice, way: str, of_set: str) -> str:
     return cell(row, 'p50_ns', digits=3) if row else '–'
 
 
+def by_mujoco(finds: str, of_set: str) -> str:
+    """Return a call's time of `exact` from C relative to MuJoCo's, and its range where known.
+
+    finds: what the call finds beside the point, volume or covariance.
+    """
+    row = fastest(rows('native.csv', set=of_set, contestant=f'exact {finds}, single'))
+    assert row
+    ends = [row[column] for column in ('by_unit_low', 'by_unit_high') if column in row]
+    return f'{float(row["by_unit"]):.2f}' + (
+        f' [{", ".join(f"{float(end):.2f}" for end in ends)}]' if ends else '')
+
+
 def models() -> str:
     """Return what each way to find the contact point costs, and how far it is off."""
     body = []
@@ -114,9 +126,12 @@ def models() -> str:
     where = fastest(rows('native.csv', set=SWAY, contestant='exact volume, single'))
     assert where
     return (f'{table}\n\nMedians of one pair on one core with '
-            f'{SHOWN[where["instruction_set"]]}, {where["processor"]}. Goods are at rest; '
+            f'{SHOWN[where["instruction_set"]]}, {where["processor"]}. Goods rest, '
             'containers sway or land. The error is what 99 % of the points are within, in % of the '
-            "smaller box's longest edge. A dash: no such call, or no network for these sizes.")
+            "smaller box's longest edge. A dash: no such call, or no network for these sizes.\n\n"
+            f'Relative to MuJoCo from C, `exact` takes {by_mujoco("volume", AT_REST)} at rest and '
+            f'{by_mujoco("volume", SWAY)} swaying for point and volume, with the covariance '
+            f'{by_mujoco("covariance", AT_REST)} and {by_mujoco("covariance", SWAY)}.')
 
 
 def bench() -> str:
@@ -124,8 +139,8 @@ def bench() -> str:
     found = RATIOS.search((RESULTS / 'bench_mlp.md').read_text('utf-8'))
     median = MEDIAN.search((RESULTS / 'bench_exact.md').read_text('utf-8'))
     assert found and median
-    return (f'`box_contact_bench --model mlp` compares latencies over ROS: of the contact node, '
-            f'of one that echoes poses, and of one with the soup. At 1 kHz it printed '
+    return (f'`box_contact_bench --model mlp` compares latencies over ROS of the contact node, '
+            f'an echo of poses, and the soup. At 1 kHz it printed '
             f'`{found[0]}`, with 95 % intervals: see [the report](docs/results/bench_mlp.md). With '
             f'`exact`, the median answer takes {median[1]} ms.')
 

@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import csv
+import re
+import runpy
 import shutil
 from pathlib import Path
 
@@ -138,6 +140,10 @@ def test_quick_run(tmp_path: Path, program: tuple[Path, list[str]],
     text = (tmp_path / 'native.md').read_text('utf-8')
     for call in ('bc_collide(', 'bc_collide_rows(', 'mj_geomDistance(', 'box_box('):
         assert call in text
+    tables = runpy.run_path(str(native.ROOT / 'docs' / 'tables.py'))
+    monkeypatch.setitem(tables['rows'].__globals__, 'RESULTS', tmp_path)
+    shown = tables['by_mujoco']('covariance', tables['SWAY'])
+    assert re.fullmatch(r'[\d.]+ \[[\d.]+, [\d.]+\]', shown) and f' {shown} ' in text
 
 
 @pytest.mark.skipif(shutil.which('pkg-config') is None, reason='no pkg-config')
