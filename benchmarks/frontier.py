@@ -61,7 +61,7 @@ SIZES = (*MLP_SIZES, 'mlp')
 """The network of `mlp` by size; `mlp` itself has 32-32."""
 SHOWN = {'exact': ('exact', 'C0', 0), 'mlp-8-8': ('mlp, 8-8', 'C2', 4),
          'mlp-16-16': ('16-16', 'C2', 0), 'mlp': ('32-32', 'C2', -4),
-         'mlp, idle': ('mlp without its network', 'C8', -9),
+         'mlp, idle': ('mlp, last layer zeroed', 'C8', -9),
          'paper': ('paper', 'C4', 0), 'paper-at-rest': ('paper, for this scene', 'C4', 0),
          'soup-1': ('soup, N = 1', 'C5', 9), 'soup-8': ('N = 8', 'C5', -5),
          'MuJoCo mj_collision': ('MuJoCo', 'C1', 9),

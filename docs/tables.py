@@ -126,9 +126,10 @@ def models() -> str:
     where = fastest(rows('native.csv', set=SWAY, contestant='exact volume, single'))
     assert where
     return (f'{table}\n\nMedians of one pair on one core with '
-            f'{SHOWN[where["instruction_set"]]}, {where["processor"]}. Goods rest, '
-            'containers sway or land. The error is what 99 % of the points are within, in % of the '
-            "smaller box's longest edge. A dash: no such call, or no network for these sizes.\n\n"
+            f'{SHOWN[where["instruction_set"]]}, {where["processor"]}. Goods rest '
+            '(cubes for `paper`), containers sway or land. The error is what 99 % of the points '
+            "are within, in % of the smaller box's longest edge. A dash: no such call, or no "
+            'network for these sizes.\n\n'
             f'Relative to MuJoCo from C, `exact` takes {by_mujoco("volume", AT_REST)} at rest and '
             f'{by_mujoco("volume", SWAY)} swaying for point and volume, with the covariance '
             f'{by_mujoco("covariance", AT_REST)} and {by_mujoco("covariance", SWAY)}.')
