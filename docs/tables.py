@@ -128,8 +128,8 @@ def models() -> str:
     return (f'{table}\n\nMedians of one pair on one core with '
             f'{SHOWN[where["instruction_set"]]}, {where["processor"]}. Goods rest '
             '(cubes for `paper`), containers sway or land. The error is what 99 % of the points '
-            "are within, in % of the smaller box's longest edge. A dash: no such call, or no "
-            'network for these sizes.\n\n'
+            "are within, in % of the smaller box's longest edge. A dash: no such call or "
+            'network. PyBullet needs five detections for a new pose.\n\n'
             f'Relative to MuJoCo from C, `exact` takes {by_mujoco("volume", AT_REST)} at rest and '
             f'{by_mujoco("volume", SWAY)} swaying for point and volume, with the covariance '
             f'{by_mujoco("covariance", AT_REST)} and {by_mujoco("covariance", SWAY)}.')

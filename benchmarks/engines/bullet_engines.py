@@ -63,7 +63,7 @@ def persistent() -> Contestant:
 
     return Contestant(
         name='PyBullet getContactPoints', package='pybullet', boxes=boxes, at=_at, read=_read,
-        call=f'{FILLING} × performCollisionDetection, getContactPoints',
+        call=f'{FILLING + 1} × performCollisionDetection, getContactPoints',
         returns='up to 4 points with depths, normals',
         causes={'invented': 'The axis test adds 1e-5 to every entry of the rotation, so gaps of '
                 'some 1e-5 of the size count as contact.'})
