@@ -32,7 +32,7 @@ from .timing import (
     usable_cores,
 )
 
-UNIT = 'MuJoCo mj_geomDistance'  # the contestant whose single call is the unit of all ratios
+UNIT = 'MuJoCo mj_collision'  # the contestant whose single call is the unit of all ratios
 PACKAGES = ('numpy', 'mujoco')
 ROUNDS, QUICK_ROUNDS = 20, 2  # of batches
 BATCH, QUICK_BATCH = 100_000, 1_000
