@@ -44,6 +44,8 @@ CONTACTS, PASSES = 100_000, 30
 QUICK_CONTACTS, QUICK_PASSES = 2_000, 3
 EACH = ('exact', 'mlp')
 PERCENTS = {'p50': 50, 'p99.9': 99.9, 'slowest': 100}
+GOALS = {'slowest': 1.5, 'p99.9': 1.3}
+"""Of all contacts by `mlp`: at most so many times the median one."""
 MIXED = 'containers, 20 % touching'
 UNIT = 'mjc_BoxBox, single'
 OURS = tuple(f'exact {finds}, {way}' for way in ('single', 'batch')
@@ -339,6 +341,16 @@ def slowest_table(times: Mapping[str, np.ndarray]) -> str:
         *PERCENTS, 'slowest / p50 of all'))], lines)
 
 
+def goals(times: Mapping[str, np.ndarray]) -> str:
+    """Return what `GOALS` names of the times of single contacts, and which goals are missed."""
+    of_all = np.concatenate([both[EACH.index('mlp')] for both in times.values()])
+    found = {name: float(np.percentile(of_all, PERCENTS[name]) / np.median(of_all))
+             for name in GOALS}
+    return ', '.join(f'{name} {found[name]:.2f} (at most {most:g}: '
+                     f'{"met" if found[name] <= most else "goal missed"})'
+                     for name, most in GOALS.items())
+
+
 def contact_rows(found: Mapping[str, Mapping[str, np.ndarray]]) -> Iterator[dict[str, object]]:
     """Yield a row per instruction set, set and model: the times of single contacts."""
     for instruction_set, by_set in found.items():
@@ -408,6 +420,7 @@ def main(args: Sequence[str] | None = None) -> int:
         folder, 'native', args, machine=output.machine(), copies=count, rounds=rounds, calls=calls,
         pairs=pairs, best=best, **tables, models=models_table(found[best]),
         scenes=scenes_table(by_scene, scenes), slowest=slowest_table(contacts[best]),
+        goals=goals(contacts[best]),
         passes=passes, code=calls_shown(missing), engines=', '.join(versions), missing=''.join(
             f'\n\nLeft out: {name.capitalize()} is not installed with its headers '
             f'(`{OPTIONAL[name]}`).' for name in missing))

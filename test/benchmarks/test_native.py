@@ -104,6 +104,9 @@ def test_each_contact_has_its_time(program: tuple[Path, list[str]], containers: 
     assert fast == '| fast | 3 | 100 | 100 | 100 | 1.00 | 100 | 100 | 100 | 1.00 |'
     assert slow == '| slow | 1 | 100 | 100 | 100 | 1.00 | 250 | 250 | 250 | 2.50 |'
     assert of_all.startswith('| all | 4 | 100 | ')
+    assert native.goals(planted) == ('slowest 2.50 (at most 1.5: goal missed), '
+                                     'p99.9 2.50 (at most 1.3: goal missed)')
+    assert native.goals({'fast': planted['fast']}).count(': met)') == 2
 
 
 @pytest.mark.parametrize('planted', ['sign', 'size'])
