@@ -218,8 +218,8 @@ def each_contact(program: Path, by_set: Mapping[str, Pairs], instruction_set: st
     one pass does not count, and an empty reading of the clock is subtracted.
     """
     share = count // len(by_set)
-    touching = {name: pairs.rows(np.flatnonzero(pairs.contacts().colliding)[:share])
-                for name, pairs in by_set.items()}
+    touching = {name: pairs.rows(rows[:share]) for name, pairs in by_set.items()
+                if len(rows := np.flatnonzero(pairs.contacts().colliding))}
     asked = Pairs(*(np.concatenate(columns) for columns in zip(*touching.values())))
     lines = run(program, asked, instruction_set, passes)
     times = np.array([line.split('\t') for line in lines], dtype=float).T
