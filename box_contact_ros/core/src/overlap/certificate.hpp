@@ -22,6 +22,8 @@ namespace planes {
 
 // Sums about a point far outside the overlap cancel: most magnitude of their parts [of the sum].
 constexpr double most_cancelled = 4.0;
+// Sums of squares do so about a nearer point: its squared distance from the centroid [of the trace].
+constexpr double most_way2 = 0.25;
 
 // Rounding shifts a line of two planes by 2⁻⁵³ · size / sine of their angle, or moves the end of a piece
 // of it by as much. An area changes by a length L times that, and the volume by the distance of the
@@ -47,18 +49,18 @@ constexpr double covariance_diagonal_share = 0.25;
 // Whether sums over planes are right.
 template <class T>
 struct Certificate {
-  Mask<T> holds;  // they are
-  Mask<T>
-      closes;  // the areas of the planes agree: no piece is lost, and only digits may be missing
+  Mask<T> holds;      // they are
+  Mask<T> cancelled;  // no piece is lost: sums about a nearer point may be right
 };
 
-// The twelve equations, and that no line has too long a lever. `x_n`, `normal` and `size` as in Surface,
-// over both boxes; `lever`: of the lines, times the length of the edges' pieces; `trace`: of the
-// covariance; `way2`: squared distance of the centroid from the origin.
+// The twelve equations, that no line has too long a lever, and that the sum of parts of the magnitude
+// `gross` has not cancelled. `x_n`, `normal`, `size` and `gross` as in Surface, over both boxes; `lever`:
+// of the lines, times the length of the edges' pieces; `trace`: of the covariance; `way2`: squared
+// distance of the centroid from the origin.
 template <bool squares, class T>
 BC_INLINE Certificate<T> certificate(const Columns<T>& x_n, const Triple<T>& normal,
-                                     const Triple<T>& size, T lever, T volume, T trace, T way2,
-                                     T pair_size, T depth) {
+                                     const Triple<T>& size, T lever, T volume, T gross, T trace,
+                                     T way2, T pair_size, T depth) {
   T rounding = centroid_rounding * pair_size / depth;
   T error = pair_size * max(splat<T>(least_centroid_error), rounding);
   T covariance_error = max(splat<T>(least_covariance_error), rounding);
@@ -73,10 +75,12 @@ BC_INLINE Certificate<T> certificate(const Columns<T>& x_n, const Triple<T>& nor
   Triple<T> own = abs(entries[0] + (-volume)) * uniform(pair_size);
   Triple<T> beside = max(abs(entries[1]), abs(entries[2]));
   Mask<T> closes = all_of(abs(normal) * uniform(pair_size) <= closure * size);
-  Mask<T> holds = closes & (volume > 0.0);
+  Mask<T> has_digits = gross <= (6.0 * most_cancelled) * volume;
+  Mask<T> holds = closes & has_digits & (volume > 0.0);
   holds &= rounding_of_size * pair_size * lever <= lever_share * error * volume;
   holds &= all_of((own <= uniform(diagonal * volume)) & (beside <= off_diagonal * size));
-  return {holds, closes};
+  Mask<T> cancelled = closes & ((has_digits == 0) | (way2 > most_way2 * trace));
+  return {holds, cancelled};
 }
 
 // Move a point of P's frame into both boxes, by the nearest points of each in turn. Returns where
@@ -134,9 +138,8 @@ BC_INLINE planes::Certificate<T> overlap_by_planes(const Pair<T>& pair,
   }
   T lever = sum(lengths) * sqrt(largest(largest_lever2));
   Triple<T> normal = p.normal + m * q.normal, area = p.size + abs(m) * q.size;
-  Certificate<T> certain =
-      certificate<squares>(x_n, normal, area, lever, volume, trace, way2, pair.size, depth);
-  certain.holds &= p.gross + q.gross <= (6.0 * most_cancelled) * volume;
+  Certificate<T> certain = certificate<squares>(x_n, normal, area, lever, volume, p.gross + q.gross,
+                                                trace, way2, pair.size, depth);
   Mask<T> shallow = depth < safely_inside * pair.size;
   if (any(shallow)) {
     Triple<T> moved = centroid;

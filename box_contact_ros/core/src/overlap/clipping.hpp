@@ -318,6 +318,7 @@ inline Found overlap_by_clipping(const Pair<double>& pair, int face) {
   Found best = clipping::overlap_from<Found>(pair, face, kept);
   if (kept < cancelled) {
     for (int other = 0; other < 6; ++other) {
+      if (other == face) continue;
       double kept_by_other;
       Found candidate = clipping::overlap_from<Found>(pair, other, kept_by_other);
       if (kept_by_other > kept) best = candidate, kept = kept_by_other;

@@ -5,8 +5,8 @@
 //
 // 1. Parallel boxes: by intervals (intervals.hpp).
 // 2. Others, pressed in where they are at exact touch: by the planes that meet the overlap (certificate.hpp).
-// 3. Where that is not certain: once more about the centroid that was found, or by clipping
-//    (clipping.hpp).
+// 3. Where that is not certain: once more about the centroid that was found where digits have
+//    cancelled, else by clipping (clipping.hpp).
 #pragma once
 
 #include "../kernel.hpp"
@@ -60,14 +60,14 @@ BC_INLINE planes::Certificate<T> overlap_of(const Query<T>& q, const Pressed<T>&
   return certificate;
 }
 
-// The overlap of a single pair that is not certain. Where all pieces are there, sums about a point far
-// from a thin overlap have cancelled: they are taken once more about the centroid that was found. Where
-// a piece is lost, the pair is clipped.
+// The overlap of a single pair that is not certain. Where sums about a point far from a thin overlap
+// have cancelled, they are taken once more about the centroid that was found. Others are clipped: a piece
+// is lost, or too long a lever moves its end, about any point.
 template <class Found>
-[[gnu::noinline]] void solve_uncertain(Query<double> q, const Vec<double>& near, bool closes,
+[[gnu::noinline]] void solve_uncertain(Query<double> q, const Vec<double>& near, bool cancelled,
                                        Found& found, Counts& counts) {
   Pressed<double> pressed(q);
-  if (closes) {
+  if (cancelled) {
     planes::PairOfBoxes<double> boxes(q.pair, q.axis);
     planes::find_planes(q.pair, q.axis, pressed.from_a, pressed.from_b, pressed.depth, boxes);
     Columns<double> to_p = transpose(boxes.p_is_a ? q.pair.axes_a : q.pair.axes_b);
@@ -111,7 +111,7 @@ BC_INLINE void solve_overlaps(const Query<T>& q, const Pressed<T>& pressed,
        uncertain &= uncertain - 1) {
     int i = __builtin_ctz(uncertain);
     FoundOf<Number<T>> one;
-    solve_uncertain(lane(q, i), lane(found.centroid, i), lane(certificate.closes, i) != 0, one,
+    solve_uncertain(lane(q, i), lane(found.centroid, i), lane(certificate.cancelled, i) != 0, one,
                     counts);
     set_lane(found, i, one);
   }
