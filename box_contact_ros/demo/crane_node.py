@@ -32,10 +32,11 @@ from visualization_msgs.msg import Marker
 from box_contact_msgs.msg import Contacts
 
 from ..arguments import parse_command_line
-from ..node.messages import contacts_by_pair, make_header, pose_message, stamp_of
+from ..node.messages import make_header, pose_message
 from ..node.parameters import Setting, declare, flag, number, warn_of_unknown
 from ..node.runtime import REFUSALS, GuardedNode, running_node, spin_once
 from ..node.topics import DEEP_RELIABLE, contact_qos
+from ..scene.read_contacts import read_contacts
 from . import CRANE_ROPES, CRANE_WRENCH
 from .crane import CraneScenario
 from .landing import CORNER_SPEED_LIMIT, ClosedLoop, Landing, LandingRecord, LoopState, with_patch
@@ -79,7 +80,7 @@ class CraneNode(GuardedNode):
         self._poses = [self.create_publisher(PoseStamped, f'{box}/pose', DEEP_RELIABLE)
                        for box in ('box_a', 'box_b')]
         self._contacts = self.create_subscription(
-            Contacts, 'contacts', self._on_contacts, DEEP_RELIABLE)
+            Contacts, 'contacts', self._on_contacts, DEEP_RELIABLE, raw=True)
         self._force = self.create_publisher(WrenchStamped, CRANE_WRENCH, contact_qos())
         self._ropes = self.create_publisher(Marker, CRANE_ROPES, contact_qos())
 
@@ -149,18 +150,18 @@ class CraneNode(GuardedNode):
             publisher.publish(pose_message(header, pose))
         return stamp
 
-    def _on_contacts(self, message: Contacts) -> None:
+    def _on_contacts(self, data: bytes) -> None:
         """Take the answer to a pair that was asked for; a stale pair is no answer."""
-        received, stamp = self._now(), stamp_of(message.header)
-        if stamp not in self._asked or message.stale:
+        received, answer = self._now(), read_contacts(data)
+        if answer.stamp not in self._asked or answer.stale:
             return
-        contacts = contacts_by_pair(message)
-        state = self._asked.pop(stamp)
+        state = self._asked.pop(answer.stamp)
         if state is None:
             self._matched = True
             return
-        latency = (received - stamp) * 1e-9
-        touches = {name: contact for name, contact in contacts.items() if contact.colliding}
+        latency = (received - answer.stamp) * 1e-9
+        touches = {name: contact for (name, _, _), contact in zip(
+            answer.names, answer.contacts[:answer.touching])}
         if touches:
             self.latencies.append(latency)
         if not all(math.isfinite(contact.volume) for contact in touches.values()):

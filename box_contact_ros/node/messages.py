@@ -19,8 +19,7 @@ from box_contact_msgs.msg import Contact as ContactMessage
 
 from ..core import native
 from ..scene.message_bytes import NANOSECONDS
-from ..scene.read_contacts import UPPER
-from ..solver.contact import Contact, Contacts
+from ..solver.contact import Contacts
 
 
 def make_header(stamp: int, frame_id: str) -> Header:
@@ -72,20 +71,3 @@ class KeptMessages:
             p, n = message.point, message.normal
             p.x, p.y, p.z, n.x, n.y, n.z, message.depth, message.volume, message.area = row
         return self._messages[:len(names)]
-
-
-def contacts_by_pair(message: Any) -> dict[str, Contact]:
-    """Return what touches in a `Contacts` message, by the names of the pairs.
-
-    Numbers are those that the node computed, to the bit.
-    """
-    return {entry.pair: _contact(entry) for entry in message.contacts}
-
-
-def _contact(entry: Any) -> Contact:
-    """Return the contact of a `Contact` message."""
-    covariance = np.empty((3, 3))
-    covariance[UPPER] = covariance.T[UPPER] = entry.covariance
-    point, normal = (np.array([vector.x, vector.y, vector.z])
-                     for vector in (entry.point, entry.normal))
-    return Contact(not np.isnan(point[0]), -entry.depth, normal, point, entry.volume, covariance)

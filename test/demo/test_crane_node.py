@@ -17,6 +17,7 @@ import rclpy
 from rclpy.context import Context
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 from test_landing import landed
 
 from box_contact_msgs.msg import Contact, Contacts
@@ -138,14 +139,15 @@ def crane(request):
 
 
 def answer_to(stamp, *, volume=0.03, stale=()):
-    """Return the answer of a load 1 mm deep on its whole bottom; NaN: by a model without patch."""
+    """Return the bytes of an answer, 1 mm deep on the whole bottom; NaN: a model without patch."""
     contact = Contact(pair='box_a_box_b', box_a='box_a', box_b='box_b', depth=1e-3, volume=volume,
                       covariance=[12.0, 0.0, 0.0, 0.5, 0.0, 1e-7])
     contact.point.z, contact.normal.z = 2.6, -1.0
     if np.isnan(volume):
         contact.covariance = [volume] * 6
-    return Contacts(header=make_header(stamp, 'world'), stale=stale,
-                    contacts=[] if stale or volume == 0.0 else [contact])
+    return serialize_message(Contacts(
+        header=make_header(stamp, 'world'), stale=stale,
+        contacts=[] if stale or volume == 0.0 else [contact]))
 
 
 def test_answers_that_say_nothing_are_held_over(crane):

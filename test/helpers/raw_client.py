@@ -12,8 +12,8 @@ import numpy as np
 import poses
 from patience import PATIENCE
 from ros_client import Client
+from typed_messages import contacts_by_pair
 
-from box_contact_ros.node.messages import contacts_by_pair
 from box_contact_ros.scene.message_bytes import NANOSECONDS
 
 ORIGIN = poses.IDENTITY

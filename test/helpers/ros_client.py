@@ -21,10 +21,9 @@ from rclpy.context import Context
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from typed_messages import pose_stamped
+from typed_messages import contacts_by_pair, pose_stamped
 
 from box_contact_msgs.msg import Contacts
-from box_contact_ros.node.messages import contacts_by_pair
 from box_contact_ros.node.rclpy_workarounds import ends_within
 from box_contact_ros.scene.message_bytes import NANOSECONDS
 from box_contact_ros.solver.contact import Contact

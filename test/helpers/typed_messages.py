@@ -113,6 +113,13 @@ def read(message: Contacts) -> ReadContacts:
     return read_contacts(serialize_message(message))
 
 
+def contacts_by_pair(message: Contacts) -> dict[str, Contact]:
+    """Return what touches by a message, by the names of the pairs."""
+    answer = read(message)
+    return {name: contact for (name, _, _), contact in zip(
+        answer.names, answer.contacts[:answer.touching])}
+
+
 def _entries(listed: Iterable[tuple[Pair, Contact]]) -> list[ContactMessage]:
     return [ContactMessage(
         pair=pair.label, box_a=pair.a, box_b=pair.b, point=_point(c.point),

@@ -21,14 +21,13 @@ from rclpy.parameter import Parameter
 from ros_client import Client, serving
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
-from typed_messages import a_box, a_pair
+from typed_messages import a_box, a_pair, contacts_by_pair
 
 from box_contact_msgs.srv import Check
 from box_contact_ros import ContactSolver, SceneSolver, make_model
 from box_contact_ros.node import check as check_module
 from box_contact_ros.node.check import MOST_CONTACTS, Checker, CheckService
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.messages import contacts_by_pair
 from box_contact_ros.scene.scene import Box, Frame, Pair, Scene
 from box_contact_ros.scene.scene_check import MOST_BOXES, MOST_PAIRS
 

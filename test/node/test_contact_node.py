@@ -18,11 +18,11 @@ from raw_client import APART, ORIGIN, TOUCHING
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from ros_client import Client, serving
+from typed_messages import contacts_by_pair
 
 from box_contact_msgs.msg import Contacts
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import LIVE, PARAMETERS, ContactNode
-from box_contact_ros.node.messages import contacts_by_pair
 
 CUBES = {'size_a': [2.0, 2.0, 2.0], 'size_b': [2.0, 2.0, 2.0], 'model': 'exact'}
 PAIR = 'box_a_box_b'

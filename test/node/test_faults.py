@@ -30,10 +30,10 @@ from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from typed_messages import contacts_by_pair
 
 from box_contact_msgs.msg import Contacts
 from box_contact_ros import ContactSolver
-from box_contact_ros.node.messages import contacts_by_pair
 
 HELPERS = Path(__file__).resolve().parents[1] / 'helpers'
 CUBES = ('--ros-args', '-p', 'size_a:=[2.0, 2.0, 2.0]', '-p', 'size_b:=[2.0, 2.0, 2.0]')

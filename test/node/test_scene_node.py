@@ -21,11 +21,11 @@ from rclpy.parameter import Parameter
 from ros_client import DEEP, Client, serving, stamp_of
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
-from typed_messages import pose_array, read
+from typed_messages import contacts_by_pair, pose_array, read
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.messages import contacts_by_pair, make_header
+from box_contact_ros.node.messages import make_header
 from box_contact_ros.node.topics import ARRAY_DEPTH, MOST_PAIRS_WITH_TOPICS
 from box_contact_ros.scene.scene import ALONE
 from box_contact_ros.view.listener import read_answer

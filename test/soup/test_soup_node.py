@@ -14,13 +14,13 @@ import yaml
 from geometry_msgs.msg import PointStamped, Vector3Stamped
 from rclpy.parameter import Parameter
 from ros_client import Client, serving
+from typed_messages import contacts_by_pair
 
 pytest.importorskip('fcl')
 
 from box_contact_msgs.msg import Contacts
 from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.messages import contacts_by_pair
 from box_contact_ros.resources import resource_path
 from box_contact_ros.soup.soup_node import SoupNode
 
