@@ -34,8 +34,8 @@ KINDS = {MLP: Kind('patch', FEATURES, (OUTPUTS,), 'relu'),
 """Networks by model.
 
 `mlp` reads what the boxes cut off the patch box, and gives the overlap there. `paper` reads t_x t_y
-t_z roll pitch yaw, and gives azimuth and elevation of the point and of the normal, or x y z of the
-point, from the first box's centre [half of the longest edge].
+t_z roll pitch yaw. It gives azimuth and elevation of the point and of the normal, or x y z of the
+point. They are seen from the first box's centre. Lengths are in halves of the longest edge.
 """
 GROUP, INPUTS_TOGETHER = 8, 4
 """Units, and inputs, that the core reads together."""

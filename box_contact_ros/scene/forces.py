@@ -50,19 +50,18 @@ _MOST = 2**31 - 1  # an int of C
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
-    """A body.
+    """What the forces know of a body.
 
-    mass     [kg]; 0: no force moves it, but it may move by its velocity
-    inertia  principal moments (3,) about the body's own axes through the centre of mass [kg m²]
-    centre   of mass (3,), in the body's own frame [m]
-
-    Raises ValueError, with field and value, for a mass outside 1e-50 to 1e50 kg, moments of inertia
-    that no body has, and a centre that is not finite.
+    Raises ValueError, with field and value, for a mass outside 1e-50 to 1e50 kg. Moments of inertia
+    that no body has and a centre that is not finite are refused as well.
     """
 
     mass: float
+    """[kg]. A body of mass 0 is moved by no force, but may move by its velocity."""
     inertia: Sequence[float] | np.ndarray
+    """(3,) principal moments about the body's own axes through the centre of mass [kg m²]."""
     centre: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0)
+    """(3,) centre of mass, in the body's own frame [m]."""
 
     def __post_init__(self) -> None:
         mass = as_number(self.mass, 'mass')
@@ -122,39 +121,37 @@ class Body:
 
 
 class Motion(NamedTuple):
-    """What a step leads to: a row for each body.
-
-    poses (n, 7) and velocities (n, 6): at the end of the step. wrenches (n, 6): of contacts, their
-    mean over the step, with what pushes overlaps out; for a simulator that moves the bodies by
-    itself.
-    """
+    """What a step leads to: a row for each body."""
 
     poses: np.ndarray
+    """(n, 7) at the end of the step."""
     velocities: np.ndarray
+    """(n, 6) at the end of the step."""
     wrenches: np.ndarray
+    """(n, 6) of contacts, their mean over the step, with what pushes overlaps out. They are for a
+    simulator that moves the bodies by itself."""
 
 
 class Loads(NamedTuple):
     """What each contact carried, the mean over the last step: a row for each pair of boxes.
 
     Forces are those on box B; A gets the opposite. All is zero where nothing presses.
-
-    pairs         (k, 2): boxes A and B, by the lower and then the higher one
-    pressing      (k,), along the normal from A to B [N]
-    friction      (k, 3) [N]
-    torsion       (k,), of friction, along the normal [N m]
-    centre        (k, 3), of pressure [m]
-    corners       (k, 4, 3), of the rectangle that stands for the patch, in turn [m]
-    corner_loads  (k, 4): the part of `pressing` at each corner, never below 0 [N]
     """
 
     pairs: np.ndarray
+    """(k, 2) boxes A and B, by the lower and then the higher one."""
     pressing: np.ndarray
+    """(k,) along the normal from A to B [N]."""
     friction: np.ndarray
+    """(k, 3) [N]."""
     torsion: np.ndarray
+    """(k,) of friction, along the normal [N m]."""
     centre: np.ndarray
+    """(k, 3) of pressure [m]."""
     corners: np.ndarray
+    """(k, 4, 3) of the rectangle that stands for the patch, in turn [m]."""
     corner_loads: np.ndarray
+    """(k, 4) the part of `pressing` at each corner, never below 0 [N]."""
 
 
 class PatchForces:
@@ -173,10 +170,11 @@ class PatchForces:
                  iterations: int = 4, relaxations: int = 2, threads: int = 1) -> None:
         """Begin without patches.
 
-        friction: Coulomb's μ of pairs without one of their own. substeps: equal parts of a step;
-        heavy bodies on light ones need them. iterations: of sequential impulses in a sub-step, at
-        most; relaxations: more of them, which remove the speed of pushing out. threads: at most;
-        they change no bit.
+        friction: Coulomb's μ of pairs without one of their own.
+        substeps: equal parts of a step. Heavy bodies on light ones need them.
+        iterations: of sequential impulses in a sub-step, at most.
+        relaxations: further iterations, which remove the speed of pushing out.
+        threads: at most. They change no bit.
         ValueError: names the field and its value.
         """
         self._native = native.PatchForces(
@@ -212,10 +210,13 @@ class PatchForces:
         Without contacts, they are one's own: `exact` solves the pairs at the start of each
         `advance`. That needs `set_boxes`, and no poses, age or period.
         A contact whose separation is NaN is stale: the patch of its pair stays.
-        friction: μ (k,). surface_velocity: of B's surface relative to A's (k, 3) [m/s], plus that
-        of the bodies, as of a belt. stiffness: (k,) [N/m]; 0 is as stiff as step and answers bear.
-        age: how long ago the answer was asked for [s]. period: from one question to the next [s];
-        0 is the least of the last intervals between answers.
+        friction: μ (k,).
+        surface_velocity: (k, 3) of B's surface relative to A's [m/s], as of a belt. That of the
+        bodies is added.
+        stiffness: (k,) [N/m]. 0 is as stiff as step and answers allow.
+        age: how long ago the answer was asked for [s].
+        period: from one question to the next [s]. 0 is the least of the last intervals between
+        answers.
         ValueError: names field and value, such as a contact without a patch, or a pair that comes
         twice; nothing changes then.
         """

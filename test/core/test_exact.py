@@ -175,7 +175,8 @@ def test_concentric_boxes_meet_in_their_middle():
     """Flush on both sides, in any orientation, 100,000 pairs: the point is where both centres are.
 
     Where a face lies in the other box's far face, rounding lets its corners be below and above it
-    by turns; cut in two as a whole, its middle was in both parts: 8 % of the size off.
+    by turns. When such a face was cut in two as a whole, both parts had its middle. The point was
+    then off by 8 % of the size.
     """
     a, b, size_a, size_b = poses.equal_thickness(np.random.default_rng(5), 200_000)
     middle = (b[:, :3] == 0).all(axis=1)

@@ -193,9 +193,9 @@ def test_half_of_the_poses_are_none(node, client):
 
 
 def test_a_request_that_rclpy_cannot_read(node, client):
-    """A parameter of a type that there is none of, at which rclpy's own service raises.
+    """A parameter has a type that does not exist, and rclpy's own service raises.
 
-    The client is answered, without a word of success, and the node says so and goes on.
+    The response says nothing of success. The node logs the request and goes on.
     """
     bad = [Parameter(name='model', value=ParameterValue(type=UNKNOWN_TYPE))]
     assert not client.call(SetParameters, '/contact_node/set_parameters',

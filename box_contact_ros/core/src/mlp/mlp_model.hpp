@@ -24,8 +24,8 @@ constexpr float least_volume = 1e-5F, least_deviation = 1e-3F;
 // Largest entry of the covariance's root [half extents]: a convex body has no more, and three of them
 // make no variance above 1.
 constexpr float most_deviation = 0.577350269F;
-// The point is moved into either box in turn, so many times, and half of the way farther: with no more
-// than the way itself, what is left outside of the other box is 60 times as large.
+// The point is moved into either box in turn, so many times, and half of the way farther. With no more
+// than the way itself, it stays outside of the other box by 60 times as much.
 constexpr int moves_inwards = 2;
 constexpr float way_inwards = 1.5F;
 

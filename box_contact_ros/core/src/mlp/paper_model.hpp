@@ -7,9 +7,9 @@
 //    The boxes are moved apart along the normal until they touch: the network knows touching boxes only.
 // 2. `fold`: symmetries bring the pair into the network's domain, t ≥ 0 and roll, pitch and yaw from
 //    −π/2 to π/2. A box stays the same when an axis changes its sign, and the whole pair may be
-//    reflected. Let t be the second box's offset and R its orientation, in the first box's frame:
-//    t' = M t, R' = M R N, det M · det N = 1, with M and N of signs that the pose alone tells. Points and
-//    directions of the contact go back by M.
+//    reflected. Let t be the second box's offset and R its orientation, in the first box's frame. Then
+//    t' = M t and R' = M R N, with det M · det N = 1. M and N are diagonal, of signs that the pose alone
+//    tells. Points and directions of the contact go back by M.
 // 3. The network: offset, roll, pitch and yaw → azimuth and elevation of the impact point, seen from the
 //    first box's centre, and of the normal. Or → x, y and z of the point; the normal is then SAT's.
 // 4. The point is where that direction leaves the first box. It goes to the middle of the depth.

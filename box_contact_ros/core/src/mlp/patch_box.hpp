@@ -326,7 +326,7 @@ struct PatchBox {
 // What the half-spaces of both boxes cut off the patch box, as its network reads it.
 //
 // A half-space cuts the box [−1, 1]³ to a depth c along a, with Σ|a_i| = 1. Per slab there are two,
-// c⁺ and c⁻. The features, of all six slabs of both boxes alike:
+// c⁺ and c⁻. All six slabs of both boxes count alike. The features:
 //
 //   0–2: Σ (c⁺ − c⁻) a       3, 4: Σ c, Σ c²       5–7, 8–10: Σ of (c⁺ − c⁻)² a aᵀ, xx yy zz, xy xz yz
 //   11–18: how deep the corners of the box are cut off, +++ ++− +−+ +−− −++ −+− −−+ −−−
