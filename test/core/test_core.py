@@ -24,7 +24,7 @@ import numpy as np
 import poses
 import pytest
 from patience import PATIENCE
-from poses import Pairs, fields
+from poses import Pairs, assert_same_bits, fields
 from test_extremes import random_network
 
 import box_contact_ros
@@ -51,12 +51,6 @@ def solve(solver: ContactSolver, pairs: Pairs, threads: int = 1) -> Contacts:
 
 def a_solver(model: str) -> ContactSolver:
     return ContactSolver((1, 1, 1), (1, 1, 1), model=make_model(model))
-
-
-def assert_same_bits(one: Contact | Contacts, other: Contact | Contacts,
-                     where: object = None) -> None:
-    for name, mine, theirs in zip(FIELDS, *map(fields, (one, other)), strict=True):
-        assert np.array_equal(mine, theirs, equal_nan=True), (name, where)
 
 
 def forced(name: str) -> dict[str, str]:
@@ -193,9 +187,9 @@ def test_threads_change_no_bit_and_no_count(model: str, count: int) -> None:
         assert refused == -1
         answers.append(found)
         counts.append(solver.clipped)
-        assert_same_bits(found, solve(a_solver(model), pairs, threads), threads)
+        assert_same_bits(found, solve(a_solver(model), pairs, threads), where=threads)
     for threads, found in zip((2, 3, 7), answers[1:]):
-        assert_same_bits(answers[0], found, threads)
+        assert_same_bits(answers[0], found, where=threads)
     assert len(set(counts)) == 1
     alone = a_solver(model)
     for row in range(count):

@@ -11,7 +11,6 @@ import poses
 import pytest
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.solver.contact import FIELDS
 
 N = 2000
 SOLVERS = {model: ContactSolver(model=model) for model in ('exact', 'mlp')}
@@ -88,10 +87,7 @@ def assert_swapped(a, b, size_a, size_b):
     Two boxes that are the same have the same normal both ways.
     """
     one, two = solve(a, b, size_a, size_b), solve(b, a, size_b, size_a)
-    assert np.array_equal(one.colliding, two.colliding)
-    assert np.array_equal(one.separation, two.separation)
-    for name in ('point', 'volume', 'covariance'):
-        assert np.array_equal(getattr(one, name), getattr(two, name), equal_nan=True), name
+    poses.assert_same_bits(one, two, 'colliding', 'separation', 'point', 'volume', 'covariance')
     same = (a == b).all(axis=1) & (size_a == size_b).all(axis=1)
     sign = np.where(same, 1.0, -1.0)[:, None]
     assert np.array_equal(one.normal, sign * two.normal, equal_nan=True)
@@ -159,9 +155,8 @@ def test_quaternions_of_any_length(power):
     """
     a, b, size_a, size_b = poses.near_parallel_pairs(np.random.default_rng(13), 20_000)
     scaling = np.array([1.0] * 3 + [2.0**power] * 4)
-    one, two = solve(a, b, size_a, size_b), solve(a * scaling, b * scaling, size_a, size_b)
-    for name, left, right in zip(FIELDS, *map(poses.fields, (one, two))):
-        assert np.array_equal(left, right, equal_nan=True), name
+    poses.assert_same_bits(solve(a, b, size_a, size_b),
+                           solve(a * scaling, b * scaling, size_a, size_b))
 
 
 def test_rigid_motion(pairs):
@@ -214,8 +209,7 @@ def test_q_and_minus_q(model):
     one = solve(a, b, size_a, size_b, model)
     for other in (solve(a * minus, b, size_a, size_b, model),
                   solve(a, b * minus, size_a, size_b, model)):
-        for name, left, right in zip(FIELDS, *map(poses.fields, (one, other))):
-            assert np.array_equal(left, right, equal_nan=True), name
+        poses.assert_same_bits(one, other)
 
 
 def test_box_symmetries(pairs):

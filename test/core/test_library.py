@@ -25,11 +25,11 @@ import numpy as np
 import poses
 import pytest
 from patience import PATIENCE
-from poses import Pairs, fields
+from poses import Pairs, assert_same_bits, fields
 
 from box_contact_ros import Body, ContactSolver, PatchForces, make_model
 from box_contact_ros.core import FORCE, instruction_sets
-from box_contact_ros.solver.contact import FIELDS, Contacts
+from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.pose import rotation_matrix
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -157,14 +157,12 @@ def test_other_languages_get_the_bits_of_python(library: ctypes.CDLL, model: str
     assert 0.3 < wanted.colliding.mean() < 0.9
     for threads in (1, 3):
         found = by_ctypes(library, model, pairs, threads)
-        for field, one, other in zip(FIELDS, *map(fields, (found, wanted))):
-            assert np.array_equal(one, other, equal_nan=True), field
+        assert_same_bits(found, wanted)
     n = len(pairs.pose_a)
     all_poses = Pairs(*2 * (np.concatenate(pairs[:2]),), *2 * (np.concatenate(pairs[2:]),))
     places = np.random.default_rng(8).permutation(np.column_stack([np.arange(n), n + np.arange(n)]))
     found = by_ctypes(library, model, all_poses, 2, places)
-    for field, one, other in zip(FIELDS, *map(fields, (found, wanted[places[:, 0]]))):
-        assert np.array_equal(one, other, equal_nan=True), field
+    assert_same_bits(found, wanted[places[:, 0]])
 
 
 @pytest.mark.parametrize('source', ['force_test.c', 'force_test.cpp'])
@@ -338,8 +336,7 @@ def test_points_without_the_patch() -> None:
         sizes = {'size_a': pairs.size_a, 'size_b': pairs.size_b}
         whole = solver.batch(*pairs[:2], **sizes)
         point = solver.batch(*pairs[:2], **sizes, patch=False)
-        for name in ('colliding', 'separation', 'normal'):
-            assert np.array_equal(getattr(whole, name), getattr(point, name), equal_nan=True)
+        assert_same_bits(whole, point, 'colliding', 'separation', 'normal')
         touching = whole.colliding
         size = np.maximum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
         depth = np.maximum(-whole.separation, 1e-9 * size)
@@ -364,8 +361,7 @@ def test_normals_within_the_margin() -> None:
         assert np.array_equal(np.isfinite(found.normal).all(axis=1), near)
         assert np.array_equal(found.normal[plain.colliding], plain.normal[plain.colliding])
         assert np.allclose(np.linalg.norm(found.normal[near], axis=1), 1.0, rtol=0.0, atol=1e-12)
-        for name in ('colliding', 'separation', 'point', 'volume', 'covariance'):
-            assert np.array_equal(getattr(found, name), getattr(plain, name), equal_nan=True)
+        assert_same_bits(found, plain, 'colliding', 'separation', 'point', 'volume', 'covariance')
     apart = np.array([0.0, 0, 3.5, 0, 0, 0, 1])
     near = ContactSolver(poses.CUBE, poses.CUBE, margin=1.5)(poses.IDENTITY, apart)
     assert not near.colliding and near.normal.tolist() == [0.0, 0.0, 1.0]

@@ -34,6 +34,13 @@ def fields(found):
     return tuple(getattr(found, name) for name in FIELDS)
 
 
+def assert_same_bits(one, other, *names, where=None):
+    """Check that two Contact or Contacts have equal fields: all, or those that are named."""
+    for name in names or FIELDS:
+        assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True), (
+            name, where)
+
+
 def joined(*parts: tuple[np.ndarray, ...]) -> Pairs:
     return Pairs(*(np.ascontiguousarray(np.concatenate(columns)) for columns in zip(*parts)))
 

@@ -20,7 +20,7 @@ from safetensors.numpy import save_file
 pytest.importorskip('benchmarks.pose_sets')
 
 from benchmarks import settled
-from benchmarks.contestant import MLP_SIZES
+from benchmarks.contestant import MLP_SIZES, idle_mlp
 from benchmarks.errors import contact_errors
 from benchmarks.pose_sets import LOADS, SETS, Generator, Pairs, at_depth, log_uniform
 from benchmarks.steps import drawn_paths, largest_steps
@@ -33,9 +33,9 @@ from box_contact_ros.core import (
     native,
 )
 from box_contact_ros.networks.models import core_numbers, mlp_numbers, read_mlp
-from box_contact_ros.networks.weights_file import Network, WeightsError, load_weights
+from box_contact_ros.networks.weights_file import Network, WeightsError
 from box_contact_ros.resources import resource_path
-from box_contact_ros.solver.contact import FIELDS, Contacts
+from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.pose import rotation_matrix
 
 N = 4000
@@ -85,11 +85,6 @@ def with_numbers(pairs: Pairs, numbers: np.ndarray) -> Contacts:
     return native.Mlp(numbers).solve(*pairs, 1)[0]
 
 
-def assert_same_bits(one: Contacts, other: Contacts, where: object = None) -> None:
-    for name, mine, theirs in zip(FIELDS, *map(poses.fields, (one, other)), strict=True):
-        assert np.array_equal(mine, theirs, equal_nan=True), (name, where)
-
-
 def trace(covariance: np.ndarray) -> np.ndarray:
     return np.trace(covariance, axis1=1, axis2=2)
 
@@ -125,8 +120,7 @@ def test_verdict_separation_normal_and_axis_are_those_of_exact(
         mlp: ContactSolver, pairs: Pairs) -> None:
     """Bit for bit; the network has no say in them."""
     one, other = pairs.contacts(mlp), pairs.contacts()
-    for name in ('colliding', 'separation', 'normal', 'axis'):
-        assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True), name
+    poses.assert_same_bits(one, other, 'colliding', 'separation', 'normal', 'axis')
     for name in ('point', 'volume', 'covariance'):
         assert np.array_equal(np.isnan(getattr(one, name)), np.isnan(getattr(other, name)))
 
@@ -206,8 +200,7 @@ def test_swap(mlp: ContactSolver, pairs: Pairs) -> None:
     """B against A: equal bits of all but the normal."""
     other = Pairs(pairs.pose_b, pairs.pose_a, pairs.size_b, pairs.size_a)
     one, two = pairs.contacts(mlp), other.contacts(mlp)
-    for name in ('colliding', 'separation', 'point', 'volume', 'covariance'):
-        assert np.array_equal(getattr(one, name), getattr(two, name), equal_nan=True), name
+    poses.assert_same_bits(one, two, 'colliding', 'separation', 'point', 'volume', 'covariance')
 
 
 def test_rows_apart_or_refused_do_not_disturb_neighbours(mlp: ContactSolver) -> None:
@@ -222,14 +215,14 @@ def test_rows_apart_or_refused_do_not_disturb_neighbours(mlp: ContactSolver) -> 
     mixed.size_a[2::4] = (1.0, 1e-3, 1.0)               # a card
     mixed.pose_b[3::8] = mixed.pose_a[3::8]             # one in the other
     found = mixed.contacts(mlp)
-    assert_same_bits(found[::4], clean[::4])
+    poses.assert_same_bits(found[::4], clean[::4])
     assert not found.colliding[1::4].any() and np.isnan(found.point[1::4]).all()
     for bad in ((np.nan, 0, 0, 0, 0, 0, 1), (0, 0, 0, 0, 0, 0, 0)):
         refused = Pairs(*(part.copy() for part in pairs))
         refused.pose_b[17] = bad
         with pytest.raises(ValueError, match=r'poses_b\[17\]'):
             refused.contacts(mlp)
-        assert_same_bits(pairs.contacts(mlp), clean)
+        poses.assert_same_bits(pairs.contacts(mlp), clean)
 
 
 MOVED = {'point': 3.0, 'volume': 8.0, 'covariance': 10.0}
@@ -316,12 +309,10 @@ def test_errors_are_within_the_limits(mlp: ContactSolver, measured: tuple[str, P
 def test_the_network_decides(mlp: ContactSolver, measured: tuple[str, Pairs]) -> None:
     """With its last layer zeroed, the point's 99th percentile is at least four times as large."""
     _, pairs = measured
-    network = load_weights(resource_path('weights', 'mlp.safetensors')).networks['patch']
-    *hidden, (weight, bias) = network.layers
-    idle = core_numbers(Network([*hidden, (0.0 * weight, 0.0 * bias)]))
     truth = pairs.contacts()
-    with_it, without = (np.percentile(contact_errors(found, truth, pairs.edge).point, 99)
-                        for found in (pairs.contacts(mlp), with_numbers(pairs, idle)))
+    with_it, without = (
+        np.percentile(contact_errors(pairs.contacts(solver), truth, pairs.edge).point, 99)
+        for solver in (mlp, ContactSolver(model=idle_mlp())))
     assert without >= 4.0 * with_it
 
 
@@ -351,8 +342,8 @@ def test_the_compiled_network_is_the_shipped_file() -> None:
     numbers = np.array([float(text) for text in re.findall(r'([-\d.e]+)F', body)], np.float32)
     assert np.array_equal(numbers, SHIPPED)
     pairs = drawn('crossed bars', 200)
-    assert_same_bits(pairs.contacts(ContactSolver(model='mlp')),
-                     with_numbers(pairs, SHIPPED))
+    poses.assert_same_bits(pairs.contacts(ContactSolver(model='mlp')),
+                           with_numbers(pairs, SHIPPED))
 
 
 def written(path: Path, widths: tuple[int, ...] = (FEATURES, 4, 4, OUTPUTS), name: str = 'patch',

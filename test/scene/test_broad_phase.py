@@ -263,8 +263,7 @@ def test_the_pairs_of_a_scene(patterns, listed):
     contacts = single.batch(pose, sizes=size, pairs=places)
     hit = np.flatnonzero(contacts.colliding)
     assert np.array_equal(answer.pairs, places[hit]) and len(hit) > 3
-    for mine, theirs in zip(*map(poses.fields, (answer.contacts, contacts[hit]))):
-        assert np.array_equal(mine, theirs)
+    poses.assert_same_bits(answer.contacts, contacts[hit])
     assert [pair for pair, _ in answer.named()] == [present[row] for row in hit]
     asks = any(gone in pair for pair in wanted[listed:])
     assert answer.named_stale() == [pair for pair in pairs if gone in pair] + [

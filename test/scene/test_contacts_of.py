@@ -17,11 +17,6 @@ def heap(rng, n):
     return np.exp(rng.uniform(-1, 0.5, (n, 3))), place
 
 
-def same(mine, theirs):
-    return all(np.array_equal(one, other, equal_nan=True)
-               for one, other in zip(*map(poses.fields, (mine, theirs))))
-
-
 @pytest.mark.parametrize('n', [0, 1, 2, 20, 90])
 def test_contacts_are_those_of_every_pair(n):
     """Each two boxes but two fixed ones and those left out, by index; few boxes and many."""
@@ -34,7 +29,7 @@ def test_contacts_are_those_of_every_pair(n):
                                   threads=2)
     hit = np.flatnonzero(wanted.colliding)
     assert np.array_equal(pairs, every[hit]) and (len(hit) > n or n < 20)
-    assert same(contacts, wanted[hit])
+    poses.assert_same_bits(contacts, wanted[hit])
 
 
 def test_listed_pairs_keep_their_order_and_sides():
@@ -46,7 +41,7 @@ def test_listed_pairs_keep_their_order_and_sides():
     pairs, contacts = contacts_of(poses.CUBE, pose.tolist(), listed, fixed=[True] * 30)
     hit = np.flatnonzero(wanted.colliding)
     assert np.array_equal(pairs, listed[hit]) and 30 < len(hit) < 300
-    assert same(contacts, wanted[hit])
+    poses.assert_same_bits(contacts, wanted[hit])
     assert len(contacts_of(poses.CUBE, pose, [])[0]) == 0
 
 
@@ -58,4 +53,4 @@ def test_a_scene_finds_the_same():
     answer = SceneSolver(scene)(pose)
     pairs, contacts = contacts_of(size, pose)
     assert np.array_equal(answer.pairs, pairs) and len(pairs) > 50
-    assert same(answer.contacts, contacts)
+    poses.assert_same_bits(answer.contacts, contacts)

@@ -65,5 +65,4 @@ def test_contacts_of_shaken_pallets_are_those_of_every_pair(pallets, solver):
             pose, sizes=pallets.size, pairs=pairs)
         hit = np.flatnonzero(wanted.colliding)
         assert np.array_equal(answer.pairs, pairs[hit]) and 4000 < len(hit) < 5000
-        assert all(np.array_equal(mine, theirs) for mine, theirs in zip(
-            *map(poses.fields, (answer.contacts, wanted[hit]))))
+        poses.assert_same_bits(answer.contacts, wanted[hit])
