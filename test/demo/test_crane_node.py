@@ -16,9 +16,9 @@ pytest.importorskip('mujoco')
 import rclpy
 from rclpy.context import Context
 from rclpy.experimental.events_executor import EventsExecutor
-from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
-from test_landing import landed
+from ros_client import arguments, overrides
+from test_landing import HARD, landed
 
 from box_contact_msgs.msg import Contact, Contacts
 from box_contact_ros.demo import crane_node, landing
@@ -26,15 +26,6 @@ from box_contact_ros.demo.crane import CraneScenario
 from box_contact_ros.demo.landing import Landing
 from box_contact_ros.node.messages import make_header
 from box_contact_ros.scene.forces import GRAVITY
-
-HARD = CraneScenario(rope_angle=3.0, rope_heading=100.0, pitch=2.0, roll=-2.0, yaw=1.0,
-                     offset=(0.2, 0.4))
-"""A landing at the ends of what is asked for."""
-
-
-def arguments(**values):
-    texts = [f'{name}:={str(value).lower()}' for name, value in values.items()]
-    return ['--ros-args', *(word for text in texts for word in ('-p', text))]
 
 
 @pytest.fixture
@@ -128,8 +119,7 @@ def crane(request):
     values = {'lockstep': True} | getattr(request, 'param', {})
     context = Context()
     rclpy.init(context=context)
-    node = crane_node.CraneNode(context, HARD, parameter_overrides=[
-        Parameter(name, value=value) for name, value in values.items()])
+    node = crane_node.CraneNode(context, HARD, parameter_overrides=overrides(**values))
     executor = EventsExecutor(context=context)
     executor.add_node(node)
     yield node, executor

@@ -25,6 +25,7 @@ from box_contact_ros.scene.forces import GRAVITY
 
 HARD = CraneScenario(rope_angle=3.0, rope_heading=100.0, pitch=2.0, roll=-2.0, yaw=1.0,
                      offset=(0.2, 0.4))
+"""A landing at the ends of what is asked for."""
 
 
 def landed(scenario, *, rate_hz=200.0, latency=0.002, lost=0.0, model='exact'):

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import gc
+import json
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
@@ -20,6 +21,7 @@ from patience import PATIENCE
 from rclpy.context import Context
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from typed_messages import contacts_by_pair, pose_stamped
 
@@ -28,6 +30,8 @@ from box_contact_ros.node.rclpy_workarounds import ends_within
 from box_contact_ros.scene.message_bytes import NANOSECONDS
 from box_contact_ros.solver.contact import Contact
 
+CUBES = {'size_a': [2.0, 2.0, 2.0], 'size_b': [2.0, 2.0, 2.0]}
+"""Parameters of a node of two cubes."""
 TWO_BOXES = {'box_a': 'box_a/pose', 'box_b': 'box_b/pose'}
 DEEP = QoSProfile(depth=10_000)
 DISCOVERY = 20.0
@@ -186,17 +190,31 @@ class Client:
             self.context.try_shutdown()
 
 
+def overrides(**parameters: Any) -> list[Parameter]:
+    """Return parameters as a node takes them."""
+    return [Parameter(name, value=value) for name, value in parameters.items()]
+
+
+def arguments(**parameters: Any) -> list[str]:
+    """Return parameters as a program takes them."""
+    texts = [f'{name}:={value if isinstance(value, str) else json.dumps(value)}'
+             for name, value in parameters.items()]
+    return ['--ros-args', *(word for text in texts for word in ('-p', text))]
+
+
 @contextmanager
-def serving(make_node: Callable[[Context], Node],
-            executor_type: Callable[..., Any] = EventsExecutor) -> Iterator[Any]:
+def serving(make_node: Callable[..., Node],
+            executor_type: Callable[..., Any] = EventsExecutor, **parameters: Any) -> Iterator[Any]:
     """Serve a node of the package in this process by a thread, with a context of its own.
 
-    A contact node is started, unless its parameter autostart is false. That thread sets parameters
-    and makes transitions too, as it does for services.
+    make_node: its type, or what makes it with a context. A contact node is started, unless its
+    parameter autostart is false. That thread sets parameters and makes transitions too, as it does
+    for services.
     """
     context = Context()
     rclpy.init(context=context)
-    node: Any = make_node(context)
+    options = {'parameter_overrides': overrides(**parameters)} if parameters else {}
+    node: Any = make_node(context, **options)
     executor = executor_type(context=context)
     executor.add_node(node)
     stop = Event()

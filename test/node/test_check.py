@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from contextlib import closing
 from functools import partial
 from types import SimpleNamespace
 from typing import Any
@@ -18,7 +19,7 @@ from raw_client import APART, ORIGIN, TOUCHING
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.parameter import Parameter
-from ros_client import Client, serving
+from ros_client import CUBES, Client, serving
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 from typed_messages import a_box, a_pair, contacts_by_pair
@@ -302,16 +303,10 @@ def test_a_soup_answers_few_pairs() -> None:
 # --- over ROS -------------------------------------------------------------------------------------
 
 
-def overrides(**values: Any) -> list[Parameter]:
-    return [Parameter(name, value=value) for name, value in {
-        'size_a': [2.0] * 3, 'size_b': [2.0] * 3, 'model': 'exact', **values}.items()]
-
-
 @pytest.fixture
 def client() -> Any:
-    client = Client()
-    yield client
-    client.close()
+    with closing(Client()) as client:
+        yield client
 
 
 def check(client: Client, *poses_of: Any, **fields: Any) -> Check.Response:
@@ -321,8 +316,7 @@ def check(client: Client, *poses_of: Any, **fields: Any) -> Check.Response:
 
 def test_a_check_leaves_the_ticks_alone(client: Client) -> None:
     """Its poses reach no tick. A new model answers the next one; before configure, none does."""
-    with serving(lambda context: ContactNode(
-            context, parameter_overrides=overrides(autostart=False))) as node:
+    with serving(ContactNode, autostart=False, **CUBES) as node:
         assert check(client, ORIGIN, TOUCHING).message == 'the node is not configured'
         node.start()
         client.offer_until_answered(ORIGIN, APART)
@@ -345,8 +339,7 @@ CHEAP = Check.Request(boxes=COSTLY.boxes[:2])
 @pytest.mark.parametrize('executor_type', EXECUTORS)
 def test_costly_requests_wait_for_ticks(client: Client, executor_type: Any) -> None:
     """For five times as long as the last one took, its sending included; a cheap one does not."""
-    with serving(lambda context: ContactNode(context, parameter_overrides=overrides()),
-                 executor_type):
+    with serving(ContactNode, executor_type, **CUBES):
         service = client._client_of(Check, 'contact_node/check')
         order: list[str] = []
         asked = {'first': COSTLY, 'second': COSTLY, 'third': COSTLY, 'cheap': CHEAP}
@@ -422,7 +415,7 @@ def test_lockstep_episodes_never_wait(client: Client, by_topics: bool) -> None:
 
     Without the reset, the node takes an episode shorter than a second for repeated stamps.
     """
-    with serving(lambda context: ContactNode(context, parameter_overrides=overrides())):
+    with serving(ContactNode, **CUBES):
         client.offer_until_answered(ORIGIN, APART)
         for ticks in (1, 20, 100, 300) * EPISODES:
             if by_topics:

@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import closing
 
 import numpy as np
 import poses
@@ -17,37 +18,26 @@ import pytest
 from raw_client import APART, ORIGIN, TOUCHING
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from ros_client import Client, serving
+from ros_client import CUBES, Client, arguments, serving
 from typed_messages import contacts_by_pair
 
 from box_contact_msgs.msg import Contacts
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import LIVE, PARAMETERS, ContactNode
 
-CUBES = {'size_a': [2.0, 2.0, 2.0], 'size_b': [2.0, 2.0, 2.0], 'model': 'exact'}
 PAIR = 'box_a_box_b'
 SIZE = list(PARAMETERS['size_a'].default)
 
 
-def overrides(**values):
-    return [Parameter(name, value=value) for name, value in (CUBES | values).items()]
-
-
-def arguments(**values):
-    texts = [f'{name}:={value}' for name, value in (CUBES | values).items()]
-    return ['--ros-args', *(word for text in texts for word in ('-p', text))]
-
-
 @pytest.fixture
 def client():
-    client = Client()
-    yield client
-    client.close()
+    with closing(Client()) as client:
+        yield client
 
 
 @pytest.fixture
 def node(client):
-    with serving(lambda context: ContactNode(context, parameter_overrides=overrides())) as node:
+    with serving(ContactNode, **CUBES) as node:
         client.offer_until_answered(ORIGIN, APART)
         yield node
 
@@ -150,8 +140,7 @@ def test_of_several_parameters_all_are_set_or_none(node, client):
 
 
 def test_integers_are_as_good_as_doubles():
-    given = overrides(max_age=2, size_a=[2, 2, 2])
-    with serving(lambda context: ContactNode(context, parameter_overrides=given)) as node:
+    with serving(ContactNode, max_age=2, size_a=[2, 2, 2]) as node:
         assert node.get_parameter('max_age').type_.name == 'DOUBLE'
         assert node.get_parameter('size_a').type_.name == 'DOUBLE_ARRAY'
         assert set_to(node, max_age=3).successful
@@ -160,10 +149,9 @@ def test_integers_are_as_good_as_doubles():
 
 def test_quality_of_service_can_be_overridden(client):
     """Of the topics named; all others keep theirs, and the node answers."""
-    given = overrides(**{
-        'qos_overrides./box_a/pose.subscription.reliability': 'reliable',
-        'qos_overrides./contacts.publisher.reliability': 'best_effort'})
-    with serving(lambda context: ContactNode(context, parameter_overrides=given)) as node:
+    given = {'qos_overrides./box_a/pose.subscription.reliability': 'reliable',
+             'qos_overrides./contacts.publisher.reliability': 'best_effort'}
+    with serving(ContactNode, **CUBES | given) as node:
         answers = []
         client.node.create_subscription(Contacts, 'contacts', answers.append, QoSProfile(
             depth=10, reliability=ReliabilityPolicy.BEST_EFFORT))
@@ -190,13 +178,13 @@ def long_topics(folder):
 
 def test_a_bad_start_is_one_clear_line(program, tmp_path):
     """And status 1."""
-    started = [(program('contact_node', *arguments(**values)), words) for values, words in (
+    started = [(program('contact_node', *arguments(**CUBES | values)), words) for values, words in (
         ({'size_a': '[0.0, 2.0, 2.0]'}, 'size_a (0, 2, 2) is not positive'),
         ({'model': 'nothing'}, "model 'nothing' is not one of"),
         ({'model': 'paper', 'size_a': '[1.0, 2.0, 3.0]', 'size_b': '[1.0, 2.0, 3.0]'},
          "use model 'exact'"),
         ({'scene': 'config/scenes/two_boxes.yaml'}, 'size_a (2.0, 2.0, 2.0) has no effect while'),
-        ({'scene': long_topics(tmp_path), 'size_a': SIZE, 'size_b': SIZE},
+        ({'scene': str(long_topics(tmp_path)), 'size_a': SIZE, 'size_b': SIZE},
          "/contact/point': failed to resolve name: topic length should not exceed"),
         ({'qos_overrides./box_a/pose.subscription.depth': 'deep'}, "'deep' of type 'STRING'"),
         ({'size_a': '{2.0'}, "Couldn't parse"))]
@@ -225,7 +213,7 @@ print(run(Node, None, ['--ros-args', '-p', 'size_a:=[0.0, 1.0, 1.0]']))
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_ends_cleanly(program, number, pauses):
     """Also under a second signal, at once or while the node leaves the network."""
-    running = program('contact_node', *arguments())
+    running = program('contact_node', *arguments(**CUBES))
     running.wait_for_output('ready')
     running.signal(number)
     for pause in pauses:
@@ -238,7 +226,7 @@ def test_ends_cleanly(program, number, pauses):
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_signalled_until_it_has_ended(program, number):
     """A KeyboardInterrupt in EventsExecutor aborts a process, and late SIGTERMs kill it."""
-    running = program('contact_node', *arguments())
+    running = program('contact_node', *arguments(**CUBES))
     running.wait_for_output('ready')
     while running.process.poll() is None:
         running.signal(number)
@@ -264,7 +252,7 @@ def test_node_killed_and_restarted(program, client):
     Every pair sent while matched is answered.
     """
     for _ in range(2):
-        running = program('contact_node', *arguments())
+        running = program('contact_node', *arguments(**CUBES))
         running.wait_for_output('ready')
         client.offer_until_answered(ORIGIN, APART)
         assert client.are_answered(stream(client, 2.0))

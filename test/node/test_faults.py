@@ -15,6 +15,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 from threading import Event, Thread
 
@@ -30,13 +31,13 @@ from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from ros_client import CUBES, arguments
 from typed_messages import contacts_by_pair
 
 from box_contact_msgs.msg import Contacts
 from box_contact_ros import ContactSolver
 
 HELPERS = Path(__file__).resolve().parents[1] / 'helpers'
-CUBES = ('--ros-args', '-p', 'size_a:=[2.0, 2.0, 2.0]', '-p', 'size_b:=[2.0, 2.0, 2.0]')
 LEAK = 8.0
 """Growth [MB] of a node's memory that is taken for none, as the allocator's arenas come in steps: a
 leak of 400 bytes a message in the storm below."""
@@ -45,15 +46,14 @@ UNKNOWN_TYPE = 77  # of a parameter
 
 @pytest.fixture
 def client():
-    client = RawClient()
-    yield client
-    client.close()
+    with closing(RawClient()) as client:
+        yield client
 
 
 @pytest.fixture
 def node(program, client):
     """Return a contact node for two cubes, matched with the client."""
-    running = program('contact_node', *CUBES, '-p', 'model:=exact')
+    running = program('contact_node', *arguments(**CUBES))
     running.wait_for_output('ready')
     client.offer_until_answered(ORIGIN, APART)
     return running

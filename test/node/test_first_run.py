@@ -25,7 +25,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
-from ros_client import stamp_of
+from ros_client import CUBES, overrides, stamp_of
 from typed_messages import pose_stamped
 
 from box_contact_ros.node.contact_node import ContactNode
@@ -33,7 +33,6 @@ from box_contact_ros.node.contact_node import ContactNode
 SECOND = 10**9
 RATE = 20  # Hz
 WATCHED = 9.0  # s: five for an error, and the reports around it
-CUBES = {'size_a': [2.0, 2.0, 2.0], 'size_b': [2.0, 2.0, 2.0], 'model': 'exact'}
 HEIGHTS = {'box_a': 0.0, 'box_b': 1.9}
 THREE = """\
 boxes: {a: {size: [2, 2, 2]}, b: {size: [2, 2, 2]}, c: {size: [2, 2, 2]}}
@@ -91,9 +90,9 @@ class FirstRuns:
         for context in self.contexts:
             rclpy.init(context=context)
         given = PARAMETERS | {'three': {'scene': three, 'model': 'exact'}}
-        self.nodes = {case: ContactNode(self.contexts[0], namespace=case, parameter_overrides=[
-            Parameter(name, value=value) for name, value in given.get(case, CUBES).items()])
-            for case in CASES}
+        self.nodes = {case: ContactNode(
+            self.contexts[0], namespace=case, parameter_overrides=overrides(
+                **given.get(case, CUBES))) for case in CASES}
         for node in self.nodes.values():
             if node.autostart:
                 node.start()

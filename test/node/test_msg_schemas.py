@@ -11,6 +11,7 @@ import re
 import shutil
 import subprocess
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +21,9 @@ import yaml
 from geometry_msgs.msg import PoseArray, PoseStamped
 from jsonschema import Draft202012Validator
 from patience import PATIENCE
-from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from referencing import Registry, Resource
-from ros_client import Client, serving
+from ros_client import CUBES, Client, serving
 from typed_messages import a_box, a_pair, make_contacts, pose_array
 
 from box_contact_msgs.srv import Check
@@ -176,17 +176,14 @@ def test_limits_are_the_codes():
 
 @pytest.fixture(scope='module')
 def node():
-    given = {'size_a': [2.0] * 3, 'size_b': [2.0] * 3, 'model': 'exact', 'margin': 0.1}
-    with serving(lambda context: ContactNode(context, parameter_overrides=[
-            Parameter(name, value=value) for name, value in given.items()])) as node:
+    with serving(ContactNode, margin=0.1, **CUBES) as node:
         yield node
 
 
 @pytest.fixture(scope='module')
 def client():
-    client = Client()
-    yield client
-    client.close()
+    with closing(Client()) as client:
+        yield client
 
 
 @pytest.fixture(scope='module')

@@ -47,8 +47,7 @@ def test_an_unknown_name_is_logged_with_the_nearest_one(capfd):
     given = {'size_a': [1, 2, 3], 'sizea': 1.0, 'robot_description': '', 'use_sim_time': False,
              'qos_overrides./contacts.publisher.depth': 5,
              'qos_overrides./contact.publisher.depth': 5}
-    with serving(lambda context: ContactNode(context, parameter_overrides=[
-            Parameter(name, value=value) for name, value in given.items()])) as node:
+    with serving(ContactNode, **given) as node:
         told = capfd.readouterr().err
         assert node.get_parameter('qos_overrides./contacts.publisher.depth').value == 5
         node.trigger_deactivate()
@@ -92,7 +91,7 @@ def test_a_word_that_ros_does_not_know_ends_the_program(capsys, signal_handlers)
 
 def test_ranges_and_choices_are_described():
     """As `ros2 param describe` shows them; what is outside is refused in the node's words."""
-    with serving(lambda context: ContactNode(context)) as node:
+    with serving(ContactNode) as node:
         told = {name: node.describe_parameter(name) for name in contact_node.PARAMETERS}
         refused, = node.set_parameters([Parameter('tolerance', value=-1.0)])
         assert 'tolerance' in refused.reason and not refused.successful

@@ -236,7 +236,7 @@ def test_a_message_comes_with_its_time_and_number(executor_type):
 def test_the_node_answers_in_every_executor(executor_type):
     """Topics and services alike."""
     client = Client()
-    with serving(lambda context: ContactNode(context), executor_type) as node:
+    with serving(ContactNode, executor_type) as node:
         client.offer_until_answered(ORIGIN, APART)
         for _ in range(20):
             assert client.answer(ORIGIN, TOUCHING)
@@ -296,8 +296,7 @@ def test_what_a_callback_raises_is_logged_and_the_node_goes_on(capfd):
 def test_a_clock_that_is_changed_begins_a_new_time(capfd):
     """`use_sim_time` set while the node runs; then the node is shut down."""
     client = Client()
-    with serving(lambda context: ContactNode(context, parameter_overrides=[
-            Parameter('model', value='exact')])) as node:
+    with serving(ContactNode) as node:
         node.set_parameters([Parameter('use_sim_time', value=True)])
         assert client.spin(lambda: node.counts[RESETS] == 1)
         assert 'use_sim_time was changed' in capfd.readouterr().err

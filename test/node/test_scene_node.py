@@ -8,6 +8,7 @@ import json
 import math
 import re
 import time
+from contextlib import closing
 
 import numpy as np
 import poses
@@ -17,7 +18,6 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from patience import PATIENCE
 from rclpy.lifecycle import TransitionCallbackReturn
-from rclpy.parameter import Parameter
 from ros_client import DEEP, Client, serving, stamp_of
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
@@ -64,16 +64,15 @@ class ArrayClient(Client):
 
 @pytest.fixture
 def client():
-    client = Client(topics={'load': 'load/pose', 'lorry': '/traffic/lorry'}, pairs=(FLOOR, BESIDE))
-    yield client
-    client.close()
+    topics = {'load': 'load/pose', 'lorry': '/traffic/lorry'}
+    with closing(Client(topics=topics, pairs=(FLOOR, BESIDE))) as client:
+        yield client
 
 
 @pytest.fixture
 def array_client():
-    client = ArrayClient()
-    yield client
-    client.close()
+    with closing(ArrayClient()) as client:
+        yield client
 
 
 @pytest.fixture
@@ -82,9 +81,7 @@ def scene_node(tmp_path):
     def start(scene=SCENE, **parameters):
         path = tmp_path / 'scene.yaml'
         path.write_text(scene)
-        given = {'scene': str(path), 'model': 'exact'} | parameters
-        return serving(lambda context: ContactNode(context, parameter_overrides=[
-            Parameter(name, value=value) for name, value in given.items()]))
+        return serving(ContactNode, scene=str(path), **parameters)
     return start
 
 
@@ -341,9 +338,9 @@ FOOT, HULL = 'floor_load_foot', 'crate_load_hull'
 
 @pytest.fixture
 def body_client():
-    client = Client(topics={'crate': 'crate/pose', 'load': 'load/pose'}, pairs=(FOOT, HULL))
-    yield client
-    client.close()
+    topics = {'crate': 'crate/pose', 'load': 'load/pose'}
+    with closing(Client(topics=topics, pairs=(FOOT, HULL))) as client:
+        yield client
 
 
 def test_a_body_has_one_pose(body_client, scene_node):

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 import signal
+from contextlib import closing
 
 import numpy as np
 import poses
@@ -13,7 +14,7 @@ import pytest
 import yaml
 from geometry_msgs.msg import PointStamped, Vector3Stamped
 from rclpy.parameter import Parameter
-from ros_client import Client, serving
+from ros_client import CUBES, Client, serving
 from typed_messages import contacts_by_pair
 
 pytest.importorskip('fcl')
@@ -27,7 +28,6 @@ from box_contact_ros.soup.soup_node import SoupNode
 ORIGIN = poses.IDENTITY
 TOUCHING = np.array([0.5, 0.25, 1.875, 0.1, 0.2, 0, 1])
 APART = np.array([0.5, 0.25, 4.0, 0, 0, 0, 1])
-SIZES = {'size_a': [2.0, 2.0, 2.0], 'size_b': [2.0, 2.0, 2.0]}
 PAIR = 'box_a_box_b'
 TOPICS = {'contact/point': PointStamped, 'contact/normal': Vector3Stamped, 'contacts': Contacts}
 
@@ -48,33 +48,26 @@ class BothClient(Client):
         return stamp
 
 
-def overrides(**values):
-    return [Parameter(name, value=value) for name, value in (SIZES | values).items()]
-
-
 def offer_until_the_soup_answers(client):
     assert client.spin(lambda: client.soup['contacts'] or not client.send(ORIGIN, APART))
 
 
 @pytest.fixture
 def client():
-    client = BothClient()
-    yield client
-    client.close()
+    with closing(BothClient()) as client:
+        yield client
 
 
 @pytest.fixture
 def soup_node(client):
-    with serving(lambda context: SoupNode(
-            context, parameter_overrides=overrides(divisions=4))) as node:
+    with serving(SoupNode, divisions=4, **CUBES) as node:
         offer_until_the_soup_answers(client)
         yield node
 
 
 def test_both_nodes_answer_one_input(client, soup_node):
     """The same header; each with its own solver's numbers, point and normal before contacts."""
-    with serving(lambda context: ContactNode(
-            context, parameter_overrides=overrides(model='exact'))):
+    with serving(ContactNode, **CUBES):
         client.offer_until_answered(ORIGIN, APART)
         stamp = client.ask_soup(ORIGIN, TOUCHING, frames=('yard', 'yard'))
         assert client.is_answered(stamp)
@@ -103,7 +96,7 @@ def test_its_topics_are_the_documents(client, soup_node):
                 for name in addresses - {'poses'}}
     assert {entity.topic_name for entity in (*soup_node.publishers, *soup_node.subscriptions)
             } - {'/parameter_events', '/rosout'} == expected
-    with serving(lambda context: ContactNode(context, parameter_overrides=overrides())) as node:
+    with serving(ContactNode, **CUBES) as node:
         qos_of, qos_of_soup = (
             {publisher.topic_name.removeprefix('/soup'): publisher.qos_profile
              for publisher in each.publishers} for each in (node, soup_node))
@@ -113,8 +106,7 @@ def test_its_topics_are_the_documents(client, soup_node):
 
 def test_the_contact_node_knows_the_soup_too():
     """From the start on; while it runs, it may change to a model in C++ alone."""
-    with serving(lambda context: ContactNode(context, parameter_overrides=overrides(
-            model='soup-2'))) as node:
+    with serving(ContactNode, model='soup-2', **CUBES) as node:
         for model, words in (('soup-65', 'a whole number from 1 to 64'),
                              ('soup-2', "model 'soup-2' needs a new start")):
             result, = node.set_parameters([Parameter('model', value=model)])

@@ -7,15 +7,15 @@ from __future__ import annotations
 import json
 import math
 import time
+from contextlib import closing
 
 import numpy as np
 import poses
 import pytest
 import yaml
 from patience import PATIENCE
-from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
-from ros_client import Client, serving
+from ros_client import CUBES, Client, serving
 from typed_messages import changed, contacts_at, read
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -151,30 +151,25 @@ def test_the_foxglove_layout_names_topics_and_fields_that_exist():
 
 # --- the node -------------------------------------------------------------------------------------
 
-SETTINGS = [Parameter(name, value=list(CUBE)) for name in ('size_a', 'size_b')]
-
-
 @pytest.fixture
 def client():
     """With what the markers node publishes."""
-    client = Client()
-    client.arrays = []
-    client.node.create_subscription(MarkerArray, 'markers', client.arrays.append,
-                                    QoSProfile(depth=1000))
-    yield client
-    client.close()
+    with closing(Client()) as client:
+        client.arrays = []
+        client.node.create_subscription(MarkerArray, 'markers', client.arrays.append,
+                                        QoSProfile(depth=1000))
+        yield client
 
 
 @pytest.fixture
 def node():
-    with serving(lambda context: MarkersNode(context, parameter_overrides=SETTINGS)) as node:
+    with serving(MarkersNode, **CUBES) as node:
         yield node
 
 
 @pytest.fixture
 def contact_node():
-    with serving(lambda context: ContactNode(context, parameter_overrides=[
-            *SETTINGS, Parameter('model', value='exact')])) as node:
+    with serving(ContactNode, **CUBES) as node:
         yield node
 
 
