@@ -36,7 +36,7 @@ from box_contact_ros.networks.models import core_numbers
 from box_contact_ros.networks.weights_file import Network
 from box_contact_ros.solver.contact import FIELDS, Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.solver.pose import rotation_matrix
 
 from . import judge, output
 from .pose_sets import (
@@ -45,6 +45,7 @@ from .pose_sets import (
     TWENTY,
     Pairs,
     log_uniform,
+    quaternion_multiply,
     right_angles,
     turns,
     unit_quaternions,

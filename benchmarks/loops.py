@@ -23,7 +23,9 @@ import numpy as np
 
 from box_contact_ros import Body, ContactSolver, PatchForces
 from box_contact_ros.scene.forces import FRICTION, GRAVITY
-from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.solver.pose import rotation_matrix
+
+from .pose_sets import quaternion_multiply
 
 # MuJoCo would write warnings to a file MUJOCO_LOG.TXT in the working directory.
 mujoco.set_mju_user_warning(logging.getLogger(__name__).warning)

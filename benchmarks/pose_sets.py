@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from box_contact_ros.scene.scene import CONTAINER as CONTAINER
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.solver.pose import rotation_matrix
 
 CUBE = (2.0, 2.0, 2.0)
 TWENTY, HIGH_CUBE = (6.058, 2.438, 2.591), (12.192, 2.438, 2.896)
@@ -73,6 +73,16 @@ def unit_quaternions(rng: np.random.Generator, n: int) -> np.ndarray:
     """Orientations (n, 4) xyzw, uniform over all."""
     q = rng.normal(size=(n, 4))
     return q / np.linalg.norm(q, axis=1, keepdims=True)
+
+
+def quaternion_multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Return the Hamilton product p ⊗ q of quaternions (..., 4) xyzw: first q, then p."""
+    px, py, pz, pw = np.moveaxis(np.asarray(p, dtype=np.float64), -1, 0)
+    qx, qy, qz, qw = np.moveaxis(np.asarray(q, dtype=np.float64), -1, 0)
+    return np.stack([pw * qx + px * qw + py * qz - pz * qy,
+                     pw * qy - px * qz + py * qw + pz * qx,
+                     pw * qz + px * qy - py * qx + pz * qw,
+                     pw * qw - px * qx - py * qy - pz * qz], axis=-1)
 
 
 def turns(axes: ArrayLike, angles: np.ndarray) -> np.ndarray:

@@ -14,10 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.pose import quaternion_multiply
 
 from .errors import departures, lengths
-from .pose_sets import Pairs, turns
+from .pose_sets import Pairs, quaternion_multiply, turns
 
 SAMPLES, KEPT, BISECTIONS = 200, 4, 45
 

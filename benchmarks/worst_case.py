@@ -8,9 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from box_contact_ros.solver.pose import quaternion_multiply
-
-from .pose_sets import Pairs, log_uniform, turns
+from .pose_sets import Pairs, log_uniform, quaternion_multiply, turns
 
 DEPTHS = (1e-4, 0.1)
 """Depths that are searched [shortest edge of both boxes]."""

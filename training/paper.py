@@ -27,7 +27,7 @@ from benchmarks.pose_sets import LOADS, Generator, Pairs, drawn
 from benchmarks.pose_sets import SETS as POSE_SETS
 from benchmarks.weights import save_weights
 from box_contact_ros.models import make_model
-from box_contact_ros.networks.models import in_file_name, is_cube
+from box_contact_ros.networks.models import is_cube
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix
 
@@ -86,8 +86,9 @@ def train(folder: Path, scene: str, output: str, *, seed: int, commit: str,
     if np.ptp(sizes, axis=0).any():
         raise ValueError(f'scene {scene!r} has boxes of several sizes; the network is for two '
                          'equal ones')
+    size = '' if is_cube(sizes[0]) else '-' + 'x'.join(f'{extent:g}' for extent in sizes[0])
     ending = '' if output == ANGLES else f'-{output}'
-    path = folder / f'paper{in_file_name(sizes[0])}{ending}.safetensors'
+    path = folder / f'paper{size}{ending}.safetensors'
     if path == SHIPPED / 'paper.safetensors':
         raise ValueError(f'scene {scene!r} has cubes, but {path} is for the poses of the paper: '
                          'name another folder by --out')

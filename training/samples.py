@@ -22,12 +22,12 @@ from benchmarks.pose_sets import (
     laid,
     log_uniform,
     onto,
+    quaternion_multiply,
     random_sizes,
     stacked,
     turns,
 )
 from box_contact_ros.core import native
-from box_contact_ros.solver.pose import quaternion_multiply
 
 PIECE = 100_000  # pairs that are made at a time
 

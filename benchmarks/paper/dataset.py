@@ -38,9 +38,9 @@ import numpy as np
 
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.solver.pose import rotation_matrix
 
-from ..pose_sets import CUBE, turns
+from ..pose_sets import CUBE, quaternion_multiply, turns
 from .models import EXPERTS, to_octant
 from .numpy_model import euler_angles
 

@@ -14,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
-from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.solver.pose import rotation_matrix
 from box_contact_ros.soup import soup
 
 from .. import output
-from ..pose_sets import CUBE, Pairs, on_cube, turned
+from ..pose_sets import CUBE, Pairs, on_cube, quaternion_multiply, turned
 from ..timing import cpu_milliseconds, no_garbage_collection, pinned, usable_cores
 from .soup_tables import PAPER, Row, pair_count
 from .tree import count_tests, tree

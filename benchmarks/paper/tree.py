@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.solver.pose import rotation_matrix
 from box_contact_ros.soup import soup
 
-from ..pose_sets import CUBE, Pairs
+from ..pose_sets import CUBE, Pairs, quaternion_multiply
 
 THICKNESS = 1e-9  # of a box around triangles in one plane [m]
 DIGITS = 12

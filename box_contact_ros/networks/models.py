@@ -175,8 +175,3 @@ def is_cube(size: np.ndarray) -> bool:
 def in_words(size: np.ndarray) -> str:
     """Return full extents (3,) [m] for a refusal."""
     return ' × '.join(f'{extent:g}' for extent in size) + ' m'
-
-
-def in_file_name(size: np.ndarray) -> str:
-    """Return full extents (3,) as the names of weights files have them: nothing for cubes."""
-    return '' if is_cube(size) else '-' + 'x'.join(f'{extent:g}' for extent in size)

@@ -87,11 +87,6 @@ class ContactSolver(native.PairSolver):
         return (partial(ContactSolver, model=self.model, margin=self._margin),
                 tuple(None if size is None else size[0] for size in (self._size_a, self._size_b)))
 
-    @property
-    def fallbacks(self) -> int:
-        """Contacts so far that the model handed to `exact`: see `soup-N`."""
-        return int(getattr(self._model, 'fallbacks', 0))
-
     def _call_general(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact:
         """Return the contact of one pair whose poses (7,) are of any kind of numbers.
 

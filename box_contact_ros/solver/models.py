@@ -20,10 +20,9 @@ NATIVE_TYPES = (native.Exact, native.Mlp)
 class Model(Protocol):
     """What answers behind `ContactSolver`; sizes come with each call.
 
-    It may also have `fallbacks`, the number of contacts that it handed to `exact` so far, and two
-    methods of the full extents (3,) [m] of both boxes. `size_fault(size_a, size_b)` returns in
-    words why it refuses them, or None. `native_for(size_a, size_b)` returns a model in C++ that
-    answers as it does for boxes of these sizes, or None.
+    It may also have two methods of the full extents (3,) [m] of both boxes. `size_fault(size_a,
+    size_b)` returns in words why it refuses them, or None. `native_for(size_a, size_b)` returns a
+    model in C++ that answers as it does for boxes of these sizes, or None.
     """
 
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,

@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Quaternions and rotation matrices of poses, for arrays of them.
+"""Rotation matrices of poses, for arrays of them.
 
 Conventions (docs/reference/conventions.md has them for users)
     Units are SI, frames right-handed. A pose is 7 numbers `x y z qx qy qz qw` in a frame common to
@@ -27,16 +27,6 @@ def rotation_matrix(quaternion: np.ndarray) -> np.ndarray:
                s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y))
     matrices = np.array(entries) if single else np.stack(entries, axis=-1)
     return matrices.reshape(*quaternion.shape[:-1], 3, 3)
-
-
-def quaternion_multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Return the Hamilton product p ⊗ q of quaternions (..., 4) xyzw: first q, then p."""
-    px, py, pz, pw = np.moveaxis(np.asarray(p, dtype=np.float64), -1, 0)
-    qx, qy, qz, qw = np.moveaxis(np.asarray(q, dtype=np.float64), -1, 0)
-    return np.stack([pw * qx + px * qw + py * qz - pz * qy,
-                     pw * qy - px * qz + py * qw + pz * qx,
-                     pw * qz + px * qy - py * qx + pz * qw,
-                     pw * qw - px * qx - py * qy - pz * qz], axis=-1)
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -31,8 +31,6 @@ from .listener import SCENE_PARAMETERS, DrawnTick, Listener
 PERIOD = 1 / 30  # time [s] between marker arrays
 LABELLED = 10  # contacts whose depth is written beside them, the deepest
 TEXT_HEIGHT = 0.04  # of the longest edge
-NAMESPACES = ('boxes', 'points', 'normals', 'patches', 'depths')
-"""RViz shows a tick box for each. Of boxes, normals and depths every marker has its own id."""
 WHITE: style.Colour = (255, 255, 255)
 
 

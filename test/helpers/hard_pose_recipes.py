@@ -19,10 +19,11 @@ from benchmarks.pose_sets import (
     HIGH_CUBE,
     TWENTY,
     Pairs,
+    quaternion_multiply,
     right_angles,
     turned,
 )
-from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.solver.pose import rotation_matrix
 
 X, Y, Z = np.eye(3)
 UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])

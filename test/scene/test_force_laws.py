@@ -11,12 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from poses import multiply
 
 from box_contact_ros import Body, Contacts, ContactSolver, PatchForces
 from box_contact_ros.scene import forces
 from box_contact_ros.scene.forces import GRAVITY
 from box_contact_ros.solver import contact_solver
-from box_contact_ros.solver.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.solver.pose import rotation_matrix
 
 STEP = 0.001  # [s]
 FIXED = Body(mass=0.0, inertia=np.zeros(3))
@@ -333,7 +334,7 @@ def move(world: World) -> None:
     world.poses = world.poses.copy()
     world.poses[:, :3] += STEP * world.velocities[:, :3]
     turns = np.hstack([0.5 * STEP * world.velocities[:, 3:], np.ones((len(world.poses), 1))])
-    turned = quaternion_multiply(turns, world.poses[:, 3:])
+    turned = multiply(turns, world.poses[:, 3:])
     world.poses[:, 3:] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
 
 
@@ -507,7 +508,7 @@ def landed(turn=(0.0, 0.0, 0.0, 1.0), shift=(0.0, 0.0, 0.0), carrier=(0.0, 0.0, 
                   pose(0.2, 0.1, 1.55, (0.0, 0.03, 0.2, 1.0)), mass=MASS * factor)
     turn = np.array(turn) / np.linalg.norm(turn)
     rotation = rotation_matrix(turn[None])[0]
-    world.poses[:, 3:] = quaternion_multiply(np.tile(turn, (3, 1)), world.poses[:, 3:])
+    world.poses[:, 3:] = multiply(np.tile(turn, (3, 1)), world.poses[:, 3:])
     world.poses[:, :3] = world.poses[:, :3] @ rotation.T + shift
     world.velocities[:, :3] = carrier
     world.outside[:, :3] = world.outside[:, :3] @ rotation.T
@@ -515,7 +516,7 @@ def landed(turn=(0.0, 0.0, 0.0, 1.0), shift=(0.0, 0.0, 0.0), carrier=(0.0, 0.0, 
     found = world.poses.copy()
     found[:, :3] = (found[:, :3] - shift - 0.14 * np.array(carrier)) @ rotation
     back = np.tile(turn * (-1, -1, -1, 1), (3, 1))
-    found[:, 3:] = quaternion_multiply(back, found[:, 3:])
+    found[:, 3:] = multiply(back, found[:, 3:])
     return found / np.hstack([np.ones((3, 6)), np.sign(found[:, 6:])])
 
 
