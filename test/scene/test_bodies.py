@@ -13,69 +13,16 @@ import pytest
 
 from box_contact_ros import Body, PatchForces
 from box_contact_ros.core import native
-from box_contact_ros.scene.scene import ALONE, EVERY_PAIR, Box, Frame, Pair, Scene, SceneError
-from box_contact_ros.scene.scene_file import read_scene
+from box_contact_ros.scene.scene import ALONE, EVERY_PAIR, Box, Frame, Pair, Scene
 from box_contact_ros.scene.scene_solver import SceneSolver
 
 UNIT = (1.0, 1.0, 1.0)
-FILE = """\
-boxes:
-  load: {size: [12.192, 2.438, 2.591]}
-  stack: {size: [12.192, 2.438, 2.591], pose: [0, 0, 1.2955, 0, 0, 0, 1]}
-bodies:
-  spreader:
-    pose_topic: /crane/spreader
-    boxes:
-      frame: {size: [12.192, 2.3, 0.6]}
-      twistlock_1: {size: [0.1, 0.1, 0.15], pose: [5.9, 1.1, -0.3, 0, 0, 0, 1]}
-  goods:
-    pose: [20, 0, 1, 0, 0, 0, 1]
-    boxes:
-      left: {size: [1, 1, 1], pose: [0, 2, 0, 0, 0, 0, 1]}
-      right: {size: [1, 1, 1], pose: [0, -2, 0, 0, 0, 0, 1]}
-  truck:
-    boxes:
-      bed: {size: [14, 2.5, 0.3]}
-pairs:
-  - {a: load, b: spreader}
-  - {name: landing, a: load, b: truck_bed}
-  - {a: 'goods*', b: load}
-"""
-
-
-@pytest.fixture
-def scene_of(tmp_path):
-    def read(text):
-        (tmp_path / 'scene.yaml').write_text(text)
-        return read_scene(tmp_path / 'scene.yaml')
-    return read
-
 
 def placed(frames, local):
     """Poses (n, 7) in the common frame, of poses in frames (n, 7)."""
     turn = frames[:, 3:] / np.linalg.norm(frames[:, 3:], axis=1, keepdims=True)
     return np.hstack((poses.rotate(turn, local[:, :3]) + frames[:, :3],
                       poses.multiply(turn, local[:, 3:])))
-
-
-def test_a_file_with_bodies(scene_of):
-    """Boxes of a body have its name before theirs; boxes come first, then bodies."""
-    scene = scene_of(FILE)
-    assert scene.names == ('load', 'stack', 'spreader_frame', 'spreader_twistlock_1', 'goods_left',
-                           'goods_right', 'truck_bed')
-    assert scene.moving == ('load', 'spreader', 'truck')
-    assert scene.sources == {'load': 'load/pose', 'spreader': '/crane/spreader',
-                             'truck': 'truck/pose'}
-    assert [pair.name for pair in scene.every_pair()] == [
-        'landing', 'load_spreader_frame', 'load_spreader_twistlock_1', 'goods_left_load',
-        'goods_right_load']
-    assert scene.is_fixed.tolist() == [False, True, False, False, True, True, False]
-    assert scene.partners('spreader') == {'load'}
-    assert scene.partners('load') == {'load'}  # the goods are there already
-    array = scene_of('poses: array\n' + FILE.replace('  - {name: landing, a: load, b: truck_bed}\n',
-                                                     ''))
-    assert array.moving == ('load', 'spreader', 'truck') and array.sources == {
-        'all boxes': 'poses'}
 
 
 @pytest.mark.parametrize('margin', [0.0, 0.5])
@@ -193,39 +140,3 @@ def test_a_box_that_its_body_carries_too_far_is_refused():
         UNIT, (1e50, 0, 0, 0, 0, 0, 1), body='b')})
     with pytest.raises(ValueError, match='pose of b2: position .* exceeds'):
         SceneSolver(scene)([poses.IDENTITY, [1e50, 0, 0, 0, 0, 0, 1]])
-
-
-@pytest.mark.parametrize('old, new, words', [
-    ('pose: [5.9, 1.1, -0.3, 0, 0, 0, 1]', 'pose: [5.9, 1.1, -0.3, 0, 0, 0, 0]',
-     'bodies.spreader.boxes.twistlock_1.pose: quaternion'),
-    ('[0.1, 0.1, 0.15]', '[0.1, 0.1]', 'bodies.spreader.boxes.twistlock_1.size: [0.1, 0.1] is too'),
-    ('pose: [20, 0, 1, 0, 0, 0, 1]', 'pose: [20, 0, 1, 0, 0, 0, 0]', 'bodies.goods.pose: quater'),
-    ('pose: [20, 0, 1, 0, 0, 0, 1]', 'pose: [20, 0, 1, 0, 0, 0, 1]\n    pose_topic: a',
-     "bodies.goods.pose_topic: 'a': a body with a pose never moves"),
-    ('left: {', 'left: {pose_topic: a, ', 'bodies.goods.boxes.left: Additional properties'),
-    ('    boxes:\n      bed: {size: [14, 2.5, 0.3]}', '    {}', 'bodies.truck'),
-    ('      bed: {size: [14, 2.5, 0.3]}', '      {}', 'bodies.truck.boxes: {} '),
-    ('stack: {', 'truck_bed: {', "bodies.truck.boxes.bed: 'truck_bed' is the name of another box"),
-    ('stack: {', 'truck: {', "bodies.truck: 'truck' is the name of a box, too"),
-    ('truck:', f'{"t" * 255}:', ' bytes, more than 255'),
-    ('a: load, b: spreader', 'name: up, a: load, b: spreader',
-     'pairs[0].name: pairs by a pattern or a body have no name'),
-    ('a: load, b: spreader', 'a: spreader, b: spreader', 'pairs[0]: no two boxes of this pattern'),
-    ('a: load, b: truck_bed', 'a: spreader_frame, b: spreader_twistlock_1',
-     "pairs[1]: 'spreader_frame' and 'spreader_twistlock_1' are parts of one body"),
-    ('a: load, b: truck_bed', 'a: goods_left, b: stack',
-     "pairs[1]: 'goods_left' and 'stack' are both fixed"),
-    ('a: load, b: truck_bed', 'a: load, b: truck_wheel', "pairs[1].b: 'truck_wheel' is none of")])
-def test_a_refusal_names_file_and_field(old, new, words, scene_of):
-    assert old in FILE
-    with pytest.raises(SceneError) as refused:
-        scene_of(FILE.replace(old, new, 1))
-    assert words in str(refused.value) and 'scene.yaml: ' in str(refused.value)
-
-
-def test_a_scene_of_bodies_alone(scene_of):
-    """Without `boxes`; each two bodies are as many pairs as their boxes."""
-    text = FILE[FILE.index('bodies:'):FILE.index('pairs:')]
-    scene = scene_of(text + 'pairs: all\n')
-    assert scene.pair_count == 2 * 2 + 2 * 1 + 2 * 1
-    assert scene_of(text + 'pairs: [{a: goods, b: truck}]\n').pair_count == 2

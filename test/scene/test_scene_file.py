@@ -33,6 +33,29 @@ pairs:
   - {name: load_s1, a: load, b: s1}
   - {name: grip, a: spreader, b: load}
 """
+BODIES = """\
+boxes:
+  load: {size: [12.192, 2.438, 2.591]}
+  stack: {size: [12.192, 2.438, 2.591], pose: [0, 0, 1.2955, 0, 0, 0, 1]}
+bodies:
+  spreader:
+    pose_topic: /crane/spreader
+    boxes:
+      frame: {size: [12.192, 2.3, 0.6]}
+      twistlock_1: {size: [0.1, 0.1, 0.15], pose: [5.9, 1.1, -0.3, 0, 0, 0, 1]}
+  goods:
+    pose: [20, 0, 1, 0, 0, 0, 1]
+    boxes:
+      left: {size: [1, 1, 1], pose: [0, 2, 0, 0, 0, 0, 1]}
+      right: {size: [1, 1, 1], pose: [0, -2, 0, 0, 0, 0, 1]}
+  truck:
+    boxes:
+      bed: {size: [14, 2.5, 0.3]}
+pairs:
+  - {a: load, b: spreader}
+  - {name: landing, a: load, b: truck_bed}
+  - {a: 'goods*', b: load}
+"""
 
 
 @pytest.fixture
@@ -69,6 +92,34 @@ def test_patterns_stand_for_pairs_of_which_one_box_moves(scene_of):
             ('pairs:\n' + listed + "  - {a: '*', b: '*'}",
              ['grip', 'load_s1', 'load_s2', 'spreader_s1', 'spreader_s2'])):
         assert [pair.name for pair in scene_of(boxes + pairs).every_pair()] == wanted
+
+
+def test_a_file_with_bodies(scene_of):
+    """Boxes of a body have its name before theirs; boxes come first, then bodies."""
+    scene = scene_of(BODIES)
+    assert scene.names == ('load', 'stack', 'spreader_frame', 'spreader_twistlock_1', 'goods_left',
+                           'goods_right', 'truck_bed')
+    assert scene.moving == ('load', 'spreader', 'truck')
+    assert scene.sources == {'load': 'load/pose', 'spreader': '/crane/spreader',
+                             'truck': 'truck/pose'}
+    assert [pair.name for pair in scene.every_pair()] == [
+        'landing', 'load_spreader_frame', 'load_spreader_twistlock_1', 'goods_left_load',
+        'goods_right_load']
+    assert scene.is_fixed.tolist() == [False, True, False, False, True, True, False]
+    assert scene.partners('spreader') == {'load'}
+    assert scene.partners('load') == {'load'}  # the goods are there already
+    landing = '  - {name: landing, a: load, b: truck_bed}\n'
+    array = scene_of('poses: array\n' + BODIES.replace(landing, ''))
+    assert array.moving == ('load', 'spreader', 'truck') and array.sources == {
+        'all boxes': 'poses'}
+
+
+def test_a_scene_of_bodies_alone(scene_of):
+    """Without `boxes`; each two bodies are as many pairs as their boxes."""
+    text = BODIES[BODIES.index('bodies:'):BODIES.index('pairs:')]
+    scene = scene_of(text + 'pairs: all\n')
+    assert scene.pair_count == 2 * 2 + 2 * 1 + 2 * 1
+    assert scene_of(text + 'pairs: [{a: goods, b: truck}]\n').pair_count == 2
 
 
 @pytest.mark.parametrize('old, new, words', [
@@ -114,11 +165,33 @@ def test_patterns_stand_for_pairs_of_which_one_box_moves(scene_of):
     ('frame_id: map', 'frame_id: 7', "frame_id: 7 is not of type 'string'"),
     ('boxes:', 'bodies:', 'bodies'), ('boxes:', 'boxes: [', 'line'),
     (GOOD, '7\n', "7 is not of type 'object'"),
-    (GOOD, 'boxes: {b: {size: [1, 1, 1]}}\npairs: []\n', 'pairs: [] ')])
+    (GOOD, 'boxes: {b: {size: [1, 1, 1]}}\npairs: []\n', 'pairs: [] '),
+    # The rest is of bodies.
+    ('pose: [5.9, 1.1, -0.3, 0, 0, 0, 1]', 'pose: [5.9, 1.1, -0.3, 0, 0, 0, 0]',
+     'bodies.spreader.boxes.twistlock_1.pose: quaternion'),
+    ('[0.1, 0.1, 0.15]', '[0.1, 0.1]', 'bodies.spreader.boxes.twistlock_1.size: [0.1, 0.1] is too'),
+    ('pose: [20, 0, 1, 0, 0, 0, 1]', 'pose: [20, 0, 1, 0, 0, 0, 0]', 'bodies.goods.pose: quater'),
+    ('pose: [20, 0, 1, 0, 0, 0, 1]', 'pose: [20, 0, 1, 0, 0, 0, 1]\n    pose_topic: a',
+     "bodies.goods.pose_topic: 'a': a body with a pose never moves"),
+    ('left: {', 'left: {pose_topic: a, ', 'bodies.goods.boxes.left: Additional properties'),
+    ('    boxes:\n      bed: {size: [14, 2.5, 0.3]}', '    {}', 'bodies.truck'),
+    ('      bed: {size: [14, 2.5, 0.3]}', '      {}', 'bodies.truck.boxes: {} '),
+    ('stack: {', 'truck_bed: {', "bodies.truck.boxes.bed: 'truck_bed' is the name of another box"),
+    ('stack: {', 'truck: {', "bodies.truck: 'truck' is the name of a box, too"),
+    ('truck:', f'{"t" * 255}:', ' bytes, more than 255'),
+    ('a: load, b: spreader', 'name: up, a: load, b: spreader',
+     'pairs[0].name: pairs by a pattern or a body have no name'),
+    ('a: load, b: spreader', 'a: spreader, b: spreader', 'pairs[0]: no two boxes of this pattern'),
+    ('a: load, b: truck_bed', 'a: spreader_frame, b: spreader_twistlock_1',
+     "pairs[1]: 'spreader_frame' and 'spreader_twistlock_1' are parts of one body"),
+    ('a: load, b: truck_bed', 'a: goods_left, b: stack',
+     "pairs[1]: 'goods_left' and 'stack' are both fixed"),
+    ('a: load, b: truck_bed', 'a: load, b: truck_wheel', "pairs[1].b: 'truck_wheel' is none of")])
 def test_a_refusal_names_file_and_field(old, new, words, scene_of):
-    assert old in GOOD
+    text = GOOD if old in GOOD else BODIES
+    assert old in text
     with pytest.raises(SceneError) as refused:
-        scene_of(GOOD.replace(old, new, 1))
+        scene_of(text.replace(old, new, 1))
     assert words in str(refused.value) and 'scene.yaml: ' in str(refused.value)
 
 
