@@ -9,6 +9,7 @@ from functools import partial
 import hard_pose_recipes as recipes
 import numpy as np
 import oracle
+import poses
 import pytest
 from gmpy2 import mpfr
 
@@ -26,12 +27,7 @@ boxes here are deep in each other; the network learns from a tenth of the shorte
 
 
 def solve(model, pairs):
-    return ContactSolver(model=model).batch(
-        pairs.pose_a, pairs.pose_b, size_a=pairs.size_a, size_b=pairs.size_b)
-
-
-def size_of(pairs):
-    return np.maximum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
+    return pairs.contacts(ContactSolver(model=model))
 
 
 # --- the file -------------------------------------------------------------------------------------
@@ -68,13 +64,12 @@ def test_families_reach_what_they_are_for():
         assert (CASES[name].gap > 0.0).all()
     for name in ('a1_tilted_faces', 'a4_ridges', 'c1_depths', 'd5_edge_against_face'):
         assert (CASES[name].gap[::2] < 0.0).all() or name == 'a1_tilted_faces'
-    assert (np.abs(CASES['b1_exact_touch'].gap) < 1e-9 * size_of(
-        CASES['b1_exact_touch'].pairs)).all()
+    touching = CASES['b1_exact_touch']
+    assert (np.abs(touching.gap) < 1e-9 * touching.pairs.size).all()
     winners = set()
-    for cases in (CASES['b4_one_axis'],):
-        for a, b, size_a, size_b in zip(*cases.pairs):
-            gaps = oracle.axis_gaps(oracle.make_box(a, size_a), oracle.make_box(b, size_b))
-            winners.add(max(gaps, key=lambda gap: gap[2])[0])
+    for a, b, size_a, size_b in zip(*CASES['b4_one_axis'].pairs):
+        gaps = oracle.axis_gaps(oracle.make_box(a, size_a), oracle.make_box(b, size_b))
+        winners.add(max(gaps, key=lambda gap: gap[2])[0])
     assert winners == set(range(15))
     ties = CASES['d1_two_axes']
     gaps = sorted(gap for _, _, gap in oracle.axis_gaps(*(
@@ -113,7 +108,7 @@ def test_gates(name, model):
 def test_exact_point(name):
     """To max(1e-9, 1e-14·size/depth) of the size, and the coordinates' rounding."""
     cases = CASES[name]
-    found, size = solve('exact', cases.pairs), size_of(cases.pairs)
+    found, size = solve('exact', cases.pairs), cases.pairs.size
     known = found.colliding & np.isfinite(cases.centroid).all(axis=1)
     off = np.linalg.norm(found.point - cases.pairs.pose_a[:, :3] - cases.centroid, axis=1)
     reach = np.abs(cases.pairs.pose_a[:, :3]).max(axis=1)
@@ -128,7 +123,7 @@ def test_exact_volume_and_covariance(name):
     Of boxes up to 100,000 times as long as thick; beyond, no eigenvalue is negative.
     """
     cases = CASES[name]
-    found, size = solve('exact', cases.pairs), size_of(cases.pairs)
+    found, size = solve('exact', cases.pairs), cases.pairs.size
     aspect = np.max([part.max(axis=1) / part.min(axis=1) for part in cases.pairs[2:]], axis=0)
     known = found.colliding & np.isfinite(cases.volume) & (aspect <= 1e5)
     rounding = 1e-14 * size / np.maximum(-cases.gap, 1e-300)
@@ -151,7 +146,7 @@ def test_exact_volume_and_covariance(name):
 
 @pytest.fixture(scope='module')
 def everything():
-    return Pairs(*(np.concatenate(columns) for columns in zip(*(c.pairs for c in CASES.values()))))
+    return Pairs(*poses.hard_pairs())
 
 
 def test_reflection(everything):
@@ -175,10 +170,10 @@ def test_free_after_moving_by_the_depth(everything, model):
     coordinates).
     """
     one = solve(model, everything)
-    rows = one.colliding & (one.separation < -1e-7 * size_of(everything))
+    rows = one.colliding & (one.separation < -1e-7 * everything.size)
     depth = -one.separation[:, None]
     reach = np.abs(np.hstack([everything.pose_a[:, :3], everything.pose_b[:, :3]])).max(axis=1)
-    m = np.maximum(1e-9 * depth[:, 0], 8 * np.spacing(np.maximum(reach, size_of(everything))))
+    m = np.maximum(1e-9 * depth[:, 0], 8 * np.spacing(np.maximum(reach, everything.size)))
     m = (m + 2 * judge.rounding(*everything))[:, None]
 
     def moved(by):
@@ -196,7 +191,7 @@ def test_free_after_moving_by_the_depth(everything, model):
 def test_depth_is_lipschitz(everything):
     """The separation changes by no more than the poses do, ties or not."""
     rng = np.random.default_rng(8)
-    size, n = size_of(everything), len(everything.pose_a)
+    size, n = everything.size, len(everything.pose_a)
     one = solve('exact', everything)
     for scale in (1e-9, 1e-4, 1e-2):
         step = rng.normal(size=(n, 3))
@@ -224,7 +219,7 @@ def test_float32_poses_have_float32_errors(everything):
                             pose_b=near.pose_b.astype(np.float32).astype(float))
     one, two = solve('mlp', near), solve('mlp', rounded)
     reach = np.maximum(np.abs(near.pose_a[:, :3]), np.abs(near.pose_b[:, :3])).max(axis=1)
-    moved = 8 * np.finfo(np.float32).eps * (size_of(near) + reach)
+    moved = 8 * np.finfo(np.float32).eps * (near.size + reach)
     assert (np.abs(one.separation - two.separation) <= moved).all()
 
 

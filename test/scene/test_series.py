@@ -52,8 +52,7 @@ class Series(NamedTuple):
 
 
 def solve(model: str, pairs: Pairs) -> Contacts:
-    return ContactSolver(model=model).batch(
-        pairs.pose_a, pairs.pose_b, size_a=pairs.size_a, size_b=pairs.size_b)
+    return pairs.contacts(ContactSolver(model=model))
 
 
 def contact_intervals(found: Contacts, motions: int) -> np.ndarray:
@@ -65,11 +64,6 @@ def contact_intervals(found: Contacts, motions: int) -> np.ndarray:
 def steps(found: Contacts, motions: int) -> np.ndarray:
     """(motions · (frames − 1),) |Δpoint| [m] from frame to frame, NaN without contact in both."""
     return np.linalg.norm(np.diff(found.point.reshape(motions, -1, 3), axis=1), axis=2).ravel()
-
-
-def largest(pairs: Pairs) -> np.ndarray:
-    """(n,) size: the largest extent of the two boxes [m]."""
-    return np.maximum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
 
 
 def pose_steps(one: Pairs, other: Pairs) -> np.ndarray:
@@ -88,7 +82,7 @@ def slopes(one: Pairs, other: Pairs, before: Contacts, after: Contacts) -> np.nd
 
     The depth is the lesser of the two, and DEPTH_FLOOR · size at least: boxes are pressed in to it.
     """
-    size = largest(one)
+    size = one.size
     depth = np.maximum(-np.maximum(before.separation, after.separation), DEPTH_FLOOR * size)
     way = pose_steps(one, other)
     way[way == 0.0] = np.nan  # no step at all, or one that float64 rounds to none
@@ -139,7 +133,7 @@ def approaches(name: str, turning: bool) -> Series:
     normal = solve('exact', met).normal
     side = np.cross(normal, rng.normal(size=(n, 3)))
     side /= np.linalg.norm(side, axis=1, keepdims=True)
-    reach = (largest(met) * rng.uniform(0.1, 0.5, (2, n)))[:, :, None]
+    reach = (met.size * rng.uniform(0.1, 0.5, (2, n)))[:, :, None]
     come, go = reach[0] * (normal + rng.uniform(-1, 1, (n, 1)) * side), 2.0 * reach[1] * side
     axis, angle = rng.normal(size=(n, 3)), TURN * turning * rng.uniform(0.1, 1.0, n)
 
@@ -229,7 +223,7 @@ def small_steps(name: str) -> tuple[Pairs, Pairs]:
     pairs = SETS[name](rng, N)
     shortest = np.minimum(pairs.size_a.min(axis=1), pairs.size_b.min(axis=1))
     pairs = at_depth(pairs, shortest * log_uniform(rng, SHALLOWEST, DEEPEST, len(shortest)))
-    n, size = len(pairs.pose_a), largest(pairs)
+    n, size = len(pairs.pose_a), pairs.size
     step = np.minimum(size * log_uniform(rng, SHORTEST_STEP, LONGEST_STEP, n),
                       -0.1 * solve('exact', pairs).separation)
     way, axis = rng.normal(size=(2, n, 3))
