@@ -143,8 +143,7 @@ def subplots(rows: int, columns: int, size: tuple[float, float], **shared: Any,
     return figure, figure.subplots(rows, columns, squeeze=False, **shared)
 
 
-def log_errors(axis: Axes, least: float, most: float, zero: str = 'exact (0)',
-               ) -> Callable[[float], float]:
+def log_errors(axis: Axes, least: float, most: float) -> Callable[[float], float]:
     """Make the y axis logarithmic, with a band for 0 below; return where an error is drawn.
 
     Errors between 0 and `least` are drawn at `least`.
@@ -155,7 +154,7 @@ def log_errors(axis: Axes, least: float, most: float, zero: str = 'exact (0)',
                                             math.floor(math.log10(most)) + 1)]
     axis.set_yscale('log')
     axis.set_ylim(bottom, most)
-    axis.set_yticks([middle, *ticks], [zero, *(f'{tick:g}' for tick in ticks)])
+    axis.set_yticks([middle, *ticks], ['exact (0)', *(f'{tick:g}' for tick in ticks)])
     axis.minorticks_off()
     axis.axhspan(bottom, least / 1.1, color='0.92', zorder=0)
     axis.grid(color='0.9', linewidth=0.5)

@@ -115,31 +115,31 @@ def stays(make: Callable[[], Scene], timing: Timing | None) -> np.ndarray:
 
 # --- scenes ---------------------------------------------------------------------------------------
 
-def tower(count: int, edge: float = 0.5, jitter: float = 0.0, mass: float = 50.0) -> Scene:
+def tower(count: int, jitter: float = 0.0) -> Scene:
     """Return cubes on each other, shifted by a share of the edge and turned about the vertical."""
     rng = np.random.default_rng(3)
-    rows = [FLOOR]
+    edge, rows = 0.5, [FLOOR]
     for k in range(count):
         x, y = jitter * edge * rng.uniform(-1, 1, 2)
         gap = 1e-4 * (k + 1) if jitter else 0.0
-        rows.append(((edge,) * 3, mass, (x, y, edge * (k + 0.5) + gap),
+        rows.append(((edge,) * 3, 50.0, (x, y, edge * (k + 0.5) + gap),
                      turned((0, 0, 1), math.radians(100 * jitter * rng.uniform(-1, 1)))))
     return Scene(f'tower of {count}' + (', jittered' if jitter else ''), Boxes.of(rows), 8.0)
 
 
-def wall(columns: int = 10, layers: int = 10) -> Scene:
+def wall() -> Scene:
     """Return a wall of bricks in running bond."""
     size, rows = (0.4, 0.2, 0.2), [FLOOR]
-    for layer in range(layers):
-        for k in range(columns):
+    for layer in range(10):
+        for k in range(10):
             rows.append((size, 16.0, (size[0] * (k + 0.5 * (layer % 2)), 0.0,
                                       size[2] * (layer + 0.5))))
     return Scene('wall 10 × 10', Boxes.of(rows), 4.0)
 
 
-def pyramid(base: int = 10) -> Scene:
+def pyramid() -> Scene:
     """Return cubes in rows, each on two of the row below."""
-    edge, rows = 0.5, [FLOOR]
+    base, edge, rows = 10, 0.5, [FLOOR]
     for layer in range(base):
         for k in range(base - layer):
             rows.append(((edge,) * 3, 50.0, ((k - 0.5 * (base - layer)) * 1.1 * edge, 0.0,
@@ -147,10 +147,10 @@ def pyramid(base: int = 10) -> Scene:
     return Scene('pyramid of 55', Boxes.of(rows), 5.0)
 
 
-def pile(count: int = 200) -> Scene:
+def pile() -> Scene:
     """Return boxes of random sizes and turns, dropped in layers."""
     rng, rows = np.random.default_rng(5), [FLOOR]
-    for k in range(count):
+    for k in range(200):
         layer, place = divmod(k, 20)
         size = rng.uniform(0.15, 0.4, 3)
         q = rng.normal(size=4)
@@ -160,10 +160,10 @@ def pile(count: int = 200) -> Scene:
     return Scene('pile of 200', Boxes.of(rows), 8.0)
 
 
-def bars(layers: int = 15) -> Scene:
+def bars() -> Scene:
     """Return pairs of bars, each layer across the one below."""
     rng, rows = np.random.default_rng(6), [FLOOR]
-    for layer in range(layers):
+    for layer in range(15):
         for side in (-1, 1):
             place = 0.35 * side
             at = (0.0, place) if layer % 2 else (place, 0.0)
@@ -185,10 +185,10 @@ def mixed() -> Scene:
     return Scene('mixed sizes, 8', Boxes.of(rows), 5.0)
 
 
-def pallet(layers: int = 10) -> Scene:
+def pallet() -> Scene:
     """Return cartons on a pallet, each layer turned."""
     rows = [FLOOR, ((1.2, 0.8, 0.144), 25.0, (0.6, 0.4, 0.072))]
-    for layer in range(layers):
+    for layer in range(10):
         long = layer % 2 == 0
         size = (0.4, 0.4, 0.2) if long else (0.6, 0.4, 0.2)
         for i in range(3 if long else 2):
@@ -255,13 +255,13 @@ def heap(count: int = 30) -> Scene:
     return Scene('heap of 30 bars', Boxes.of(rows), 12.0)
 
 
-def packed_pallets(count: int = 3, layers: int = 5) -> Scene:
+def packed_pallets() -> Scene:
     """Return pallets side by side, each with 40 cartons that touch their neighbours."""
     base, carton, rows = (1.2, 0.8, 0.144), (0.3, 0.4, 0.25), [FLOOR]
-    for k in range(count):
+    for k in range(3):
         corner = np.array([0.0, 0.8 * k, 0.0])
         rows.append((base, 25.0, corner + 0.5 * np.array(base)))
-        for x, y, z in product(range(4), range(2), range(layers)):
+        for x, y, z in product(range(4), range(2), range(5)):
             rows.append((carton, 9.0, corner + (0.0, 0.0, base[2]) + carton * np.array(
                 [x + 0.5, y + 0.5, z + 0.5])))
     return Scene('three packed pallets', Boxes.of(rows), 4.0)

@@ -33,13 +33,13 @@ QUICK_TILTS, QUICK_DIVISIONS = (0.1, 1.0, 10.0), (8,)
 REPEATS = 5  # timings, of which the least counts
 
 
-def tilted_cube(tilt: float, depth: float = DEPTH) -> Pairs:
+def tilted_cube(tilt: float) -> Pairs:
     """Return a cube with its lowest corner below the middle of another's top face."""
     turn = quaternion_multiply(turned((0, 0, 1), np.radians(SPIN)),
                                turned((1, -1, 0), np.radians(tilt)))
     signs = 2.0 * np.indices((2, 2, 2)).reshape(3, -1).T - 1.0
     corners = signs @ rotation_matrix(turn).T
-    place = (0.0, 0.0, 0.5 * CUBE[2] - depth) - corners[corners[:, 2].argmin()]
+    place = (0.0, 0.0, 0.5 * CUBE[2] - DEPTH) - corners[corners[:, 2].argmin()]
     return on_cube(np.concatenate([place, turn])[None])
 
 

@@ -22,10 +22,9 @@ def drawn(name, n=400):
     return fuzz.draw(name, np.random.default_rng([SEED, 7]), n)
 
 
-def answers(pairs, model='exact'):
+def answers(pairs):
     a, b, size_a, size_b = pairs
-    return ContactSolver(model=model).batch(
-        a, b, size_a=size_a, size_b=size_b)
+    return ContactSolver().batch(a, b, size_a=size_a, size_b=size_b)
 
 
 def test_gates_are_at_zero(tmp_path, capsys):

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import poses
 import pytest
-from test_paper import touching
 
 from benchmarks.paper.models import Committee, committee, weights_path
 from benchmarks.paper.numpy_model import NumpyPaper
@@ -28,7 +27,7 @@ def solver_of(model: NumpyPaper) -> ContactSolver:
 def test_error_on_touching_boxes() -> None:
     """Mean errors against `exact`: 0.49 m and 6.4° are reached; rows are as single calls."""
     solver = solver_of(committee())
-    a, b = touching(np.array(poses.CUBE), depth=1e-9)
+    a, b = poses.at_depth(poses.CUBE, depth=1e-9)
     truth, found = EXACT.batch(a, b), solver.batch(a, b)
     cosine = np.clip(np.sum(found.normal * truth.normal, axis=1), -1, 1)
     assert np.linalg.norm(found.point - truth.point, axis=1).mean() < 0.55

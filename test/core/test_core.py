@@ -35,7 +35,6 @@ from box_contact_ros.networks.weights_file import Network
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.contact import FIELDS, Contacts
 
-TESTS = Path(__file__).resolve().parents[1]
 PACKAGE = Path(box_contact_ros.__file__).parent
 MLP_FILE = resource_path('weights', 'mlp.safetensors')
 MODELS = ('exact', 'mlp')
@@ -53,13 +52,9 @@ def a_solver(model: str) -> ContactSolver:
     return ContactSolver((1, 1, 1), (1, 1, 1), model=make_model(model))
 
 
-def forced(name: str) -> dict[str, str]:
-    return os.environ | {FORCE: name}
-
-
-def started(name: str, *words: str | Path, cwd: Path = TESTS) -> subprocess.Popen[str]:
+def started(name: str, *words: str | Path) -> subprocess.Popen[str]:
     """Start Python with an instruction set."""
-    return subprocess.Popen([sys.executable, *map(str, words)], env=forced(name), cwd=cwd,
+    return subprocess.Popen([sys.executable, *map(str, words)], env=os.environ | {FORCE: name},
                             text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
 
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from box_contact_ros.solver.contact import FIELDS
+from box_contact_ros.solver.contact_solver import ContactSolver
 
 CONTAINER = (12.192, 2.438, 2.591)
 CUBE = (2.0, 2.0, 2.0)
@@ -90,13 +91,27 @@ def random_pairs(rng, n):
     return a, b, size_a, size_b
 
 
-def near_parallel_pairs(rng, n, size=CONTAINER):
+def at_depth(size, n=4000, depth=0.0, seed=9):
+    """Pairs of equal boxes in any orientation, `depth` [m] deep along SAT's normal."""
+    rng = np.random.default_rng(seed)
+    a = np.concatenate([rng.uniform(-9, 9, (n, 3)), unit_quaternions(rng, n)], axis=1)
+    within = rotate(a[:, 3:], rng.uniform(-0.5, 0.5, (n, 3)) * size)
+    turn = unit_quaternions(rng, n)
+    within_b = rotate(turn, rng.uniform(-0.5, 0.5, (n, 3)) * size)
+    b = np.concatenate([a[:, :3] + within - within_b, turn], axis=1)
+    found = ContactSolver(size, size).batch(a, b)
+    assert found.colliding.all()
+    b[:, :3] += (-found.separation - depth)[:, None] * found.normal
+    return a, b
+
+
+def near_parallel_pairs(rng, n):
     """Stacked boxes: tilt 0 and 1e-16 to 0.1 rad about axes of all kinds, gap ±1e-12 to ±1e-1 m.
 
     Lateral offsets: none, exactly flush sides (half an extent), or random. Half of the pairs are
     then moved rigidly, so that no axis is a coordinate axis.
     """
-    size = np.asarray(size, dtype=np.float64)
+    size = np.array(CONTAINER)
     sizes = np.tile(size, (n, 1))
     axes = rng.normal(size=(n, 3))
     kind = rng.integers(0, 6, n)

@@ -122,7 +122,7 @@ class Client:
         if len(stamps) > AHEAD:
             assert self.is_answered(stamps[-AHEAD - 1]), 'no answer in mid-stream'
 
-    def offer_until_answered(self, *poses: Any, timeout: float = PATIENCE) -> float:
+    def offer_until_answered(self, *poses: Any) -> float:
         """Send poses every 50 ms until some are answered: both sides have matched. Seconds taken.
 
         An answer that lacks a stale pair is none.
@@ -131,7 +131,7 @@ class Client:
         offered: list[int] = []
         while not any(stamp in self.contacts and not self.contacts[stamp].stale
                       for stamp in offered):
-            assert time.monotonic() - started < timeout, 'no answer'
+            assert time.monotonic() - started < PATIENCE, 'no answer'
             offered.append(self.send(*poses))
             self.is_answered(offered[-1], 0.05)
         # Late answers to offers must not be mistaken for answers to what comes.

@@ -27,25 +27,10 @@ def make(name):
     return paper, ContactSolver(size, size), size
 
 
-def touching(size, n=4000, depth=0.0, seed=9):
-    """Pairs of equal boxes in any orientation, `depth` [m] deep along SAT's normal."""
-    rng = np.random.default_rng(seed)
-    exact = ContactSolver(size, size, model='exact')
-    a = np.concatenate([rng.uniform(-9, 9, (n, 3)), poses.unit_quaternions(rng, n)], axis=1)
-    within = poses.rotate(a[:, 3:], rng.uniform(-0.5, 0.5, (n, 3)) * size)
-    turn = poses.unit_quaternions(rng, n)
-    within_b = poses.rotate(turn, rng.uniform(-0.5, 0.5, (n, 3)) * size)
-    b = np.concatenate([a[:, :3] + within - within_b, turn], axis=1)
-    found = exact.batch(a, b)
-    assert found.colliding.all()
-    b[:, :3] += (-found.separation - depth)[:, None] * found.normal
-    return a, b
-
-
 def test_error_on_touching_boxes():
     """Against `exact`, whose point at touch is the paper's impact point: 0.53 m and 7.4°."""
     solver, exact, size = make('cubes')
-    a, b = touching(np.array(size), depth=1e-9)
+    a, b = poses.at_depth(size, depth=1e-9)
     truth, found = exact.batch(a, b), solver.batch(a, b)
     error = np.linalg.norm(found.point - truth.point, axis=1)
     cosine = np.clip(np.sum(found.normal * truth.normal, axis=1), -1, 1)
@@ -61,7 +46,7 @@ def test_it_is_numpys_model(file):
     weights = load_weights(resource_path('weights', f'{file}.safetensors'))
     size = np.array(weights.card['sizes'][0])
     model = make_model('paper', weights=weights.path)
-    a, b = touching(size, n=10_000, depth=0.01 * size.min())
+    a, b = poses.at_depth(size, n=10_000, depth=0.01 * size.min())
     found, wanted = (ContactSolver(size, size, model=one).batch(a, b)
                      for one in (model, numpy_model.NumpyPaper(weights, size)))
     for difference in ((found.point - wanted.point) / size.max(), found.normal - wanted.normal):
@@ -76,7 +61,7 @@ def test_garbage_for_weights_stays_finite():
     weights = load_weights(resource_path('weights', 'paper.safetensors'))
     numbers = PaperWeights(weights).numbers.copy()
     numbers[6:] = 1e4 * np.sign(np.random.default_rng(4).normal(size=len(numbers) - 6))
-    a, b = touching(np.array(poses.CUBE), n=1000, depth=0.02)
+    a, b = poses.at_depth(poses.CUBE, n=1000, depth=0.02)
     solver = native.PairSolver(native.Paper(numbers), poses.CUBE, poses.CUBE)
     found = solver.batch(a, b)
     assert np.isfinite(found.point).all()
@@ -90,7 +75,7 @@ def test_contracts(name):
     Rows are as single calls.
     """
     solver, exact, size = make(name)
-    a, b = touching(np.array(size), n=300, depth=0.05)
+    a, b = poses.at_depth(size, n=300, depth=0.05)
     b[::3, :3] += 20.0
     truth, found = exact.batch(a, b), solver.batch(a, b)
     assert np.array_equal(found.colliding, truth.colliding)
@@ -110,7 +95,7 @@ def test_point_is_in_the_middle_of_the_depth(name):
     The networks know touching boxes only, so the depth δ changes neither the normal nor the rest.
     """
     solver, exact, size = make(name)
-    a, b = touching(np.array(size), n=2000, depth=1e-9)
+    a, b = poses.at_depth(size, n=2000, depth=1e-9)
     deep, delta = b.copy(), 0.05
     before = exact.batch(a, b)
     deep[:, :3] -= delta * before.normal
@@ -128,7 +113,7 @@ def test_point_is_in_the_middle_of_the_depth(name):
 def test_the_first_refused_row_is_named(name):
     """And other rows do not matter."""
     solver, _, size = make(name)
-    a, b = touching(np.array(size), n=6, depth=0.05)
+    a, b = poses.at_depth(size, n=6, depth=0.05)
     b[2, 3:] = 0.0
     a[4, 0] = np.nan
     with pytest.raises(ValueError, match=r'poses_b\[2\] quaternion .* has zero length'):
@@ -139,7 +124,7 @@ def test_the_first_refused_row_is_named(name):
 def test_covariance(name):
     """Moved rigidly, the answer moves along (float32 network: 1e-4 of the size)."""
     solver, _, size = make(name)
-    a, b = touching(np.array(size), n=500, depth=0.05)
+    a, b = poses.at_depth(size, n=500, depth=0.05)
     rng = np.random.default_rng(1)
     turn, shift = poses.unit_quaternions(rng, 500), rng.uniform(-5, 5, (500, 3))
     one = solver.batch(a, b)
@@ -152,7 +137,7 @@ def test_covariance(name):
 def test_cubes_of_any_edge():
     """Scaled by 2^k, so is the point, to the bit."""
     solver, _, size = make('cubes')
-    a, b = touching(np.array(size), n=200, depth=0.05)
+    a, b = poses.at_depth(size, n=200, depth=0.05)
     for factor in (2.0**-6, 2.0**6):
         other = ContactSolver([EDGE * factor] * 3, [EDGE * factor] * 3, model=make_model('paper'))
         scaling = np.array([factor] * 3 + [1] * 4)
@@ -165,7 +150,7 @@ def test_cubes_of_any_edge():
 def test_sizes_and_places_of_rows(name):
     """Rows with sizes, or by their places among the boxes, are as rows without; axes are SAT's."""
     solver, exact, size = make(name)
-    a, b = touching(np.array(size), n=200, depth=0.05)
+    a, b = poses.at_depth(size, n=200, depth=0.05)
     sizes = np.tile(size, (200, 1))
     many = solver.batch(a, b)
     assert np.array_equal(many.axis, exact.batch(a, b).axis)
@@ -179,7 +164,7 @@ def test_sizes_and_places_of_rows(name):
 def test_each_row_by_the_weights_for_its_size():
     """Cubes and containers in one batch; and no rows at all, whatever their size."""
     solver = ContactSolver(model=make_model('paper'))
-    parts = [(*touching(np.array(size), n=50, depth=0.05), np.tile(size, (50, 1)))
+    parts = [(*poses.at_depth(size, n=50, depth=0.05), np.tile(size, (50, 1)))
              for size in MODELS.values()]
     a, b, sizes = map(np.concatenate, zip(*parts))
     found = solver.batch(a, b, size_a=sizes, size_b=sizes)

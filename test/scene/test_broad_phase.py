@@ -70,11 +70,10 @@ def made(rng, kind, n, upright=False):
     return size, np.hstack((place, turn))
 
 
-def broad_phase(size, fixed=None, *, margin=0.0, listed=NONE, groups=None, allowed=ALL,
-                bodies=None):
+def broad_phase(size, fixed=None, *, margin=0.0, listed=NONE, allowed=ALL, bodies=None):
     n = len(size)
     return native.BroadPhase(size, np.zeros(n, bool) if fixed is None else fixed, margin, listed,
-                             np.zeros(n, np.int32) if groups is None else groups, allowed,
+                             np.zeros(n, np.int32), allowed,
                              np.full(n, -1, np.int32) if bodies is None else bodies)
 
 

@@ -34,18 +34,6 @@ def corner_on_top(depth, x=0.31, y=-0.17):
     return np.concatenate([corner - lowest, turn[0]]), corner
 
 
-def overlapping(n=60, depth=1e-3, seed=4):
-    """Cubes in any pose, `depth` [m] deep."""
-    rng = np.random.default_rng(seed)
-    a = np.concatenate([rng.uniform(-9, 9, (n, 3)), poses.unit_quaternions(rng, n)], axis=1)
-    turn = poses.unit_quaternions(rng, n)
-    at = [poses.rotate(q, rng.uniform(-1, 1, (n, 3))) for q in (a[:, 3:], turn)]
-    b = np.concatenate([a[:, :3] + at[0] - at[1], turn], axis=1)
-    found = EXACT.batch(a, b)
-    b[:, :3] -= (found.separation + depth)[:, None] * found.normal
-    return a, b
-
-
 @pytest.mark.parametrize('divisions', [1, 2, 8, 22])
 def test_triangles_cover_the_box_once(divisions):
     """12 N² of them, the box's area; normals leave the box.
@@ -84,7 +72,7 @@ def test_a_corner_on_a_face(depth, divisions):
 
 def test_the_error_shrinks_with_the_triangles():
     """In any pose, 1 mm deep: about in proportion to 1/N, and less than a triangle's side."""
-    a, b = overlapping()
+    a, b = poses.at_depth(poses.CUBE, n=60, depth=1e-3)
     exact = EXACT.batch(a, b)
     errors = []
     for divisions in (2, 8, 32):
@@ -110,7 +98,7 @@ def test_the_normal_points_from_a_to_b(axis, sign):
 
 
 def test_depth_and_verdict_are_sats():
-    a, b = overlapping(depth=0.02)
+    a, b = poses.at_depth(poses.CUBE, n=60, depth=0.02)
     b[::3, :3] += 9.0
     found, exact = cubes(8).batch(a, b), EXACT.batch(a, b)
     assert np.array_equal(found.colliding, exact.colliding)
@@ -135,7 +123,7 @@ def test_a_box_inside_another_is_counted_and_answered():
 
 def test_exact_touch_is_always_answered():
     """Cubes in any pose that touch to within rounding: no NaN, whether the soup found it or not."""
-    a, b = overlapping(n=200, depth=0.0)
+    a, b = poses.at_depth(poses.CUBE, n=200)
     found = cubes(8)
     many, exact = found.batch(a, b), EXACT.batch(a, b)
     touch = exact.colliding
