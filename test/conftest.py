@@ -18,7 +18,7 @@ import subprocess
 import sys
 import time
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -264,14 +264,12 @@ def signal_handlers() -> Iterator[None]:
 def program(tmp_path: Path) -> Iterator[Callable[..., RunningProgram]]:
     """Start a program of setup.py, or a module; it is ended with the test, however that ends.
 
-    `program('crane', '--ros-args', '-p', 'rate:=200.0', env={...})`: `env` is added to this
-    process's environment, `within` stands before the command, such as `ip netns exec NAME`.
-    The test is skipped where an extra of the program is not installed.
+    `program('crane', '--ros-args', '-p', 'rate:=200.0')`. The test is skipped where an extra of the
+    program is not installed.
     """
     started: list[RunningProgram] = []
 
-    def start(*args: str, env: dict[str, str] | None = None,
-              within: Sequence[str] = ()) -> RunningProgram:
+    def start(*args: str) -> RunningProgram:
         for extra in {'crane': ('sim',), 'soup_node': ('soup',), 'view': ('view',)}.get(
                 args[0], ()):
             if importlib.util.find_spec(EXTRAS[extra][0]) is None:
@@ -280,12 +278,11 @@ def program(tmp_path: Path) -> Iterator[Callable[..., RunningProgram]]:
         log = tmp_path / f'program_{len(started)}.log'
         with log.open('wb') as out:
             process = subprocess.Popen(
-                [*within, sys.executable, '-u', '-m', f'box_contact_ros.{module}', *args[1:]],
+                [sys.executable, '-u', '-m', f'box_contact_ros.{module}', *args[1:]],
                 stdin=subprocess.DEVNULL,
                 stdout=out,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
-                env={**os.environ, **(env or {})},
             )
         started.append(RunningProgram(process, log))
         return started[-1]
