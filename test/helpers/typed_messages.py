@@ -31,6 +31,9 @@ from box_contact_ros.scene.scene import Pair
 from box_contact_ros.solver.checks import pose_fault
 from box_contact_ros.solver.contact import FIELDS, Contact, patch_area
 
+TOLD = FIELDS[:-1]
+"""What a message says of a contact: all but its axis."""
+
 
 def pose_stamped(numbers: Iterable[float], frame_id: str, stamp: int) -> PoseStamped:
     """Return the message of a pose `x y z qx qy qz qw`; stamp [ns]."""

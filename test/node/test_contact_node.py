@@ -19,7 +19,7 @@ from raw_client import APART, ORIGIN, TOUCHING
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from ros_client import CUBES, Client, arguments, serving
-from typed_messages import contacts_by_pair
+from typed_messages import TOLD, contacts_by_pair
 
 from box_contact_msgs.msg import Contacts
 from box_contact_ros import ContactSolver
@@ -57,10 +57,7 @@ def test_answers_with_point_normal_and_contacts(node, client):
     assert (normal.vector.x, normal.vector.y, normal.vector.z) == tuple(wanted.normal)
     entry, = contacts.contacts
     assert (entry.pair, entry.box_a, entry.box_b) == (PAIR, 'box_a', 'box_b')
-    contact = contacts_by_pair(contacts)[PAIR]
-    assert (contact.separation, contact.volume) == (wanted.separation, wanted.volume)
-    for name in ('point', 'normal', 'covariance'):
-        assert np.array_equal(getattr(contact, name), getattr(wanted, name))
+    poses.assert_same_bits(contacts_by_pair(contacts)[PAIR], wanted, *TOLD)
     # They come in this order, so a reader of contacts knows that point and normal are out.
     assert [topic for topic, at in client.order if at == stamp] == [
         'contact/point', 'contact/normal', 'contacts']

@@ -15,8 +15,10 @@ from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
 from hypothesis import given
 from hypothesis import strategies as st
 from message_fuzz import STRICTER, TYPES, fuzz, outcome_of
+from poses import assert_same_bits
 from rclpy.serialization import deserialize_message, serialize_message
 from typed_messages import (
+    TOLD,
     make_contacts,
     make_normal,
     make_point,
@@ -225,9 +227,8 @@ def test_answers_are_written_alike(data, stamp, frame_id, touching, close, stale
     assert read[:2] == (stamp, frame_id) and read.touching == touching
     assert read.names == [(pair.label, pair.a, pair.b) for pair in pairs[:len(contacts)]]
     assert read.stale == [pair.label for pair in pairs[len(contacts):]]
-    for name in ('separation', 'volume', 'point', 'normal', 'colliding'):
-        assert np.array_equal(getattr(read.contacts, name), getattr(answer.contacts, name),
-                              equal_nan=True)
+    assert_same_bits(read.contacts, answer.contacts, 'separation', 'volume', 'point', 'normal',
+                     'colliding')
     for c in contacts[:touching]:
         point, normal = (aligned(header) + vector.tobytes() for vector in (c.point, c.normal))
         assert deserialize_message(point, PointStamped) == make_point(typed_header, c)
@@ -247,9 +248,7 @@ def test_what_a_client_reads_is_the_contact_again():
             read_contacts(ContactWriter(scene).contacts(header_bytes(0, 'map'), answer)), scene)
         assert np.array_equal(read.stale, answer.stale)
         assert np.array_equal(read.pairs, answer.pairs)
-        for name in ('colliding', 'separation', 'volume', 'point', 'normal', 'covariance'):
-            assert np.array_equal(getattr(read.contacts, name), getattr(answer.contacts, name),
-                                  equal_nan=True)
+        assert_same_bits(read.contacts, answer.contacts, *TOLD)
     message = make_contacts(make_header(0, 'map'), [(Pair('p', 'a', 'b'), overlap)])
     with pytest.raises(MessageError, match="'p' is no pair of the scene"):
         read_answer(read_contacts(serialize_message(message)), scene)
