@@ -18,7 +18,7 @@ from pathlib import Path
 import hostile_calls
 import numpy as np
 import pytest
-from test_library import LIBRARY, Query, Results, Rows, run, tool
+from test_library import EACH_FUNCTION_ONCE, LIBRARY, Query, Results, Rows, run, tool
 
 from box_contact_ros.core import instruction_sets, native
 
@@ -46,11 +46,11 @@ def test_with_sanitizers(tmp_path: Path) -> None:
     """No access out of bounds and no undefined behaviour in the library and its binding."""
     extension, kernel = tmp_path / Path(native.__file__).name, tmp_path / 'kernel.o'
     compiler = (
-        tool('g++'), '-std=c++17', '-Og', '-g1', '-w', '-fPIC', '-fvisibility=hidden',
+        tool('g++'), '-std=c++17', '-g1', '-w', '-Wno-psabi', '-fPIC', '-fvisibility=hidden',
         # Null pointers and ends of objects are the address sanitizer's too; twice takes long.
         '-fsanitize=address,undefined,float-cast-overflow', '-fno-sanitize-recover=all',
         '-fno-sanitize=null,object-size,pointer-overflow',
-        '-DBOX_CONTACT_VERSION=""', '-ffp-contract=off', '-fno-tree-slp-vectorize')
+        '-DBOX_CONTACT_VERSION=""', '-ffp-contract=off', EACH_FUNCTION_ONCE)
     # The kernel has no virtual function, and its arrays are those that the library has taken.
     run(*compiler, '-fno-sanitize=alignment,vptr', '-c', CORE / 'src/kernel.cpp', '-o', kernel)
     run(*compiler, '-shared', f'-I{sysconfig.get_path("include")}', f'-I{np.get_include()}', kernel,

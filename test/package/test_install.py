@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from test_library import EXAMPLE, EXAMPLE_SAYS, PREFIX, configure, example, tool
+from test_library import EACH_FUNCTION_ONCE, EXAMPLE, EXAMPLE_SAYS, PREFIX, configure, example, tool
 
 from box_contact_ros.core import instruction_sets
 
@@ -65,7 +65,7 @@ add_executable(first_contact "{EXAMPLE}/first_contact.cpp")
 target_link_libraries(first_contact PRIVATE box_contact_ros::box_contact)
 """
 COMPILER = f"""#!/bin/sh
-# Compile each object once, hardly optimised: all builds below have the same sources and flags.
+# Compile each object once, without optimisation: all builds below have the same sources and flags.
 # CMake's folder of the target and the name of the source tell objects apart.
 for word; do
     if [ "$before" = -o ]; then output=$word; fi
@@ -74,9 +74,9 @@ done
 kept=$(dirname "$0")/$(echo "${{output##*CMakeFiles/}}" | tr / -)
 case $output in
     *.dir/*) [ -e "$kept" ] && exec cp "$kept" "$output" ;;
-    *) exec {os.environ.get('CXX', 'g++')} "$@" -Og ;;
+    *) exec {os.environ.get('CXX', 'g++')} "$@" -O0 ;;
 esac
-{os.environ.get('CXX', 'g++')} "$@" -Og -fno-inline && cp "$output" "$kept"
+{os.environ.get('CXX', 'g++')} "$@" -O0 -w {EACH_FUNCTION_ONCE} && cp "$output" "$kept"
 """
 USER = """
 from box_contact_ros import ContactSolver
@@ -169,7 +169,7 @@ def test_a_wheel_answers_with_files_of_its_own(installed: Installation) -> None:
 def test_kernels_share_no_symbol(installed: Installation) -> None:
     """The linker keeps one of two equal names, and a machine could run another set's code.
 
-    By -fno-inline, functions that are inlined otherwise are symbols.
+    Without optimisation, functions that are inlined otherwise are symbols.
     """
     if platform.machine() not in ('x86_64', 'AMD64') or not shutil.which('nm'):
         pytest.skip('nm is not installed, or the machine has one instruction set')
