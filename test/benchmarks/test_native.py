@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_library import EACH_FUNCTION_ONCE
 
 from benchmarks import native, settled
 from benchmarks.contestant import MLP_SIZES
@@ -28,9 +29,14 @@ def containers() -> Pairs:
 
 @pytest.fixture(scope='module')
 def program(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
+    """Return the program and what it lacks; networks are compiled for answers, not for speed."""
     pytest.importorskip('mujoco')
     sets = [name for name in instruction_sets() if name != 'baseline']
-    return native.compiled(tmp_path_factory.mktemp('native'), sets)
+    flags_of = native.library_flags
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(native, 'library_flags', lambda name: [
+            *flags_of(name), '-O0', EACH_FUNCTION_ONCE])
+        return native.compiled(tmp_path_factory.mktemp('native'), sets)
 
 
 @needs_compiler

@@ -15,12 +15,14 @@ from pathlib import Path
 import numpy as np
 import poses
 import pytest
+from test_library import EACH_FUNCTION_ONCE
 
 from box_contact_ros import Body, ContactSolver, PatchForces
 from box_contact_ros.scene.forces import GRAVITY
 
 CORE = Path(__file__).resolve().parents[2] / 'box_contact_ros' / 'core'
-FLAGS = ('-std=c++17', '-O2', '-ffp-contract=off', '-Wno-psabi', '-DBOX_CONTACT_VERSION=""')
+FLAGS = ('-std=c++17', '-O2', '-ffp-contract=off', '-Wno-psabi', '-DBOX_CONTACT_VERSION=""',
+         EACH_FUNCTION_ONCE)
 BUILDS: dict[str, tuple[str, tuple[str, ...]]] = {
     'clang++': ('clang++', ()),
     'arm': ('aarch64-linux-gnu-g++', ('qemu-aarch64', '-L', '/usr/aarch64-linux-gnu'))}
