@@ -15,6 +15,7 @@ from contextlib import closing
 import numpy as np
 import poses
 import pytest
+from patience import PATIENCE
 from raw_client import APART, ORIGIN, TOUCHING
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -173,9 +174,20 @@ def long_topics(folder):
     return path
 
 
-def test_a_bad_start_is_one_clear_line(program, tmp_path):
+STARTS = """
+import json, sys
+from box_contact_ros.node.contact_node import main
+for arguments in json.loads(sys.argv[1]):
+    try:
+        print('status', main(arguments), flush=True)
+    except SystemExit as error:
+        print('status', error.code, flush=True)
+"""
+
+
+def test_a_bad_start_is_one_clear_line(tmp_path):
     """And status 1."""
-    started = [(program('contact_node', *arguments(**CUBES | values)), words) for values, words in (
+    values, words = zip(
         ({'size_a': '[0.0, 2.0, 2.0]'}, 'size_a (0, 2, 2) is not positive'),
         ({'model': 'nothing'}, "model 'nothing' is not one of"),
         ({'model': 'paper', 'size_a': '[1.0, 2.0, 3.0]', 'size_b': '[1.0, 2.0, 3.0]'},
@@ -184,12 +196,16 @@ def test_a_bad_start_is_one_clear_line(program, tmp_path):
         ({'scene': str(long_topics(tmp_path)), 'size_a': SIZE, 'size_b': SIZE},
          "/contact/point': failed to resolve name: topic length should not exceed"),
         ({'qos_overrides./box_a/pose.subscription.depth': 'deep'}, "'deep' of type 'STRING'"),
-        ({'size_a': '{2.0'}, "Couldn't parse"))]
-    for running, words in started:
-        assert running.wait() == 1, running.output
-        last = running.output.splitlines()[-1]
-        assert last.startswith('error: ') and words in running.output
-        assert 'Traceback' not in running.output
+        ({'size_a': '{2.0'}, "Couldn't parse"))
+    starts = [arguments(**CUBES | given) for given in values]
+    done = subprocess.run(
+        [sys.executable, '-c', STARTS, json.dumps(starts)],
+        text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=PATIENCE)
+    assert 'Traceback' not in done.stdout and done.returncode == 0, done.stdout
+    *outputs, end = done.stdout.split('status 1\n')
+    assert not end and len(outputs) == len(words), done.stdout
+    for output, expected in zip(outputs, words):
+        assert output.splitlines()[-1].startswith('error: ') and expected in output
 
 
 def test_a_node_that_does_not_start_is_destroyed_before_its_context():
@@ -205,9 +221,9 @@ print(run(Node, None, ['--ros-args', '-p', 'size_a:=[0.0, 1.0, 1.0]']))
     assert done.stdout.split('\n') == ['destroyed True', '1', ''], done.stderr
 
 
-@pytest.mark.parametrize('pauses', [
-    (), (0.0,), (0.02,), (0.12,)], ids=str)
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(('number', 'pauses'), [
+    (signal.SIGINT, ()), (signal.SIGTERM, ()), (signal.SIGINT, (0.0,)), (signal.SIGTERM, (0.02,)),
+    (signal.SIGINT, (0.12,))], ids=str)
 def test_ends_cleanly(program, number, pauses):
     """Also under a second signal, at once or while the node leaves the network."""
     running = program('contact_node', *arguments(**CUBES))

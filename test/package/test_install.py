@@ -228,17 +228,16 @@ def test_the_programs_are_in_bin(installed: Installation, setup_arguments: dict[
                           cwd=installed.folder)
 
 
-@pytest.mark.parametrize('editable', [True, False])
-def test_a_type_checker_finds_the_types(installed: Installation, tmp_path: Path, editable: bool,
-                                        ) -> None:
+def test_a_type_checker_finds_the_types(installed: Installation, tmp_path: Path) -> None:
     """Let mypy say that a separation is a float, also where this checkout is installed with -e."""
     pytest.importorskip('mypy')
-    python = Path(sys.executable) if editable else installed.bin / 'python'
     (tmp_path / 'user.py').write_text(USER)
-    done = subprocess.run([sys.executable, '-m', 'mypy', '--strict', '--python-executable', python,
-                           'user.py'], cwd=tmp_path, env=CLEAN, capture_output=True, text=True)
-    assert done.stdout.endswith('Found 1 error in 1 file (checked 1 source file)\n'), done.stdout
-    assert 'expression has type "float", variable has type "str"' in done.stdout
+    for python in (Path(sys.executable), installed.bin / 'python'):  # NumPy is read once
+        done = subprocess.run(
+            [sys.executable, '-m', 'mypy', '--strict', '--python-executable', python, 'user.py'],
+            cwd=tmp_path, env=CLEAN, capture_output=True, text=True)
+        assert 'Found 1 error in 1 file (checked 1 source file)' in done.stdout, done.stdout
+        assert 'expression has type "float", variable has type "str"' in done.stdout
 
 
 def test_the_source_distribution_is_the_checkout(tmp_path: Path) -> None:
