@@ -98,7 +98,7 @@ def test_planted_faults_show_up(program):
     with running_node(FaultyRelay) as (relay, executor):
         remaps = ' '.join(f'-r bench/contact/{topic}:=relayed/{topic}'
                           for topic in ('contact/point', 'contact/normal', 'contacts'))
-        running = bench(program, '--rate 100 --duration 9 --model exact',
+        running = bench(program, '--rate 100 --duration 4 --model exact',
                         f'--ros-args {remaps}')
         while running.process.poll() is None:
             spin_for(relay, executor, 0.2)

@@ -32,6 +32,8 @@ WELL_AIMED = PlannedLanding(name='grid: well aimed', overhang=(0.1, 0.0), scenar
     rope_angle=0.5, rope_heading=0.0, pitch=0.5, roll=0.0, yaw=0.0))
 HANGING_OVER = 17
 """Tilt of 3°, 0.6 m of overhang: the patch is about to lift off on one side."""
+CHOSEN = [ADDED[1], ADDED[6], ADDED[9], ADDED[-1]]
+"""Mass off the middle, the lightest load, four castings, and a load that falls."""
 
 
 def test_the_grid_covers_what_is_asked_for():
@@ -68,7 +70,7 @@ def test_the_hardest_of_the_grid_are_within_the_limits_of_held_patches(number, r
     assert result.point_step < 1e-7
 
 
-@pytest.mark.parametrize('planned', ADDED[1::2], ids=[planned.name for planned in ADDED[1::2]])
+@pytest.mark.parametrize('planned', CHOSEN, ids=[planned.name for planned in CHOSEN])
 def test_other_loads_and_stacks_do_what_is_expected(planned):
     """One law, whose constants know the load's mass and inertia and no size.
 

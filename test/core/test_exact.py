@@ -3,7 +3,7 @@
 
 """Model `exact` against the 60-digit oracle.
 
-10,000 random and near-parallel pairs, and 5,000 of slivers, rods, sides flush to some ulps, edges
+5,000 random and near-parallel pairs, and 2,500 of slivers, rods, sides flush to some ulps, edges
 in sides, and plates of one thickness.
 """
 from __future__ import annotations
@@ -23,7 +23,7 @@ FAMILIES = {'random': poses.random_pairs, 'near-parallel': poses.near_parallel_p
 THIN = {'ridges': poses.ridges, 'cards': poses.cards, 'flush': poses.flush_pairs,
         'sharing an axis': poses.sharing_an_axis, 'equal thickness': poses.equal_thickness}
 
-CHUNKS = [0, 1, *(pytest.param(chunk, marks=pytest.mark.slow) for chunk in range(2, 10))]
+CHUNKS = [0, 1, *(pytest.param(chunk, marks=pytest.mark.slow) for chunk in range(2, 5))]
 
 # Rows of 200,000 ridges.
 SLIVERS = [3650, 16297, 79049, 85246, 85698, 105096, 105366, 110647, 158096, 158626]
@@ -41,14 +41,13 @@ def test_agrees_with_the_oracle(family, chunk):
     assert 0.2 < colliding.mean() < 0.9  # both verdicts are really tested
 
 
-@pytest.mark.parametrize('chunk', [0, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize('family', THIN)
-def test_thin_overlaps(family, chunk):
+def test_thin_overlaps(family):
     """Overlaps a millionth as thick as long, cut off obliquely; sides in one plane but for ulps.
 
     And edges exactly in sides, where sums over edges go wrong: docs/explanation/contact_point.md.
     """
-    colliding = check(family, chunk, *THIN[family](np.random.default_rng([2027, chunk]), CHUNK))
+    colliding = check(family, 0, *THIN[family](np.random.default_rng([2027, 0]), CHUNK))
     assert colliding.mean() > 0.4
 
 

@@ -114,7 +114,7 @@ def crane_series(name: str) -> Series:
         scenario.stack_size, (n, 1)), np.tile(scenario.size, (n, 1))), 1, {})
 
 
-APPROACHES, FRAMES = 150, 401
+APPROACHES, FRAMES = 60, 401
 TURN = 0.5
 """Largest angle [rad] by which a box turns in an approach."""
 
@@ -209,7 +209,7 @@ def test_the_point_keeps_to_its_slope(series):
 
 # --- where the point may step, and where not ------------------------------------------------------
 
-N = 200_000
+N = 50_000
 SHALLOWEST, DEEPEST = 1e-6, 0.1
 """Depths, of the shortest edge: well above DEPTH_FLOOR, and to the end of the trained range."""
 SHORTEST_STEP, LONGEST_STEP = 1e-7, 1e-3
