@@ -37,10 +37,10 @@ def contact_node(program):
 
 def test_it_lands(program, contact_node):
     """In lockstep: with the figures of a landing without ROS, and every stage was told."""
-    crane = program('crane', *arguments(lockstep=True))
+    crane = program('crane', *arguments(lockstep=True, rate=100))
     assert crane.wait() == 0, crane.output
     assert 'PASS: the load is at rest, settled ' in crane.output
-    assert str(landed(CraneScenario(), latency=0.0)) in crane.output
+    assert str(landed(CraneScenario(), rate_hz=100.0, latency=0.0)) in crane.output
     assert ' contacts, none lost; latency p50 ' in crane.output
     assert 'not met' not in crane.output
     corners = re.search('corner loads  (.*) kN', crane.output)[1].split()
