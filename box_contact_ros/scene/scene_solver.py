@@ -57,8 +57,8 @@ class Answer(NamedTuple):
 class SceneSolver:
     """Contacts of all pairs of a scene, one tick at a time.
 
-    Raises ValueError for a model that does not go with the sizes. Keeps the last order of the
-    boxes: use one per thread.
+    Raises ValueError for a model that does not go with the sizes. Remembers which boxes are near
+    each other: use one per thread.
     """
 
     def __init__(self, scene: Scene, *, model: str | Model = 'exact',

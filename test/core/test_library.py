@@ -167,6 +167,13 @@ def test_other_languages_get_the_bits_of_python(library: ctypes.CDLL, model: str
     assert_same_bits(found, wanted[places[:, 0]])
 
 
+def test_a_broad_phase_allocates_no_memory_after_the_first_calls(tmp_path: Path) -> None:
+    program = tmp_path / 'broad_phase_test'
+    source = ROOT / 'test/core/broad_phase_test.cpp'
+    run(tool('g++'), '-std=c++17', '-O2', *STRICT, INCLUDES, source, *LINKED, '-o', program)
+    assert run(program).endswith(' 0 failures\n')
+
+
 @pytest.mark.parametrize('source', ['force_test.c', 'force_test.cpp'])
 def test_forces_have_the_bits_of_python(tmp_path: Path, source: str) -> None:
     """A load that is dropped and pushed: 2,000 steps in C, in C++ and here."""

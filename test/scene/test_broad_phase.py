@@ -70,10 +70,11 @@ def made(rng, kind, n, upright=False):
     return size, np.hstack((place, turn))
 
 
-def broad_phase(size, fixed=None, *, margin=0.0, listed=NONE, allowed=ALL, bodies=None):
+def broad_phase(size, fixed=None, *, margin=0.0, listed=NONE, groups=None, allowed=ALL,
+                bodies=None):
     n = len(size)
     return native.BroadPhase(size, np.zeros(n, bool) if fixed is None else fixed, margin, listed,
-                             np.zeros(n, np.int32), allowed,
+                             np.zeros(n, np.int32) if groups is None else groups, allowed,
                              np.full(n, -1, np.int32) if bodies is None else bodies)
 
 
@@ -128,6 +129,53 @@ def test_what_is_found_depends_on_the_poses_alone(kind):
         rows = np.where(rng.random((120, 1)) < 0.1, np.nan, pose) if tick % 2 else pose
         for one, other in zip(used.find(rows, PLENTY), broad_phase(size).find(rows, PLENTY)):
             assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize('share', [0.03, 0.4])
+def test_few_boxes_move_at_a_time(kind, share):
+    """Any distance, among others at rest and fixed ones; some leave and come back."""
+    rng = np.random.default_rng(11)
+    n = 150
+    size, pose = made(rng, kind, n)
+    fixed, gone = rng.random(n) < 0.3, np.zeros(n, bool)
+    bodies = rng.integers(-1, 40, n).astype(np.int32)
+    of_other = (bodies != bodies[:, None]) | (bodies < 0)
+    asked = {'fixed': fixed, 'bodies': bodies, 'groups': rng.integers(0, 3, n).astype(np.int32),
+             'allowed': rng.integers(0, 3, (3, 3)).astype(np.uint8),
+             'listed': np.argwhere(np.triu((rng.random((n, n)) < 0.01) & of_other, 1))}
+    used = broad_phase(size, **asked)
+    for _ in range(40):
+        moved = ~fixed & (rng.random(n) < share)
+        step = size.min(axis=1) * 10.0**rng.uniform(-3, 2, n)
+        pose[moved, :3] += (step[:, None] * rng.normal(size=(n, 3)))[moved]
+        gone ^= ~fixed & (rng.random(n) < 0.02)
+        rows = np.where(gone[:, None], np.nan, pose)
+        fresh = broad_phase(size, **asked)
+        for one, other in zip(used.find(rows, PLENTY), fresh.find(rows, PLENTY)):
+            assert np.array_equal(one, other)
+
+
+def test_a_search_that_ended_early_or_was_refused_leaves_nothing_out():
+    rng = np.random.default_rng(12)
+    size, pose = made(rng, scattered, 90)
+    fixed = np.arange(90) < 20
+    late = np.where((np.arange(90) < 5)[:, None], np.nan, pose)  # fixed boxes that come later
+    bad = np.where((np.arange(90) == 70)[:, None], np.inf, pose)
+    used = broad_phase(size, fixed)
+    for rows, most in ((bad, PLENTY), (late, 7), (late, PLENTY), (pose, 7), (bad, PLENTY),
+                       (pose, PLENTY), (pose - 1e-3, PLENTY)):
+        pairs, stale, refused = used.find(rows, most)
+        if rows is bad:
+            assert refused == 70 and not len(pairs)
+            continue
+        rows = np.where(fixed[:, None] & ~np.isnan(rows), pose, rows)  # read once
+        every, gone, _ = broad_phase(size, fixed).find(rows, PLENTY)
+        assert refused == -1 and np.array_equal(stale, gone) and len(every) > 50
+        if most == PLENTY:
+            assert np.array_equal(pairs, every)
+        else:
+            assert len(pairs) == 8 and set(map(tuple, pairs)) <= set(map(tuple, every))
 
 
 @pytest.mark.parametrize('kind', [scattered, one_place, grid])
@@ -273,7 +321,7 @@ def test_the_pairs_of_a_scene(patterns, listed):
         assert met == ({name} if any(boxes[other].pose for other in others) else others)
 
 
-def test_bad_poses_are_refused_in_a_sweep():
+def test_bad_poses_are_refused_among_many():
     names = [f'm{number}' for number in range(90)]
     scene = Scene({name: Box((1.0, 1.0, 1.0)) for name in names}, patterns=EVERY_PAIR,
                   pose_array=True)

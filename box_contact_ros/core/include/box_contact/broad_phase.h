@@ -1,7 +1,7 @@
 /* Copyright 2026 The box_contact_ros maintainers
  * SPDX-License-Identifier: Apache-2.0 */
 
-/* Which pairs of many boxes may touch, for `bc_rows.pairs`: sweep and prune of bounding boxes.
+/* Which pairs of many boxes may touch, for `bc_rows.pairs`: those whose bounding boxes overlap.
  *
  *   bc_boxes boxes = {sizeof(bc_boxes), 10000, sizes};
  *   bc_broad_phase* broad_phase;
@@ -12,9 +12,10 @@
  *                   near.pairs};
  *   bc_broad_phase_destroy(broad_phase);
  *
- * No pair that touches is left out. One thread at a time may use a broad phase. A call begins with
- * the order of the last one, so boxes that move little cost least. What is found depends on the
- * poses alone. Memory is taken for boxes and for pairs that are near, and kept. */
+ * No pair that touches is left out. One thread at a time may use a broad phase. A call searches for
+ * the partners of boxes that have moved by a twentieth of their shortest extent, or more. It knows
+ * those of the other boxes from earlier calls. What is found depends on the poses alone. Memory is
+ * taken for boxes and for pairs that are near, and kept. */
 #ifndef BOX_CONTACT_BROAD_PHASE_H
 #define BOX_CONTACT_BROAD_PHASE_H
 

@@ -132,10 +132,10 @@ bc_status bc_broad_phase_find(bc_broad_phase* broad_phase, const bc_pose* poses,
     const auto* numbers = reinterpret_cast<const double*>(poses);
     int64_t refused = self.find(numbers, most);
     *near = {sizeof(bc_near),
-             self.pairs().data(),
-             int64_t(self.pairs().size() / 2),
-             self.stale().data(),
-             int64_t(self.stale().size() / 2),
+             reinterpret_cast<const int64_t*>(self.pairs().data()),
+             int64_t(self.pairs().size()),
+             reinterpret_cast<const int64_t*>(self.stale().data()),
+             int64_t(self.stale().size()),
              refused};
     if (refused < 0) return BC_OK;
     char field[32];

@@ -1,0 +1,194 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// Axis-aligned bounding boxes, and a tree to search many of them.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "poses.hpp"
+
+namespace box_contact::detail {
+
+// Bounds grow on all sides by this share of the box's largest coordinate or extent. Boxes touch up
+// to a separation of 8 ulp. The largest gap on the SAT axes is at least 1/√3 of the distance, so 14
+// ulp; the rest is for the rounding of separation and bounds.
+constexpr double widening = 64.0 * 0x1p-52;
+
+// An axis-aligned bounding box, common frame [m]: its low corner, and its high corner negated. All
+// six numbers of the bounds around several are then minima.
+struct Bounds {
+  double ends[6];
+
+  bool is_nowhere() const { return ends[0] == infinity; }
+  bool overlaps(const Bounds& other) const {
+    double gap = ends[0] + other.ends[3];
+    for (int k = 1; k < 6; ++k) gap = std::max(gap, ends[k] + other.ends[(k + 3) % 6]);
+    return gap <= 0.0;
+  }
+  bool is_within(const Bounds& other) const {
+    double least = ends[0] - other.ends[0];
+    for (int k = 1; k < 6; ++k) least = std::min(least, ends[k] - other.ends[k]);
+    return least >= 0.0;
+  }
+  Bounds grown(double length) const {
+    Bounds larger;
+    for (int k = 0; k < 6; ++k) larger.ends[k] = ends[k] - length;
+    return larger;
+  }
+};
+constexpr Bounds nowhere{{infinity, infinity, infinity, infinity, infinity, infinity}};
+
+inline Bounds bounds_of(const Pose<double>& pose, const Vec<double>& half) {
+  Mat<double> axes = rotation_matrix(pose.quaternion);
+  double reach[3], largest = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    reach[k] = dot(abs(row(axes, k)), half);
+    largest = std::max(largest, std::fabs(pose.position[k]) + 2.0 * reach[k]);
+  }
+  Bounds bounds;
+  for (int k = 0; k < 3; ++k) {
+    bounds.ends[k] = pose.position[k] - reach[k] - widening * largest;
+    bounds.ends[k + 3] = -pose.position[k] - reach[k] - widening * largest;
+  }
+  return bounds;
+}
+
+// Eight boxes that are near each other share a block. Eight blocks share a block of the next level,
+// up to the root. A search tests the eight bounds of a block at once.
+class BoundsTree {
+ public:
+  // The boxes, by their places in the tree.
+  const std::vector<int32_t>& order() const { return order_; }
+
+  // Whether searches since the tree was built have visited so many blocks that building it anew
+  // costs less. The order of boxes that moved far tells little.
+  bool is_worn() const { return visits_ > 4 * size_t(levels_) * order_.size(); }
+
+  void build(const std::vector<int32_t>& boxes, const std::vector<Bounds>& bounds) {
+    corners_.clear();
+    for (int32_t box : boxes) {
+      const double* low = bounds[size_t(box)].ends;
+      corners_.push_back({{low[0], low[1], low[2]}, box});
+    }
+    halve(corners_.data(), corners_.data() + corners_.size());
+    order_.clear();
+    for (const Corner& corner : corners_) order_.push_back(corner.box);
+    levels_ = 0;
+    size_t blocks = 0;
+    for (size_t count = order_.size(); count > size_t(levels_ > 0); ++levels_) {
+      starts_[levels_] = blocks;
+      count = (count + width - 1) / width;
+      blocks += count;
+    }
+    blocks_.assign(blocks, Block());
+    visits_ = 0;
+    refit(bounds);
+  }
+
+  // Take other bounds of the same boxes.
+  void refit(const std::vector<Bounds>& bounds) {
+    for (size_t place = 0; place < order_.size(); ++place)
+      blocks_[place / width].set(place % width, bounds[size_t(order_[place])]);
+    for (int level = 1; level < levels_; ++level)
+      for (size_t below = starts_[level - 1]; below < starts_[level]; ++below) {
+        size_t place = below - starts_[level - 1];
+        blocks_[starts_[level] + place / width].set(place % width, blocks_[below].around());
+      }
+  }
+
+  // Call `visit` with each box from place `first` on whose bounds overlap, until it returns false.
+  // Returns whether it never did.
+  template <class Visit>
+  bool each_near(const Bounds& bounds, size_t first, Visit visit) {
+    return levels_ == 0 || each_below(levels_ - 1, 0, bounds, first, visit);
+  }
+
+ private:
+  static constexpr size_t width = 8;
+  static constexpr int width_bits = 3;
+
+  struct Block {
+    double ends[6][width];
+
+    Block() {
+      for (auto& end : ends) std::fill_n(end, width, infinity);
+    }
+    void set(size_t place, const Bounds& bounds) {
+      for (int k = 0; k < 6; ++k) ends[k][place] = bounds.ends[k];
+    }
+    Bounds around() const {
+      Bounds bounds;
+      for (int k = 0; k < 6; ++k) bounds.ends[k] = *std::min_element(ends[k], ends[k] + width);
+      return bounds;
+    }
+    // A bit for each of the bounds that overlap.
+    unsigned overlapping(const Bounds& bounds) const {
+      using Two = Lanes<double, 2>;
+      unsigned found = 0;
+      for (size_t place = 0; place < width; place += 2) {
+        Two gap = splat<Two>(-infinity);
+        for (int k = 0; k < 6; ++k) {
+          Two end;
+          std::memcpy(&end, &ends[k][place], sizeof end);
+          gap = max(end + splat<Two>(bounds.ends[(k + 3) % 6]), gap);
+        }
+        found |= bits(gap <= 0.0) << place;
+      }
+      return found;
+    }
+  };
+  struct Corner {
+    double low[3];
+    int32_t box;
+  };
+
+  template <class Visit>
+  bool each_below(int level, size_t block, const Bounds& bounds, size_t first, Visit& visit) {
+    ++visits_;
+    unsigned near = blocks_[starts_[level] + block].overlapping(bounds);
+    size_t begin = width * block, first_here = first >> (width_bits * level);
+    if (first_here > begin) near &= ~0U << (first_here - begin);
+    for (; near; near &= near - 1) {
+      size_t place = begin + size_t(__builtin_ctz(near));
+      if (level ? !each_below(level - 1, place, bounds, first, visit) : !visit(order_[place]))
+        return false;
+    }
+    return true;
+  }
+
+  // Order boxes: halve them along the axis on which they are spread most, and so on.
+  static void halve(Corner* begin, Corner* end) {
+    while (end - begin > long(width)) {
+      long half = width;  // times a power of two: all blocks of a level but the last are full
+      while (2 * half < end - begin) half *= 2;
+      int axis = 0;
+      double largest = -1.0;
+      for (int k = 0; k < 3; ++k) {
+        double least = begin->low[k], most = least;
+        for (const Corner* corner = begin; corner < end; ++corner) {
+          least = std::min(least, corner->low[k]);
+          most = std::max(most, corner->low[k]);
+        }
+        if (most - least > largest) largest = most - least, axis = k;
+      }
+      std::nth_element(begin, begin + half, end, [axis](const Corner& a, const Corner& b) {
+        return a.low[axis] < b.low[axis];
+      });
+      halve(begin, begin + half);
+      begin += half;
+    }
+  }
+
+  std::vector<int32_t> order_;
+  std::vector<Block> blocks_;  // those of boxes, then level by level up to the root
+  size_t starts_[11] = {};     // of each level; 8¹¹ exceeds the number of boxes
+  int levels_ = 0;
+  size_t visits_ = 0;
+  std::vector<Corner> corners_;
+};
+
+}  // namespace box_contact::detail

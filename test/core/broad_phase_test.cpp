@@ -1,0 +1,50 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// After the first calls, finding pairs allocates no memory, while boxes rest and while they move.
+#include "box_contact/broad_phase.h"
+
+#include <cstdio>
+#include <cstdlib>
+#include <new>
+#include <vector>
+
+static long allocations = 0;
+
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+
+int main() {
+  const int columns = 12, count = columns * columns * columns;
+  std::vector<bc_size> sizes(count, {{1.0, 1.0, 1.0}});
+  std::vector<bc_pose> poses(count);
+  bc_boxes boxes{};
+  boxes.size = sizeof boxes, boxes.count = count, boxes.sizes = sizes.data();
+  bc_broad_phase* phase;
+  bc_near near{};
+  near.size = sizeof near;
+  int failures = bc_broad_phase_create(&boxes, &phase);
+  long before = 0;
+  for (int tick = 0; tick < 400; ++tick) {
+    if (tick == 200) before = allocations;
+    // Boxes pass each other along x. In every tenth tick, all of them are a metre away.
+    for (int k = 0; k < count; ++k) {
+      double place[] = {double(k % columns), double(k / columns % columns),
+                        double(k / columns / columns)};
+      place[tick / 10 % 3] += tick % 10 == 0;
+      place[0] += 0.003 * (tick % 100) * (k % 7);
+      poses[k] = {{place[0], place[1], place[2]}, {0.0, 0.0, 0.0, 1.0}};
+    }
+    failures += bc_broad_phase_find(phase, poses.data(), INT64_MAX, &near) != BC_OK;
+    failures += near.count < count;
+  }
+  failures += allocations == 0 || allocations != before;
+  bc_broad_phase_destroy(phase);
+  std::printf("%lld pairs, %d failures\n", (long long)near.count, failures);
+  return failures != 0;
+}
