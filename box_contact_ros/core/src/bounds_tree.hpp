@@ -57,8 +57,8 @@ inline Bounds bounds_of(const Pose<double>& pose, const Vec<double>& half) {
   return bounds;
 }
 
-// Eight boxes that are near each other share a block. Eight blocks share a block of the next level,
-// up to the root. A search tests the eight bounds of a block at once.
+// Sixteen boxes that are near each other share a block. Sixteen blocks share a block of the next
+// level, up to the root. A search tests all bounds of a block at once.
 class BoundsTree {
  public:
   // The boxes, by their places in the tree.
@@ -69,14 +69,8 @@ class BoundsTree {
   bool is_worn() const { return visits_ > 4 * size_t(levels_) * order_.size(); }
 
   void build(const std::vector<int32_t>& boxes, const std::vector<Bounds>& bounds) {
-    corners_.clear();
-    for (int32_t box : boxes) {
-      const double* low = bounds[size_t(box)].ends;
-      corners_.push_back({{low[0], low[1], low[2]}, box});
-    }
-    halve(corners_.data(), corners_.data() + corners_.size());
-    order_.clear();
-    for (const Corner& corner : corners_) order_.push_back(corner.box);
+    order_ = boxes;
+    halve(order_.data(), order_.data() + order_.size(), bounds);
     levels_ = 0;
     size_t blocks = 0;
     for (size_t count = order_.size(); count > size_t(levels_ > 0); ++levels_) {
@@ -108,8 +102,8 @@ class BoundsTree {
   }
 
  private:
-  static constexpr size_t width = 8;
-  static constexpr int width_bits = 3;
+  static constexpr size_t width = 16;
+  static constexpr int width_bits = 4;
 
   struct Block {
     double ends[6][width];
@@ -121,8 +115,9 @@ class BoundsTree {
       for (int k = 0; k < 6; ++k) ends[k][place] = bounds.ends[k];
     }
     Bounds around() const {
-      Bounds bounds;
-      for (int k = 0; k < 6; ++k) bounds.ends[k] = *std::min_element(ends[k], ends[k] + width);
+      Bounds bounds = nowhere;
+      for (int k = 0; k < 6; ++k)
+        for (double end : ends[k]) bounds.ends[k] = std::min(bounds.ends[k], end);
       return bounds;
     }
     // A bit for each of the bounds that overlap.
@@ -141,10 +136,6 @@ class BoundsTree {
       return found;
     }
   };
-  struct Corner {
-    double low[3];
-    int32_t box;
-  };
 
   template <class Visit>
   bool each_below(int level, size_t block, const Bounds& bounds, size_t first, Visit& visit) {
@@ -161,34 +152,32 @@ class BoundsTree {
   }
 
   // Order boxes: halve them along the axis on which they are spread most, and so on.
-  static void halve(Corner* begin, Corner* end) {
+  static void halve(int32_t* begin, int32_t* end, const std::vector<Bounds>& bounds) {
     while (end - begin > long(width)) {
       long half = width;  // times a power of two: all blocks of a level but the last are full
       while (2 * half < end - begin) half *= 2;
-      int axis = 0;
-      double largest = -1.0;
-      for (int k = 0; k < 3; ++k) {
-        double least = begin->low[k], most = least;
-        for (const Corner* corner = begin; corner < end; ++corner) {
-          least = std::min(least, corner->low[k]);
-          most = std::max(most, corner->low[k]);
+      double low[3] = {infinity, infinity, infinity}, high[3] = {-infinity, -infinity, -infinity};
+      for (const int32_t* box = begin; box < end; ++box)
+        for (int k = 0; k < 3; ++k) {
+          low[k] = std::min(low[k], bounds[size_t(*box)].ends[k]);
+          high[k] = std::max(high[k], bounds[size_t(*box)].ends[k]);
         }
-        if (most - least > largest) largest = most - least, axis = k;
-      }
-      std::nth_element(begin, begin + half, end, [axis](const Corner& a, const Corner& b) {
-        return a.low[axis] < b.low[axis];
+      int axis = 0;
+      for (int k = 1; k < 3; ++k)
+        if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
+      std::nth_element(begin, begin + half, end, [&](int32_t a, int32_t b) {
+        return bounds[size_t(a)].ends[axis] < bounds[size_t(b)].ends[axis];
       });
-      halve(begin, begin + half);
+      halve(begin, begin + half, bounds);
       begin += half;
     }
   }
 
   std::vector<int32_t> order_;
   std::vector<Block> blocks_;  // those of boxes, then level by level up to the root
-  size_t starts_[11] = {};     // of each level; 8¹¹ exceeds the number of boxes
+  size_t starts_[8] = {};      // of each level; 16⁸ exceeds the number of boxes
   int levels_ = 0;
   size_t visits_ = 0;
-  std::vector<Corner> corners_;
 };
 
 }  // namespace box_contact::detail

@@ -189,7 +189,7 @@ class BroadPhase {
   }
 
   void forget_kept() {
-    if (is_partial_) std::fill(is_changed_.begin(), is_changed_.end(), 0);
+    if (is_partial_) fat_.assign(count(), nowhere), is_changed_.assign(count(), 0);
     kept_.clear();
     changed_.clear();
     for (int32_t box : moving_tree_.order()) fat_[size_t(box)] = nowhere;
@@ -257,7 +257,10 @@ class BroadPhase {
     for (uint64_t pair : kept_) {
       size_t a = box_at(lower_bit, pair), b = box_at(higher_bit, pair);
       if (!bounds_[a].overlaps(bounds_[b])) continue;
-      if (pairs_.size() > most_) return;
+      if (pairs_.size() > most_) {
+        is_partial_ = true;  // so that kept pairs take no more memory
+        return;
+      }
       if (pair & 1) std::swap(a, b);
       pairs_.emplace_back(int64_t(a), int64_t(b));
     }
