@@ -554,7 +554,7 @@ def test_two_hundred_boxes_in_a_browser():
     rows = SceneRows(scene)
     contacts = {pair: solver(pose, boxes[pair.b].pose) for pair, pose in zip(pairs[:99], placed)}
     message = contacts_at(START, contacts, [pairs[99].label])
-    with closing(Page('127.0.0.1', 8450, rows)) as page, open_page(page.url) as tab:
+    with closing(Page('127.0.0.1', 8450, rows)) as page, open_page(page.url, 640, 360) as tab:
         known = np.where(np.isnan(rows.poses), np.r_[placed, placed], rows.poses)
         answer = read_touching(read(message), scene)
         bring(page, DrawnTick(rows, START, 'yard', known, answer, 1e-3))
