@@ -98,15 +98,14 @@ def from_c(choice: Choice, way: str, of_set: str) -> str:
 
 
 def by_mujoco(finds: str, of_set: str) -> str:
-    """Return a call's time of `exact` from C relative to MuJoCo's, and its range where known.
+    """Return a call's time of `exact` from C relative to MuJoCo's, and its range.
 
     finds: what the call finds beside the point, volume or covariance.
     """
     row = fastest(rows('native.csv', set=of_set, contestant=f'exact {finds}, single'))
     assert row
-    ends = [row[column] for column in ('by_unit_low', 'by_unit_high') if column in row]
-    return f'{float(row["by_unit"]):.2f}' + (
-        f' [{", ".join(f"{float(end):.2f}" for end in ends)}]' if ends else '')
+    ratio, low, high = (float(row[column]) for column in ('by_unit', 'by_unit_low', 'by_unit_high'))
+    return f'{ratio:.2f} [{low:.2f}, {high:.2f}]'
 
 
 def models() -> str:
