@@ -44,7 +44,7 @@ help:
 	echo 'make test-debian13  make demo, then make test, on a fresh Debian 13 (root)'
 	echo 'make dist     wheel and source distribution in dist/, both installed and tried'
 	echo 'make coverage lines of solver, scenes and nodes that their tests run'
-	echo 'make reports  every table and picture of docs, in 30 minutes; ARGS=--quick tries them out'
+	echo 'make reports  every table and picture of docs, in an hour; ARGS=--quick tries them out'
 	echo 'make docs     the documentation as HTML: build/docs/index.html'
 	echo 'make docs-links asks every link to another site'
 	echo 'make tables   write the figures of docs/results/ into README and docs'

@@ -5,19 +5,9 @@
 #include "box_contact/broad_phase.h"
 
 #include <cstdio>
-#include <cstdlib>
-#include <new>
 #include <vector>
 
-static long allocations = 0;
-
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+#include "allocations.hpp"
 
 int main() {
   const int columns = 12, count = columns * columns * columns;
