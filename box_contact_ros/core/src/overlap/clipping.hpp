@@ -10,7 +10,8 @@
 // faces, of integrals of the clamped height over the face's projection:
 //
 // 1. Corners of the incident box in (u, v, w). A face wholly outside contributes nothing.
-// 2. Each other face is clipped by the rectangle's four sides and by w ≤ 0 (Sutherland–Hodgman).
+// 2. Each other face is clipped by w ≤ 0 and by the rectangle's sides (Sutherland–Hodgman), two
+//    parallel ones at once.
 // 3. What comes out below the reference box counts with the height −thickness. It is cut triangle by
 //    triangle, because no part of a face may count twice.
 // 4. Signed integrals of w, u w, v w and w²/2 over the polygon, triangle by triangle.
@@ -59,40 +60,51 @@ struct FirstMoments {
   }
 };
 
-// A quadrilateral clipped by six planes has at most ten corners. Two more are written and not counted.
+// A quadrilateral clipped by three slabs has at most ten corners. One more is written and not counted. A
+// face along a side of a slab may wind about it by rounding, which leaves some more.
 struct Polygon {
   int count = 0;
-  Place3 corners[12];
+  Place3 corners[16];
 };
 
-// A half-space: sign · place[axis] ≤ limit.
-struct Bound {
+// What lies between two parallel planes: least ≤ place[axis] ≤ most.
+struct Slab {
   int axis;
-  double sign, limit;
-
-  double excess(const Place3& place) const { return sign * place[axis] - limit; }
+  double least, most;
 };
 
-// Keep what is within the bound. Without branches on the corners, which no processor predicts.
-inline void clip(const Polygon& from, const Bound& bound, Polygon& kept) {
+// Keep what is within the slab. Without branches on the corners, which no processor predicts.
+inline void clip(const Polygon& from, const Slab& slab, Polygon& kept) {
   static const Flags3 on_axis[3] = {{-1}, {0, -1}, {0, 0, -1, -1}};
-  Flags3 axis = on_axis[bound.axis];
-  Place3 plane = splat<Place3>(bound.sign * bound.limit);
+  Flags3 axis = on_axis[slab.axis];
   kept.count = 0;
   if (from.count == 0) return;
   Place3 before = from.corners[from.count - 1];
-  double excess_before = bound.excess(before);
+  double x_before = before[slab.axis];
+  bool below_before = x_before < slab.least;
+  bool above_before = x_before > slab.most;
+  int count = 0;
   for (int i = 0; i < from.count; ++i) {
-    Place3 here = from.corners[i];
-    double excess = bound.excess(here);
-    double share = excess_before / (excess_before - excess);
-    kept.corners[kept.count] = choose(axis, plane, before + share * (here - before));
-    kept.count += (excess > 0.0) != (excess_before > 0.0);
-    kept.corners[kept.count] = here;
-    kept.count += !(excess > 0.0);
-    before = here;
-    excess_before = excess;
+    Place3 here = from.corners[i], way = here - before;
+    double x = here[slab.axis], step = x - x_before;
+    bool below = x < slab.least;
+    bool above = x > slab.most;
+    bool rises = step > 0.0;
+    // The edge crosses one plane on its way in, and then the other on its way out.
+    bool at_least = below != below_before, at_most = above != above_before;
+    auto crossing = [&](double plane) {
+      return choose(axis, splat<Place3>(plane), before + ((plane - x_before) / step) * way);
+    };
+    kept.corners[count] = crossing(rises ? slab.least : slab.most);
+    count += rises ? at_least : at_most;
+    kept.corners[count] = crossing(rises ? slab.most : slab.least);
+    count += rises ? at_most : at_least;
+    kept.corners[count] = here;
+    count += !(below | above);
+    before = here, x_before = x;
+    below_before = below, above_before = above;
   }
+  kept.count = count;
 }
 
 // Call visit(twice the area, a, b, c) for the triangles of a polygon. The area is that of the projection
@@ -128,11 +140,11 @@ inline void lifted(const Polygon& polygon, double floor, Visit visit) {
     double low = min(min(a[2], b[2]), c[2]), high = max(max(a[2], b[2]), c[2]);
     // A triangle in the plane, to the last bit, is a part below it and none above.
     if (high > floor) {
-      clip(triangle, {2, -1.0, -floor}, part);
+      clip(triangle, {2, floor, infinity}, part);
       visit(part);
     }
     if (low < floor || !(high > floor)) {
-      clip(triangle, {2, 1.0, floor}, part);
+      clip(triangle, {2, -infinity, floor}, part);
       for (int k = 0; k < part.count; ++k) part.corners[k][2] = floor;
       visit(part);
     }
@@ -219,11 +231,7 @@ inline Found overlap_from(const Pair<double>& pair, int face, double& kept) {
     unsigned above = bits(corners[c] > most), below = bits(corners[c] < least);
     outside[c] = (above >> 2 & 1) | (above & 3) << 1 | (below & 3) << 3;
   }
-  const Bound bounds[5] = {{2, 1.0, 0.0},
-                           {0, 1.0, most[0]},
-                           {1, 1.0, most[1]},
-                           {0, -1.0, -least[0]},
-                           {1, -1.0, -least[1]}};
+  const Slab slabs[3] = {{2, -infinity, 0.0}, {0, least[0], most[0]}, {1, least[1], most[1]}};
 
   FirstMoments sum;
   double gross = 0.0;
@@ -240,15 +248,16 @@ inline Found overlap_from(const Pair<double>& pair, int face, double& kept) {
     double most_volume = (2.0 * pair.size) * (lowest * lowest) * flatness[j];
     if (6.0 * most_volume <= negligible_face * std::fabs(sum.volume)) continue;
     if (outside[f[0]] & outside[f[1]] & outside[f[2]] & outside[f[3]]) continue;
-    // 2. Clip by the planes that cut the face.
-    unsigned cut = outside[f[0]] | outside[f[1]] | outside[f[2]] | outside[f[3]];
+    // 2. Clip by the slabs that cut the face.
+    unsigned beyond = outside[f[0]] | outside[f[1]] | outside[f[2]] | outside[f[3]];
+    unsigned cut = (beyond & 7) | beyond >> 3 << 1;
     Polygon* polygon = &polygons[count];
     Polygon* other_polygon = &clipped;
     if (__builtin_popcount(cut) & 1) std::swap(polygon, other_polygon);  // the last one is kept
     polygon->count = 4;
     for (int k = 0; k < 4; ++k) polygon->corners[k] = corners[f[k]];
     for (; cut; cut &= cut - 1) {
-      clip(*polygon, bounds[__builtin_ctz(cut)], *other_polygon);
+      clip(*polygon, slabs[__builtin_ctz(cut)], *other_polygon);
       std::swap(polygon, other_polygon);
     }
     // 3. and 4. Integrate.
