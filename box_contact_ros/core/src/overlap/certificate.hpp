@@ -84,14 +84,17 @@ BC_INLINE Certificate<T> certificate(const Columns<T>& x_n, const Triple<T>& nor
 }
 
 // Move a point of P's frame into both boxes, by the nearest points of each in turn. Returns where
-// that succeeds.
+// that succeeds. Points that are in both already are left after one turn.
 template <class T>
 [[gnu::noinline]] Mask<T> move_inside(const PairOfBoxes<T>& boxes, Triple<T>& point, T size) {
   Triple<T> outside;
   for (int round = 0; round < 3; ++round) {
     point = clamp(point, boxes.p.half);
     Triple<T> in_q = boxes.rows * (point - boxes.offset);
-    point += boxes.columns * (clamp(in_q, boxes.q.half) - in_q);
+    Triple<T> way = clamp(in_q, boxes.q.half) - in_q;
+    outside = uniform(T{});
+    if (!any(all_of(way == outside) == 0)) break;
+    point += boxes.columns * way;
     outside = abs(point) - boxes.p.half;
   }
   return largest(outside) <= outside_by_rounding * size;
