@@ -20,8 +20,10 @@ PYTHON ?=
 export PYTHON
 
 # .venv is complete. Another environment's packages must not shine through, nor a ROS that was
-# installed with apt and sourced in this shell: its libraries do not go with the wheels'.
-unexport PYTHONHOME PYTHONPATH RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
+# installed with apt and sourced in this shell: its libraries do not go with the wheels'. Programs
+# start twice as fast where Python may keep their bytecode, which images for containers forbid.
+unexport PYTHONDONTWRITEBYTECODE PYTHONHOME PYTHONPATH RMW_IMPLEMENTATION
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 ifdef ROS_DISTRO
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH ROS_DISTRO
 endif
@@ -160,4 +162,4 @@ clean:
 	rm -rf build dist install log box_contact_ros.egg-info
 	find box_contact_ros -name '*.so' -delete
 	rm -rf .pytest_cache .ruff_cache .mypy_cache .hypothesis
-	find benchmarks box_contact_msgs box_contact_ros launch test training -name __pycache__ -type d -prune -exec rm -rf {} + || true
+	find benchmarks box_contact_msgs box_contact_ros docs launch test training -name __pycache__ -type d -prune -exec rm -rf {} + || true

@@ -137,3 +137,11 @@ def test_what_is_not_there_or_not_ours_is_named(clone: Path) -> None:
     assert refused.returncode == 1
     assert output.startswith('error: .venv exists, and make did not make it')
     assert (clone / '.venv' / 'mine').exists()
+
+
+@pytest.mark.parametrize('name', ['PYTHONDONTWRITEBYTECODE', 'PYTHONPATH', 'RMW_IMPLEMENTATION'])
+def test_settings_of_another_environment_stay_out(name: str) -> None:
+    """Programs of make would load other packages, or compile their own at each start."""
+    done = subprocess.run(['make', '-s', '--eval', 'shown: ; @env', 'shown'], cwd=ROOT, text=True,
+                          env={'PATH': '/usr/bin:/bin', name: 'foreign'}, capture_output=True)
+    assert 'PATH=' in done.stdout and 'foreign' not in done.stdout, done.stderr
