@@ -152,8 +152,12 @@ class Client:
         """Return the value of a key in a diagnostic that was sent after this call."""
         seen = len(self.diagnostics)
         assert self.spin(lambda: len(self.diagnostics) > seen + 1), 'no diagnostics'
-        values = {entry.key: entry.value for entry in self.diagnostics[-1].status[0].values}
-        return values.get(key, '')
+        return self.newest_diagnostic(key)
+
+    def newest_diagnostic(self, key: str) -> str:
+        """Return the value of a key in the last diagnostic that came, '' if there is none."""
+        entries = self.diagnostics[-1].status[0].values if self.diagnostics else ()
+        return {entry.key: entry.value for entry in entries}.get(key, '')
 
     def poll(self) -> None:
         """Serve what is there, without waiting."""
