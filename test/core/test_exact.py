@@ -246,6 +246,12 @@ def test_columns_whose_covariance_planes_had_wrong():
         check('column', 0, *(np.array([part]) for both in column for part in both))
 
 
+def test_pointed_overlaps_whose_covariance_planes_had_wrong():
+    """A wrong tip changes the variance by 15 times its share of the volume."""
+    for pair in poses.SMALL_ON_LARGE:
+        check('small on large', 0, *(np.array([part]) for both in pair for part in both))
+
+
 @pytest.mark.parametrize('aspect', [1e3, 1e4, 1e5])
 def test_needles(aspect):
     """Within all bounds up to an aspect of 100,000."""
