@@ -15,7 +15,7 @@
 // coordinates comes on top.
 //
 //   colliding: bool. Touching counts, up to 8 ulp of the largest coordinate or size.
-//   separation [m], to 1e-12 · size. Negative: the depth along the normal. Positive: the largest
+//   separation [m]. Negative: the depth along the normal, to 1e-12 · size. Positive: the largest
 //       gap of the separating-axis test, at most the distance.
 //   normal: unit vector, common frame, from A to B. Moving B by depth · normal separates the boxes.
 //   axis: the winning axis. 0–2: faces of A. 3–5: faces of B. 6 + 3 i + j: the edges a_i × b_j.
