@@ -41,6 +41,8 @@ MESSAGE_LIMIT = 1 << 20
 """Longest message [bytes] of a browser; the page sends a few hundred."""
 PANEL_WIDTH, CHART_HEIGHT, TIMES_HEIGHT = 300, 110, 45  # pixels; the last is that of the axis
 GROUND, LINES, SECTIONS, ROPE = (236, 238, 241), (206, 211, 217), (176, 183, 191), (70, 70, 80)
+SKYLIGHT = 2.6  # intensity
+FROM_BELOW = (120, 120, 120)  # colour of what the ground reflects
 NO_LINES = np.zeros((0, 2, 3))
 GROUND_SIZE = 60.0  # length [m] of the ground at least
 VIEWPOINT = np.array([-0.55, -0.78, 0.42])
@@ -184,6 +186,11 @@ class Page:
         scene, place = self._server.scene, np.zeros((1, 2, 3))
         edge = float(np.median(rows.sizes.max(axis=1)))
         radius, self._normal_length = style.POINT_RADIUS * edge, style.NORMAL_LENGTH * edge
+        # viser's lights, among them a picture of a hall, take seconds of rendering in software.
+        scene.configure_environment_map(hdri=None)
+        scene.configure_default_lights(enabled=False)
+        scene.add_light_hemisphere('/sky', ground_color=FROM_BELOW, intensity=SKYLIGHT,
+                                   position=(0.0, 0.0, 1.0))
         self._ground = scene.add_grid('/ground', GROUND_SIZE, GROUND_SIZE, cell_size=1.0,
                                       section_size=5.0, cell_color=LINES, section_color=SECTIONS,
                                       plane_color=GROUND, plane_opacity=1.0, shadow_opacity=0.0,
