@@ -39,11 +39,12 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in `nohup make test 
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 FIRST = (
-    'test_install.py', 'test_view.py', 'test_faults.py', 'test_training.py', 'test_hostile.py',
-    'test_landing_report.py', 'test_readme.py', 'test_examples.py', 'test_crane_node.py',
-    'test_bench.py', 'test_service.py', 'test_contact_node.py', 'test_exact.py', 'test_native.py',
-    'test_search.py', 'test_scene_node.py', 'test_builds.py', 'test_frontier.py', 'test_series.py',
-    'test_fuzz.py', 'test_demo.py', 'test_paper_tables.py')
+    'test_install.py', 'test_faults.py', 'test_view.py', 'test_training.py', 'test_readme.py',
+    'test_examples.py', 'test_hostile.py', 'test_demo.py', 'test_crane_node.py', 'test_bench.py',
+    'test_scene_node.py', 'test_first_run.py', 'test_contact_node.py', 'test_landing_report.py',
+    'test_search.py', 'test_native.py', 'test_exact.py', 'test_service.py', 'test_builds.py',
+    'test_frontier.py', 'test_series.py', 'test_paper_tables.py', 'test_fuzz.py',
+    'test_dataset.py')
 """The longest files, longest first. Begun late, one would leave the other workers idle."""
 
 _modules = count()
