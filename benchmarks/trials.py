@@ -22,7 +22,6 @@ from .timing import after_warm_up, each_call, take_turns
 FEW_PAIRS = 17
 """Pairs that are prepared at once where more pairs of sizes than that are among them. Odd, so that
 a median is the time of one pair, not between two that may differ tenfold."""
-ROUND_SECONDS = 0.025  # least time of a round's single calls; a round ends with its last pair
 LONGEST_RUN = 3600.0  # of a subprocess with one instruction set [s]
 VERDICT = 1e-9
 """Least gap or depth, of the size, at which verdicts and normals are judged. At exact touch both
@@ -39,10 +38,12 @@ class Plan:
     """Pairs that every round times call by call, whatever they take. Some cost fifty times as much
     as others, so the median of a round that ends by the clock depends on how many it reached."""
     rounds: int
+    round_seconds: float  # least time of a round's single calls; a round ends with its last pair
 
 
-FULL = Plan(batch_pairs=20_000, single_pairs=1_000, timed_pairs=200, rounds=20)
-QUICK = Plan(batch_pairs=1_000, single_pairs=40, timed_pairs=10, rounds=2)
+FULL = Plan(batch_pairs=20_000, single_pairs=1_000, timed_pairs=200, rounds=20,
+            round_seconds=0.025)
+QUICK = Plan(batch_pairs=1_000, single_pairs=40, timed_pairs=10, rounds=2, round_seconds=0.001)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,6 +152,7 @@ class Trial:
         """Prepare the calls."""
         self.name, self.set = engine.name, name
         self._pairs, self._answers = pairs, answers
+        self._seconds = plan.round_seconds
         timed = pairs.rows(slice(plan.timed_pairs))
         self._calls = engine.prepare(timed.rows(slice(_at_once(timed))))
         self._batch = engine.prepare_batch(pairs) if engine.prepare_batch else None
@@ -161,7 +163,7 @@ class Trial:
 
     def time(self) -> None:
         """Time one round, after a warm-up: all single calls, again and again, then a batch."""
-        self._singles.append(np.array(each_call(self._calls, ROUND_SECONDS), np.int64))
+        self._singles.append(np.array(each_call(self._calls, self._seconds), np.int64))
         self._batches.append(after_warm_up(self._batch, len(self._pairs.size)) if self._batch
                              else math.nan)
 
