@@ -155,7 +155,7 @@ class Client:
         return self.newest_diagnostic(key)
 
     def newest_diagnostic(self, key: str) -> str:
-        """Return the value of a key in the last diagnostic that came, '' if there is none."""
+        """Return the value of a key in the last diagnostic, or '' before the first."""
         entries = self.diagnostics[-1].status[0].values if self.diagnostics else ()
         return {entry.key: entry.value for entry in entries}.get(key, '')
 

@@ -218,7 +218,7 @@ def test_a_request_that_rclpy_cannot_read(node, client):
 
 @needs_proc
 def test_nothing_is_lost_at_1_kHz_and_memory_does_not_grow(node, client):
-    """1,000 ticks of two boxes; then some of which a third lacks a partner or has its own frame."""
+    """1,000 ticks of two boxes. Then a third are lone poses, and a third have their own frame."""
     stamps = []
     for _ in rate_limited(1000, 1000):
         stamps.append(client.send_pair(ORIGIN, TOUCHING))

@@ -73,7 +73,7 @@ struct Slab {
   double least, most;
 };
 
-// Keep what is within the slab. Without branches on the corners, which no processor predicts.
+// Keep what is within the slab. No branch asks whether a corner is, which no processor predicts.
 inline void clip(const Polygon& from, const Slab& slab, Polygon& kept) {
   static const Flags3 on_axis[3] = {{-1}, {0, -1}, {0, 0, -1, -1}};
   Flags3 axis = on_axis[slab.axis];
