@@ -42,14 +42,10 @@ constexpr double outside_by_rounding = 0x1p-48;
 
 // Shares of the accuracy that the twelve equations may be off by. An origin of the sums that is far from
 // the centroid makes the covariance more wrong than the diagonal: the square of the distance, divided by
-// the trace. So does an overlap that is thin, whose ends rounding moves by far more than its sides. At
-// the tip of a pyramid, the square of the distance from the centroid is (3/4)² / (3/80) = 15 times the
-// variance.
+// the trace. So does a piece that is lost at the tip of a pyramid: the square of its distance from the
+// centroid is (3/4)² / (3/80) = 15 times the variance.
 constexpr double off_diagonal_share = 0.01, diagonal_share = 0.3, closure_share = 0.1;
-constexpr double covariance_diagonal_share = 0.25, thin_diagonal_share = 1.0 / 16.0;
-// Square of the volume by the cube of the trace, below which an overlap is thin. It is that of a column
-// 64 times as long as thick, or of a plate 1,470 times as wide.
-constexpr double thin_overlap = 1e-4;
+constexpr double covariance_diagonal_share = 1.0 / 16.0;
 
 // Whether sums over planes are right.
 template <class T>
@@ -73,9 +69,8 @@ BC_INLINE Certificate<T> certificate(const Columns<T>& x_n, const Triple<T>& nor
   T diagonal = diagonal_share * error, closure = closure_share * error;
   if constexpr (squares) {
     off_diagonal = min(off_diagonal, (0.5 * off_diagonal_share) * covariance_error * sqrt(trace));
-    T share = select<T>(volume * volume < (thin_overlap * trace) * (trace * trace),
-                        splat<T>(thin_diagonal_share), splat<T>(covariance_diagonal_share));
-    diagonal = min(diagonal, (share * covariance_error) * (pair_size * (trace / (trace + way2))));
+    T share = covariance_diagonal_share * (trace / (trace + way2));
+    diagonal = min(diagonal, (share * covariance_error) * pair_size);
   }
   Columns<T> entries = diagonals(x_n);
   Triple<T> own = abs(entries[0] + (-volume)) * uniform(pair_size);

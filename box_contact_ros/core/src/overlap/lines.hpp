@@ -4,8 +4,8 @@
 // The lines in which two planes meet, and what is left of them within both boxes.
 //
 // A line is clipped by the slabs of both boxes (Kay and Kajiya 1986). The sides of the slabs that do
-// not meet the overlap are moved away, so that a line may lie in such a side. The edges of one box are
-// the case c = 0 (sums.hpp).
+// not meet the overlap are moved to where it has ended, so that a line may lie in such a side. The edges
+// of one box are the case c = 0 (sums.hpp).
 #pragma once
 
 #include "sums.hpp"
@@ -62,15 +62,14 @@ BC_INLINE Pieces<T> clipped_lines(const PairOfBoxes<T>& boxes, int i, int s, int
   Triple<T> start = min(repeated(of_p.start, i), of_q.start);
   Triple<T> none = uniform(splat<T>(nowhere)), least = uniform(splat<T>(1.0 / least_sine2));
   Triple<T> back = choose(least > scale, start, none), to = back;
-  clip(repeated(p.from, y) + pieces.at_y, repeated(p.slab, y), by_z, to, back);
-  clip(repeated(p.from, z) + pieces.at_z, repeated(p.slab, z), by_y, back, to);
-  clip(rotated(q.from) + pieces.at_k, rotated(q.slab), rotated_back(by_i), back, to);
-  clip(rotated_back(q.from) + pieces.at_l, rotated_back(q.slab), rotated(by_i), to, back);
+  clip(pieces.at_y - repeated(p.middle, y), repeated(p.slab, y), by_z, to, back);
+  clip(pieces.at_z - repeated(p.middle, z), repeated(p.slab, z), by_y, back, to);
+  clip(pieces.at_k - rotated(q.middle), rotated(q.slab), rotated_back(by_i), back, to);
+  clip(pieces.at_l - rotated_back(q.middle), rotated_back(q.slab), rotated(by_i), to, back);
   pieces.span = max(to + back, Triple<T>{});
   pieces.middle = 0.5 * (to - back);
   Triple<T> lever2 = (f * f) * (pieces.u * by_q) + (g * g) * (pieces.v * by_p);
-  Triple<T> zero{};
-  largest_lever2 = max(largest_lever2, choose(pieces.span > zero, lever2, zero));
+  largest_lever2 = choose(pieces.span > Triple<T>{}, max(largest_lever2, lever2), largest_lever2);
   return pieces;
 }
 
@@ -210,11 +209,11 @@ BC_INLINE void add_edges(const Box<T>& x, int s, int t, const Box<T>& y, const C
   const Planes<T>&of_f = x.planes[s], &of_g = x.planes[t];
   Triple<T> f = rotated(of_f.place), g = rotated_back(of_g.place);
   Triple<T> start = min(rotated(of_f.start), rotated_back(of_g.start));
-  Triple<T> back = min(start, x.slab + x.from), to = min(start, x.slab - x.from);
+  Triple<T> back = min(start, x.slab - x.middle), to = min(start, x.slab + x.middle);
 #pragma GCC unroll 3
   for (int m = 0; m < 3; ++m) {
-    Triple<T> place = (f * rotated(axes[m]) + g * rotated_back(axes[m])) + spread(y.from, m);
-    clip(place, spread(y.slab, m), inverse[m], back, to);
+    Triple<T> place = f * rotated(axes[m]) + g * rotated_back(axes[m]);
+    clip(place - repeated(y.middle, m), spread(y.slab, m), inverse[m], back, to);
   }
   Triple<T> span = max(to + back, Triple<T>{}), middle = 0.5 * (to - back);
   length += span;

@@ -104,17 +104,19 @@ struct Box {
   Triple<T> half;          // half extents [m]
   Triple<T> origin;        // of the sums [m]
   Triple<T> first;         // the places of the first planes along the axes [m]
-  Triple<T> slab, middle;  // half widths of the slabs that clip lines, and their middles [m]
-  Triple<T> from;          // the origin, from these middles [m]
+  Triple<T> top, bottom;   // where the slabs end that clip lines [m]
+  Triple<T> slab, middle;  // half widths of these slabs, and their middles from the origin [m]
   Planes<T> planes[2];     // two across an axis where both sides meet the overlap
   Flags<T> both;           // where they do
 
-  // Which sides meet the overlap. The first plane is the positive side, where that one does.
-  BC_INLINE void choose_planes(const Flags<T>& plus, const Flags<T>& minus) {
-    Triple<T> zero{}, one = uniform(splat<T>(1.0)), here = uniform(splat<T>(far_away));
-    Triple<T> up = choose(plus, zero, 0.5 * half), down = choose(minus, zero, 0.5 * half);
-    slab = half + (up + down);
-    middle = up - down;
+  // Which sides meet the overlap. The first plane is the positive side, where that one does. `most`,
+  // `least`: what the overlap reaches at most [m]. A slab as small as the overlap keeps its digits.
+  BC_INLINE void choose_planes(const Flags<T>& plus, const Flags<T>& minus, const Triple<T>& most,
+                               const Triple<T>& least, T slack) {
+    Triple<T> one = uniform(splat<T>(1.0)), here = uniform(splat<T>(far_away));
+    Triple<T> room = 0.5 * (most - least) + slack;
+    top = choose(plus, half, most + room);
+    bottom = choose(minus, -half, least - room);
     both = plus & minus;
     first = choose(plus, half, -half);
     planes[0].sign = choose(plus, one, -one);
@@ -125,7 +127,9 @@ struct Box {
     planes[1].axes = bits_of_any<T>(both);
   }
   BC_INLINE void place_planes() {
-    from = origin - middle;
+    Triple<T> high = top - origin, low = bottom - origin;
+    slab = 0.5 * (high - low);
+    middle = 0.5 * (high + low);
     planes[0].place = first - origin;
     planes[1].place = -half - origin;
   }
@@ -233,15 +237,15 @@ BC_INLINE void find_planes(const Pair<T>& pair, const SeparatingAxis<T>& axis,
   Triple<T> extent = 2.0 * min(radius, p.half);
   Triple<T> side = p.half + max(flush_limit * extent, uniform(slack));
   Flags<T> plus = (high > side) | top, minus = (-low > side) | bottom;
-  p.choose_planes(plus, minus);
 
   // 2. P's part within its bounds, and the faces of Q that touch it.
   Triple<T> most = min(high, side), least = max(low, -side);
+  p.choose_planes(plus, minus, most, least, slack);
   p.origin = 0.5 * (most + least);
   Triple<T> in_q = boxes.rows * (p.origin - c), radius_q = abs(boxes.rows) * (0.5 * (most - least));
-  Triple<T> edge = q.half + (-slack);
-  q.choose_planes(min(in_q + radius_q, middle_q + reach) >= edge,
-                  min(radius_q - in_q, reach - middle_q) >= edge);
+  Triple<T> most_q = min(in_q + radius_q, middle_q + reach);
+  Triple<T> least_q = max(in_q - radius_q, middle_q - reach), edge = q.half + (-slack);
+  q.choose_planes(most_q >= edge, -least_q >= edge, most_q, least_q, slack);
 
   // The origin: the middle of P's part. A contact of two edges may be small in it.
   Mask<T> by_edges = axis.axis >= splat<Place<T>>(first_edge_axis);
