@@ -57,7 +57,8 @@ inline PyObject* clipped(PyObject*, PyObject* const* args, Py_ssize_t count) {
   if (count != 4) fail(PyExc_TypeError, "clipped(poses_a, poses_b, sizes_a, sizes_b)");
   PairArrays pairs(args, Py_None);
   npy_intp n = pairs.count;
-  auto point = make<double>({n, 3}), volume = make<double>({n}), covariance = make<double>({n, 3, 3});
+  auto point = make<double>({n, 3}), volume = make<double>({n}),
+       covariance = make<double>({n, 3, 3});
   each_query(pairs, [&](Query<double> q, long row) {
     if (depth_floor * q.pair.size + q.axis.separation > 0.0)
       enforce_minimum_depth(q.pair, q.axis, true);
@@ -65,7 +66,7 @@ inline PyObject* clipped(PyObject*, PyObject* const* args, Py_ssize_t count) {
     Triple<double> centroid = point_in_common_frame(q.pair, triple(found.centroid));
     write(components<double>(centroid), point.numbers + 3 * row);
     volume.numbers[row] = found.volume;
-    write(matrix(found.covariance), covariance.numbers + 9 * row);
+    for (int k = 0; k < 9; ++k) covariance.numbers[9 * row + k] = found.covariance(k / 3, k % 3);
   });
   return pack(&PyTuple_Type, point, volume, covariance);
 }

@@ -51,7 +51,7 @@ BC_INLINE bool solve_pair(const Model& model, const detail::PairNumbers& pair, d
     store(unknown, contact.normal);
     if (!(q.axis.separation <= margin)) return true;
   }
-  Triple<double> normal = direction_in_common_frame(q.pair, q.axis.normal);
+  Triple<double> normal = q.pair.axes_a * q.axis.normal;
   // Zeros keep no sign on a swap.
   normal = select(q.pair.swapped, Triple<double>{} - normal, normal);
   store(normal, contact.normal);
@@ -59,7 +59,7 @@ BC_INLINE bool solve_pair(const Model& model, const detail::PairNumbers& pair, d
   Found overlap;
   model.solve(q, overlap, counts);  // a pair alone is left to nobody
   store(overlap, contact);
-  if constexpr (has_normal<Found>) store(triple(overlap.normal), contact.normal);
+  if constexpr (Found::has_normal) store(triple(overlap.normal), contact.normal);
   return true;
 }
 

@@ -55,15 +55,12 @@ BC_INLINE T squared_norm(const T (&q)[4]) {
 // The matrix of a quaternion of any length. Dividing by the squared norm needs no square root, and q
 // and −q give the same bits.
 template <class T>
-BC_INLINE Mat<T> rotation_matrix(const T (&q)[4], T norm2) {
+BC_INLINE Mat<T> rotation_matrix(const T (&q)[4]) {
+  T norm2 = squared_norm(q);
   T x = q[0], y = q[1], z = q[2], w = q[3], s = 2.0 / norm2;
   return {{{1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)},
            {s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)},
            {s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)}}};
-}
-template <class T>
-BC_INLINE Mat<T> rotation_matrix(const T (&q)[4]) {
-  return rotation_matrix(q, squared_norm(q));
 }
 // Its rows.
 template <class T>
@@ -80,7 +77,7 @@ BC_INLINE Columns<T> rotation_rows(const T (&q)[4], T norm2) {
     for (int i = 0; i < 3; ++i) rows[i] = choose(is_at<T>(i), 1.0 + rows[i], rows[i]);
     return rows;
   } else {
-    Mat<T> m = rotation_matrix(q, norm2);
+    Mat<T> m = rotation_matrix(q);
     return {{triple(row(m, 0)), triple(row(m, 1)), triple(row(m, 2))}};
   }
 }
@@ -167,8 +164,8 @@ BC_INLINE void prepare(const Pose<T>& a, const Pose<T>& b, const Vec<T>& size_a,
   pair.offset_a = first * t;
   pair.offset_b = other * t;
   for (int i = 0; i < 3; ++i)
-    pair.a_in_b[i] = (spread(first[0], i) * other[0] + spread(first[1], i) * other[1]) +
-                     spread(first[2], i) * other[2];
+    pair.a_in_b[i] = (repeated(first[0], i) * other[0] + repeated(first[1], i) * other[1]) +
+                     repeated(first[2], i) * other[2];
   pair.b_in_a = transpose(pair.a_in_b);
   pair.axes_a = transpose(first);
   pair.axes_b = transpose(other);
@@ -186,14 +183,10 @@ BC_INLINE void move_against(Pair<T>& pair, T distance, const Triple<T>& directio
   pair.offset_b = pair.offset_b - distance * (pair.a_in_b * direction);
 }
 
-// Bring a point [m] or a direction from A's frame to the common frame.
+// Bring a point from A's frame to the common frame [m].
 template <class T>
 BC_INLINE Triple<T> point_in_common_frame(const Pair<T>& pair, const Triple<T>& point) {
   return pair.origin_a + pair.axes_a * point;
-}
-template <class T>
-BC_INLINE Triple<T> direction_in_common_frame(const Pair<T>& pair, const Triple<T>& direction) {
-  return pair.axes_a * direction;
 }
 
 template <class T>

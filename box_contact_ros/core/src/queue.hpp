@@ -38,21 +38,10 @@ struct Block {
 
  private:
   BC_INLINE void put(const Block& other, int from, int to) {
-    static_assert(sizeof query % sizeof(T) == 0, "all that a query has are lanes");
-    constexpr size_t one = sizeof(Number<T>);
-    auto* source = reinterpret_cast<const char*>(&other.query) + one * from;
-    auto* target = reinterpret_cast<char*>(&query) + one * to;
-    for (size_t k = 0; k < sizeof query; k += sizeof(T)) std::memcpy(target + k, source + k, one);
+    copy_lane<T, T>(other.query, from, query, to);
     rows[to] = other.rows[from];
   }
 };
-
-// Whether a model solves two blocks at once: it has `solve_two(query, other, found, other_found)` and
-// leaves no pair.
-template <class T, class Model, class = void>
-constexpr bool takes_two = false;
-template <class T, class Model>
-constexpr bool takes_two<T, Model, std::void_t<decltype(&Model::template solve_two<T>)>> = true;
 
 // The overlaps of a batch.
 template <class T, class Model>
@@ -81,14 +70,14 @@ class Queue {
   }
   BC_INLINE void finish() {
     if (waiting_.count) solve_waiting();
-    if constexpr (!takes_two<T, Model>)
+    if constexpr (!Model::takes_two)
       if (left_.count) solve_left();
     if (first_) solve_two(*first_, *first_);
   }
 
  private:
   BC_INLINE void solve(const Block<T>& block) {
-    if constexpr (takes_two<T, Model>) {
+    if constexpr (Model::takes_two) {
       if (first_) solve_two(*first_, block);
       first_ = first_ ? nullptr : &block;
     } else {
@@ -101,7 +90,7 @@ class Queue {
     }
   }
   BC_INLINE void solve_two(const Block<T>& one, const Block<T>& other) {
-    if constexpr (takes_two<T, Model>) {
+    if constexpr (Model::takes_two) {
       typename Model::template Found<T> found, other_found;
       model_.solve_two(one.query, other.query, found, other_found);
       write_overlaps<T>(found, bits(one.query.touching), one.rows, results_);

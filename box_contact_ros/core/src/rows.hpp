@@ -85,7 +85,7 @@ template <class T>
   unsigned touching = bits(q.touching), valid = bits(q.pair.valid), all = ~0U >> (32 - width<T>);
   Mask<T> near = q.touching | ((q.axis.separation <= results.margin) & q.pair.valid);
   Triple<T> none = uniform(nothing);
-  Triple<T> from_first = direction_in_common_frame(q.pair, q.axis.normal);
+  Triple<T> from_first = q.pair.axes_a * q.axis.normal;
   // Zeros keep no sign on a swap.
   Triple<T> from_a = select(q.pair.swapped, Triple<T>{} - from_first, from_first);
   Vec<T> normal = components<T>(select(near, from_a, none));
@@ -123,21 +123,22 @@ template <class T>
 template <class T, class Found>
 [[gnu::noinline]] inline void write_overlaps(const Found& found, unsigned chosen,
                                              const long (&rows)[width<T>], const Results& results) {
-  const Moments<T>& overlap = all_moments(found);
   double* places[width<T>];
   auto store = [&](double* array, int numbers, int from, const auto& x) {
     for (int i = 0; i < width<T>; ++i) places[i] = array + (numbers * rows[i] + from);
     store_rows(places, chosen, x);
   };
-  if constexpr (has_normal<Found>)
+  if constexpr (Found::has_normal)
     if (results.normal) store(results.normal, 3, 0, found.normal.v);
-  if (results.point) store(results.point, 3, 0, overlap.centroid.v);
+  if (results.point) store(results.point, 3, 0, found.centroid.v);
   if (results.volume) {
-    T volume[1] = {overlap.volume};
+    T volume[1] = {found.volume};
     store(results.volume, 1, 0, volume);
   }
   if (results.covariance) {
-    const auto& c = overlap.covariance;
+    T unknown = splat<T>(not_a_number);
+    Sym<T> c{{unknown, unknown, unknown, unknown, unknown, unknown}};
+    if constexpr (std::is_same_v<Found, Moments<T>>) c = found.covariance;
     T first[4] = {c(0, 0), c(0, 1), c(0, 2), c(1, 0)};
     T middle[4] = {c(1, 1), c(1, 2), c(2, 0), c(2, 1)}, last[1] = {c(2, 2)};
     store(results.covariance, 9, 0, first);

@@ -13,7 +13,7 @@ template <class T>
 constexpr int together = is_scalar<T> ? 1 : 2;
 
 template <class T>
-using Floats = typename std::conditional_t<is_scalar<T>, NumberOf<float>,
+using Floats = typename std::conditional_t<is_scalar<T>, std::enable_if<true, float>,
                                            LanesOf<float, is_scalar<T> ? 2 : 2 * width<T>>>::type;
 
 // The same numbers in the other precision. The instructions are named because g++ converts halves.
@@ -32,24 +32,17 @@ BC_INLINE To converted(From x) {
   return __builtin_convertvector(x, To);
 }
 
-template <class T, int... k>
-BC_INLINE Floats<T> joined(const T& a, const T& b, std::integer_sequence<int, k...>) {
-  using Half = Lanes<float, width<T>>;
-  return __builtin_shufflevector(converted<Half>(a), converted<Half>(b), k...);
-}
-template <class T, int... k>
-BC_INLINE T part(const Floats<T>& x, std::integer_sequence<int, k...>, bool second) {
-  return converted<T>(second ? __builtin_shufflevector(x, x, width<T> + k...)
-                             : __builtin_shufflevector(x, x, k...));
-}
-
 // A number of each block: `of(0)`, `of(1)`.
 template <class T, class Of>
 BC_INLINE Floats<T> floats(const Of& of) {
   if constexpr (is_scalar<T>) {
     return float(of(0));
   } else {
-    return joined<T>(of(0), of(1), std::make_integer_sequence<int, 2 * width<T>>());
+    using Half = Lanes<float, width<T>>;
+    Half halves[2] = {converted<Half>(T(of(0))), converted<Half>(T(of(1)))};
+    Floats<T> both;
+    std::memcpy(&both, halves, sizeof both);
+    return both;
   }
 }
 template <class T, class Of>
@@ -67,7 +60,9 @@ BC_INLINE T doubles(const Floats<T>& x, int block) {
   if constexpr (is_scalar<T>) {
     return x;
   } else {
-    return part<T>(x, std::make_integer_sequence<int, width<T>>(), block == 1);
+    Lanes<float, width<T>> halves[2];
+    std::memcpy(halves, &x, sizeof x);
+    return converted<T>(halves[block]);
   }
 }
 template <class T>

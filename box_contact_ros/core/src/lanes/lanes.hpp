@@ -41,17 +41,17 @@ using Lanes = typename LanesOf<Number, width>::type;
 template <class T>
 constexpr bool is_scalar = std::is_arithmetic_v<T>;
 
-template <class T, bool = is_scalar<T>>
-struct NumberOf {
-  using type = T;
-};
 template <class T>
-struct NumberOf<T, false> {
-  using type = std::decay_t<decltype(std::declval<T&>()[0])>;
-};
+constexpr auto first_number(T x) {
+  if constexpr (is_scalar<T>) {
+    return x;
+  } else {
+    return x[0];
+  }
+}
 // The type of one lane of T.
 template <class T>
-using Number = typename NumberOf<T>::type;
+using Number = decltype(first_number(T()));
 
 template <class T>
 constexpr int width = sizeof(T) / sizeof(Number<T>);
@@ -194,6 +194,30 @@ BC_INLINE void set_lane(T& x, int i, N value) {
     x = value;
   } else {
     x[i] = value;
+  }
+}
+
+// Structs all of whose members are lanes of T. Copy what one has in lane i to lane j of one of lanes U.
+template <class T, class U, class From, class To>
+BC_INLINE void copy_lane(const From& from, int i, To& to, int j) {
+  constexpr size_t one = sizeof(Number<T>), members = sizeof from / sizeof(T);
+  static_assert(members * sizeof(T) == sizeof from && members * sizeof(U) == sizeof to);
+  auto* source = reinterpret_cast<const char*>(&from) + one * i;
+  auto* target = reinterpret_cast<char*>(&to) + one * j;
+  for (size_t k = 0; k < members; ++k)
+    std::memcpy(target + k * sizeof(U), source + k * sizeof(T), one);
+}
+// Put the chosen lanes of one into another.
+template <class T, class Struct>
+BC_INLINE void put(Mask<T> chosen, const Struct& from, Struct& to) {
+  auto* source = reinterpret_cast<const char*>(&from);
+  auto* target = reinterpret_cast<char*>(&to);
+  for (size_t k = 0; k < sizeof from; k += sizeof(T)) {
+    T lanes[2];
+    std::memcpy(&lanes[0], source + k, sizeof(T));
+    std::memcpy(&lanes[1], target + k, sizeof(T));
+    lanes[1] = select<T>(chosen, lanes[0], lanes[1]);
+    std::memcpy(target + k, &lanes[1], sizeof(T));
   }
 }
 

@@ -23,22 +23,17 @@ constexpr int machine_bytes = 16;
 template <class T>
 constexpr bool packed = is_scalar<T> && 4 * sizeof(T) <= machine_bytes;
 
-template <class T, bool = packed<T>>
-struct TripleOf {
-  using type = Vec<T>;
-};
 template <class T>
-struct TripleOf<T, true> {
-  using type = Lanes<T, 4>;
-};
-template <class T>
-using Triple = typename TripleOf<T>::type;
+using Triple =
+    typename std::conditional_t<packed<T>, LanesOf<T, 4>, std::enable_if<true, Vec<T>>>::type;
 
 // What comparisons of triples give: a mask for each number.
 template <class T>
 using Flags = decltype(Triple<T>() > Triple<T>());
 
-// Functions below take a `Vec<T>`, or a vector of the machine, `Packed`.
+// Functions of a `Three` take either layout: a `Vec`, or a vector of the machine.
+template <class Three>
+constexpr bool is_vec = std::is_class_v<Three>;
 
 template <class T>
 BC_INLINE Triple<T> triple(const Vec<T>& a) {
@@ -63,60 +58,31 @@ BC_INLINE Triple<Number<T>> triple_of_lane(const Triple<T>& a, int i) {
   if constexpr (is_scalar<T>) {
     return a;
   } else {
-    return triple(lane(a, i));
+    return triple(Vec<Number<T>>{lane(a[0], i), lane(a[1], i), lane(a[2], i)});
   }
 }
 // A formula of single numbers, for each number of triples.
-template <class Formula, class T, class... More>
-BC_INLINE Vec<T> each(Formula formula, const Vec<T>& a, const More&... more) {
-  return {formula(a[0], more[0]...), formula(a[1], more[1]...), formula(a[2], more[2]...)};
-}
-template <class Formula, class Packed, class... More>
-BC_INLINE Packed each(Formula formula, Packed a, More... more) {
-  return formula(a, more...);
-}
-
-// Component k as a factor or a summand of triples.
-template <class T>
-BC_INLINE T spread(const Vec<T>& a, int k) {
-  return a[k];
-}
-template <class Packed>
-BC_INLINE Packed spread(Packed a, int k) {
-  return k == 0   ? __builtin_shufflevector(a, a, 0, 0, 0, 0)
-         : k == 1 ? __builtin_shufflevector(a, a, 1, 1, 1, 1)
-                  : __builtin_shufflevector(a, a, 2, 2, 2, 2);
+template <class Formula, class Three, class... More>
+BC_INLINE Three each(Formula formula, const Three& a, const More&... more) {
+  if constexpr (is_vec<Three>) {
+    return {formula(a[0], more[0]...), formula(a[1], more[1]...), formula(a[2], more[2]...)};
+  } else {
+    return formula(a, more...);
+  }
 }
 
 // Component k as a triple.
-template <class T>
-BC_INLINE Vec<T> repeated(const Vec<T>& a, int k) {
-  return {a[k], a[k], a[k]};
-}
-template <class Packed>
-BC_INLINE Packed repeated(Packed a, int k) {
-  return spread(a, k);
-}
-
-// The sum of the components.
 template <class Three>
-BC_INLINE auto sum(const Three& a) {
-  return (a[0] + a[1]) + a[2];
+BC_INLINE Three repeated(const Three& a, int k) {
+  if constexpr (is_vec<Three>) {
+    return {a[k], a[k], a[k]};
+  } else {
+    return k == 0   ? __builtin_shufflevector(a, a, 0, 0, 0, 0)
+           : k == 1 ? __builtin_shufflevector(a, a, 1, 1, 1, 1)
+                    : __builtin_shufflevector(a, a, 2, 2, 2, 2);
+  }
 }
-// The sum of the products of the components.
-template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_class_v<Packed>>>
-BC_INLINE Number<Packed> dot(Packed a, Packed b) {
-  Packed products = a * b;
-  return (products[0] + products[1]) + products[2];
-}
-
-// The largest component.
-template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_class_v<Packed>>>
-BC_INLINE Number<Packed> largest(Packed a) {
-  return max(max(a[0], a[1]), a[2]);
-}
-
-// The same in each lane.
+// The largest component, in each lane of a vector of the machine.
 template <class Packed>
 BC_INLINE Packed largest_in_each(Packed a) {
   Packed of_two = max(a, __builtin_shufflevector(a, a, 1, 0, 3, 2));
@@ -124,36 +90,45 @@ BC_INLINE Packed largest_in_each(Packed a) {
 }
 
 // The components y z x, and z x y.
-template <class T>
-BC_INLINE Vec<T> rotated(const Vec<T>& a) {
-  return {a[1], a[2], a[0]};
+template <class Three>
+BC_INLINE Three rotated(const Three& a) {
+  if constexpr (is_vec<Three>) {
+    return {a[1], a[2], a[0]};
+  } else {
+    return __builtin_shufflevector(a, a, 1, 2, 0, 0);
+  }
 }
-template <class Packed>
-BC_INLINE Packed rotated(Packed a) {
-  return __builtin_shufflevector(a, a, 1, 2, 0, 0);
-}
-template <class T>
-BC_INLINE Vec<T> rotated_back(const Vec<T>& a) {
-  return {a[2], a[0], a[1]};
-}
-template <class Packed>
-BC_INLINE Packed rotated_back(Packed a) {
-  return __builtin_shufflevector(a, a, 2, 0, 1, 1);
+template <class Three>
+BC_INLINE Three rotated_back(const Three& a) {
+  if constexpr (is_vec<Three>) {
+    return {a[2], a[0], a[1]};
+  } else {
+    return __builtin_shufflevector(a, a, 2, 0, 1, 1);
+  }
 }
 
 // By numbers, each with its own mask. The instruction is named because g++ compares the mask first.
-template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_class_v<Packed>>>
-BC_INLINE Packed choose(Mask<Packed> masks, Packed a, Packed b) {
+template <class Masks, class Three>
+BC_INLINE Three choose(const Masks& masks, const Three& a, const Three& b) {
 #if defined(__AVX__)
-  if constexpr (std::is_same_v<Packed, Lanes<double, 4>>)
-    return (Packed)_mm256_blendv_pd((__m256d)b, (__m256d)a, (__m256d)masks);
+  if constexpr (std::is_same_v<Three, Lanes<double, 4>>)
+    return (Three)_mm256_blendv_pd((__m256d)b, (__m256d)a, (__m256d)masks);
 #endif
-  return masks ? a : b;
+  if constexpr (is_vec<Three>) {
+    auto one = [](auto x, auto y, auto mask) { return select<decltype(x)>(mask, x, y); };
+    return each(one, a, b, masks);
+  } else {
+    return masks ? a : b;
+  }
 }
-// One choice for all three numbers of a single pair, without a branch.
-template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_class_v<Packed>>>
-BC_INLINE Packed select(bool mask, Packed a, Packed b) {
-  return choose(Mask<Packed>{} - Number<Mask<Packed>>(mask), a, b);
+// One choice for all three numbers: of a single pair without a branch.
+template <class M, class Three, class = std::enable_if_t<is_vec<Three> || std::is_same_v<M, bool>>>
+BC_INLINE Three select(const M& mask, const Three& a, const Three& b) {
+  if constexpr (is_vec<Three>) {
+    return each([&](auto x, auto y) { return select<decltype(x)>(mask, x, y); }, a, b);
+  } else {
+    return choose(Mask<Three>{} - Number<Mask<Three>>(mask), a, b);
+  }
 }
 
 // Which of three numbers is the one at `place`: 0, 1 or 2.
@@ -170,21 +145,21 @@ BC_INLINE Flags<T> is_at(Place<T> place) {
   }
 }
 // Whether all, or any, of three masks are set.
-template <class M>
-BC_INLINE M all_of(const Vec<M>& masks) {
-  return M((masks[0] & masks[1]) & masks[2]);
+template <class Masks>
+BC_INLINE auto all_of(const Masks& masks) {
+  if constexpr (is_vec<Masks>) {
+    return decltype(masks[0] & masks[1])((masks[0] & masks[1]) & masks[2]);
+  } else {
+    return (bits(masks) & 7) == 7;
+  }
 }
-template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_class_v<Packed>>>
-BC_INLINE bool all_of(Packed masks) {
-  return (bits(masks) & 7) == 7;
-}
-template <class M>
-BC_INLINE M any_of(const Vec<M>& masks) {
-  return M((masks[0] | masks[1]) | masks[2]);
-}
-template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_class_v<Packed>>>
-BC_INLINE bool any_of(Packed masks) {
-  return bits(masks) != 0;
+template <class Masks>
+BC_INLINE auto any_of(const Masks& masks) {
+  if constexpr (is_vec<Masks>) {
+    return decltype(masks[0] | masks[1])((masks[0] | masks[1]) | masks[2]);
+  } else {
+    return bits(masks) != 0;
+  }
 }
 
 // The nearest point of the box of half extents `half` about the origin.
@@ -242,7 +217,7 @@ BC_INLINE Columns<T> select(Mask<T> mask, const Columns<T>& a, const Columns<T>&
 }
 template <class T>
 BC_INLINE Triple<T> operator*(const Columns<T>& m, const Triple<T>& a) {
-  return (spread(a, 0) * m[0] + spread(a, 1) * m[1]) + spread(a, 2) * m[2];
+  return (repeated(a, 0) * m[0] + repeated(a, 1) * m[1]) + repeated(a, 2) * m[2];
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET

@@ -79,10 +79,6 @@ BC_INLINE Vec<M> operator|(const Vec<M>& a, const Vec<M>& b) {
   return {M(a[0] | b[0]), M(a[1] | b[1]), M(a[2] | b[2])};
 }
 template <class T>
-BC_INLINE T dot(const Vec<T>& a, const Vec<T>& b) {
-  return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
-}
-template <class T>
 BC_INLINE Vec<T> abs(const Vec<T>& a) {
   return {abs(a[0]), abs(a[1]), abs(a[2])};
 }
@@ -94,20 +90,19 @@ template <class T>
 BC_INLINE Vec<T> max(const Vec<T>& a, const Vec<T>& b) {
   return {max(a[0], b[0]), max(a[1], b[1]), max(a[2], b[2])};
 }
-template <class T>
-BC_INLINE T largest(const Vec<T>& a) {
-  return max(max(a[0], a[1]), a[2]);
-}
-template <class T>
-BC_INLINE Vec<T> select(Mask<T> mask, const Vec<T>& a, const Vec<T>& b) {
-  return {select<T>(mask, a[0], b[0]), select<T>(mask, a[1], b[1]), select<T>(mask, a[2], b[2])};
-}
 
-// By components, each with its own mask.
-template <class T>
-BC_INLINE Vec<T> choose(const Vec<Mask<T>>& masks, const Vec<T>& a, const Vec<T>& b) {
-  return {select<T>(masks[0], a[0], b[0]), select<T>(masks[1], a[1], b[1]),
-          select<T>(masks[2], a[2], b[2])};
+// The sum of three components, the sum of the products of two times three, and the largest component.
+template <class Three>
+BC_INLINE auto sum(const Three& a) {
+  return (a[0] + a[1]) + a[2];
+}
+template <class Three>
+BC_INLINE auto dot(const Three& a, const Three& b) {
+  return sum(Three(a * b));
+}
+template <class Three>
+BC_INLINE auto largest(const Three& a) {
+  return max(max(a[0], a[1]), a[2]);
 }
 
 // A 3 × 3 matrix, row by row: m[i][j].
@@ -135,15 +130,6 @@ BC_INLINE Vec<T> operator*(const Mat<T>& m, const Vec<T>& a) {
 template <class T>
 BC_INLINE Vec<T> transposed_times(const Mat<T>& m, const Vec<T>& a) {
   return {dot(column(m, 0), a), dot(column(m, 1), a), dot(column(m, 2), a)};
-}
-
-template <class T>
-BC_INLINE Vec<Number<T>> lane(const Vec<T>& a, int i) {
-  return {lane(a[0], i), lane(a[1], i), lane(a[2], i)};
-}
-template <class T, class N>
-BC_INLINE void set_lane(Vec<T>& a, int i, const Vec<N>& value) {
-  for (int k = 0; k < 3; ++k) set_lane(a[k], i, value[k]);
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET

@@ -131,6 +131,8 @@ using Answers = Found* const (&)[together<T>];
 // A model that asks a network. `Way` has Found<T>, and solve<T>(network, Queries<T>, Answers<Found<T>, T>).
 template <class Way>
 struct NetworkModel {
+  static constexpr bool takes_two = true;
+
   Network network;
 
   template <class T>

@@ -122,6 +122,8 @@ struct Impact {
 // What the paper's network finds.
 template <class T>
 struct PointAndNormal : PointAndVolume<T> {
+  static constexpr bool has_normal = true;
+
   Vec<T> normal;  // from the caller's A, common frame
 };
 

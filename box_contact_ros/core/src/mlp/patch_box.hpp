@@ -29,10 +29,6 @@ constexpr float least_component = 1e-12F;
 // the least depth.
 constexpr double level = 1e-12;
 
-template <class F>
-BC_INLINE Triple<F> cross_product(const Triple<F>& a, const Triple<F>& b) {
-  return rotated(a) * rotated_back(b) - rotated_back(a) * rotated(b);
-}
 // The inverses of three numbers by one division.
 template <class F>
 BC_INLINE Triple<F> inverses(const Triple<F>& x) {
@@ -241,7 +237,10 @@ struct PatchBox {
     Triple<F> edge_b = select(is_b, edge.axis(), seen(a_in_b));
     a.axes[0] = by * (edge_a - along * a.axes[2]);
     b.axes[0] = by * (edge_b - along * b.axes[2]);
-    for (Side<F>* side : {&a, &b}) side->axes[1] = cross_product<F>(side->axes[2], side->axes[0]);
+    for (Side<F>* side : {&a, &b}) {
+      const Triple<F>&x = side->axes[0], &z = side->axes[2];
+      side->axes[1] = rotated(z) * rotated_back(x) - rotated_back(z) * rotated(x);
+    }
 
     // Of two edges that cross, the place on P's that is closest to Q's.
     Triple<F> gap = place([](const auto& meeting) { return meeting.gap; });

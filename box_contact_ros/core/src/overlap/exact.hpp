@@ -43,7 +43,7 @@ struct Pressed {
     from_a = pair.offset_a;
     from_b = -pair.offset_b;
     depth = select<T>(shallow, planes::depth_on(pair, q.axis.face), depth);
-    origin_b = origin_b - direction_in_common_frame(pair, q.pair.offset_a - pair.offset_a);
+    origin_b = origin_b - pair.axes_a * Triple<T>(q.pair.offset_a - pair.offset_a);
   }
 };
 
@@ -68,11 +68,11 @@ template <class Found>
                                        Found& found, Counts& counts) {
   Pressed<double> pressed(q);
   if (cancelled) {
-    planes::PairOfBoxes<double> boxes(q.pair, q.axis);
-    planes::find_planes(q.pair, q.axis, pressed.from_a, pressed.from_b, pressed.depth, boxes);
+    planes::PairOfBoxes<double> boxes(q.pair, q.axis, pressed.from_a, pressed.from_b,
+                                      pressed.depth);
     Columns<double> to_p = transpose(boxes.p_is_a ? q.pair.axes_a : q.pair.axes_b);
     Triple<double> origin = boxes.p_is_a ? q.pair.origin_a : pressed.origin_b;
-    planes::move_origin(boxes, to_p * (triple(near) - origin));
+    boxes.take_sums_about(to_p * (triple(near) - origin));
     if (overlap_of<true>(q, pressed, boxes, found).holds) return;
   }
   ++counts.clipped;
@@ -87,19 +87,20 @@ template <class Found>
 constexpr double least_edge = 1e-4;
 
 // Keep the covariances of needles and plates free of negative eigenvalues.
-template <class T>
-BC_INLINE void mend_needles(const Pair<T>& pair, unsigned chosen, Moments<T>& found) {
-  Triple<T> least = uniform((0.5 * least_edge) * pair.size);
-  unsigned needles = chosen & ~bits(all_of(min(pair.half_a, pair.half_b) >= least));
-  for (; needles; needles &= needles - 1) {
-    int i = __builtin_ctz(needles);
-    Sym<double> covariance = lane(found.covariance, i);
-    make_possible(covariance, {infinity, infinity, infinity});
-    set_lane(found.covariance, i, covariance);
+template <class T, class Found>
+BC_INLINE void mend_needles(const Pair<T>& pair, unsigned chosen, Found& found) {
+  if constexpr (std::is_same_v<Found, Moments<T>>) {
+    Triple<T> least = uniform((0.5 * least_edge) * pair.size);
+    unsigned needles = chosen & ~bits(all_of(min(pair.half_a, pair.half_b) >= least));
+    for (; needles; needles &= needles - 1) {
+      int i = __builtin_ctz(needles);
+      Sym<double> covariance;
+      copy_lane<T, double>(found.covariance, i, covariance, 0);
+      make_possible(covariance, {infinity, infinity, infinity});
+      copy_lane<double, T>(covariance, 0, found.covariance, i);
+    }
   }
 }
-template <class T>
-BC_INLINE void mend_needles(const Pair<T>&, unsigned, PointAndVolume<T>&) {}
 
 // The overlaps of the chosen lanes, whose planes have been found.
 template <bool two_sided, class T, template <class> class FoundOf>
@@ -110,10 +111,11 @@ BC_INLINE void solve_overlaps(const Query<T>& q, const Pressed<T>& pressed,
   for (unsigned uncertain = chosen & ~bits(certificate.holds); uncertain;
        uncertain &= uncertain - 1) {
     int i = __builtin_ctz(uncertain);
-    FoundOf<Number<T>> one;
-    solve_uncertain(lane(q, i), lane(found.centroid, i), lane(certificate.cancelled, i) != 0, one,
-                    counts);
-    set_lane(found, i, one);
+    Vec<double> near;
+    copy_lane<T, double>(found.centroid, i, near, 0);
+    FoundOf<double> one;
+    solve_uncertain(lane(q, i), near, lane(certificate.cancelled, i) != 0, one, counts);
+    copy_lane<double, T>(one, 0, found, i);
   }
   mend_needles(q.pair, chosen, found);
 }
@@ -138,8 +140,7 @@ template <class T, class Found>
 BC_INLINE unsigned solve_by_planes(const Query<T>& q, unsigned chosen, bool all, Found& found,
                                    Counts& counts) {
   Pressed<T> pressed(q);
-  planes::PairOfBoxes<T> boxes(q.pair, q.axis);
-  planes::find_planes(q.pair, q.axis, pressed.from_a, pressed.from_b, pressed.depth, boxes);
+  planes::PairOfBoxes<T> boxes(q.pair, q.axis, pressed.from_a, pressed.from_b, pressed.depth);
   unsigned two_sided = bits(any_of(boxes.p.both | boxes.q.both)) & chosen;
   if (all || 4 * __builtin_popcount(two_sided) > __builtin_popcount(chosen)) {
     solve_two_sided(q, pressed, boxes, chosen, found, counts);
@@ -167,13 +168,15 @@ template <class T, class Found>
 //     common frame. It returns the bits of those that it leaves; it leaves no pair alone.
 //   solve_left(query, found, counts): the same for pairs that were left, side by side.
 //
-// A model that leaves none may have solve_two(query, other, found, other_found) in their place, for two
-// blocks of pairs at once; `solve` is then for a pair alone.
+// A model that leaves none may take two blocks of pairs at once: `takes_two` says so. It then has
+// solve_two(query, other, found, other_found) in their place, and `solve` for a pair alone.
 
 // Model `exact`. `FoundOf`: Moments, or PointAndVolume. It leaves few pairs of W that have two planes
 // across an axis.
 template <template <class> class FoundOf>
 struct ExactModelOf {
+  static constexpr bool takes_two = false;
+
   template <class T>
   using Found = FoundOf<T>;
 
@@ -189,16 +192,5 @@ struct ExactModelOf {
 
 using ExactModel = ExactModelOf<Moments>;
 using ExactPointModel = ExactModelOf<PointAndVolume>;
-
-// All moments. What a model does not find is NaN.
-template <class T>
-BC_INLINE const Moments<T>& all_moments(const Moments<T>& found) {
-  return found;
-}
-template <class T>
-BC_INLINE Moments<T> all_moments(const PointAndVolume<T>& found) {
-  T unknown = splat<T>(not_a_number);
-  return {found, {{unknown, unknown, unknown, unknown, unknown, unknown}}};
-}
 
 }  // namespace box_contact::BOX_CONTACT_SET

@@ -14,17 +14,10 @@ namespace box_contact::BOX_CONTACT_SET {
 
 namespace planes {
 
-// The sums of each triple's numbers, side by side.
-template <class T>
-BC_INLINE Triple<T> totals(const Triple<T>& a, const Triple<T>& b, const Triple<T>& c) {
-  Columns<T> by_number = transpose(Columns<T>{{a, b, c}});
-  return (by_number[0] + by_number[1]) + by_number[2];
-}
-
 // Clip a line from −back to `to` by a slab: it is `at` from the slab's middle there, and its
 // direction's component is 1 / inverse.
-template <class N, class Slab>
-BC_INLINE void clip(const N& at, const Slab& slab, const N& inverse, N& back, N& to) {
+template <class N>
+BC_INLINE void clip(const N& at, const N& slab, const N& inverse, N& back, N& to) {
   N by = at * inverse, width = slab * abs(inverse);
   back = min(back, width + by);
   to = min(to, width - by);
@@ -122,7 +115,8 @@ struct ByAxis {
   }
   BC_INLINE Triple<T> sums() const {
     if constexpr (packed<T>) {
-      return totals<T>(lines[0], lines[1], lines[2]);
+      Columns<T> by_number = transpose(Columns<T>{{lines[0], lines[1], lines[2]}});
+      return (by_number[0] + by_number[1]) + by_number[2];
     } else {
       return total;
     }
@@ -213,7 +207,7 @@ BC_INLINE void add_edges(const Box<T>& x, int s, int t, const Box<T>& y, const C
 #pragma GCC unroll 3
   for (int m = 0; m < 3; ++m) {
     Triple<T> place = f * rotated(axes[m]) + g * rotated_back(axes[m]);
-    clip(place - repeated(y.middle, m), spread(y.slab, m), inverse[m], back, to);
+    clip(place - repeated(y.middle, m), repeated(y.slab, m), inverse[m], back, to);
   }
   Triple<T> span = max(to + back, Triple<T>{}), middle = 0.5 * (to - back);
   length += span;

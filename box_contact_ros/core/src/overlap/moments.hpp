@@ -19,12 +19,6 @@ struct Sym {
   BC_INLINE const T& operator()(int i, int j) const { return s[i == j ? i : 6 - i - j]; }
 };
 
-template <class T>
-BC_INLINE Sym<T> operator+(const Sym<T>& a, const Sym<T>& b) {
-  Sym<T> sum;
-  for (int k = 0; k < 6; ++k) sum.s[k] = a.s[k] + b.s[k];
-  return sum;
-}
 // R · S · Rᵀ: a tensor of one frame in another, where R's columns are the axes of the first.
 template <class T>
 BC_INLINE Sym<T> rotated(const Columns<T>& axes, const Sym<T>& s) {
@@ -36,20 +30,6 @@ BC_INLINE Sym<T> rotated(const Columns<T>& axes, const Sym<T>& s) {
     for (int j = i; j < 3; ++j) found(i, j) = turned[j];
   }
   return found;
-}
-template <class T>
-BC_INLINE Mat<T> matrix(const Sym<T>& s) {
-  return {{{s(0, 0), s(0, 1), s(0, 2)}, {s(1, 0), s(1, 1), s(1, 2)}, {s(2, 0), s(2, 1), s(2, 2)}}};
-}
-template <class T>
-BC_INLINE Sym<Number<T>> lane(const Sym<T>& a, int i) {
-  Sym<Number<T>> one;
-  for (int k = 0; k < 6; ++k) one.s[k] = lane(a.s[k], i);
-  return one;
-}
-template <class T, class N>
-BC_INLINE void set_lane(Sym<T>& a, int i, const Sym<N>& value) {
-  for (int k = 0; k < 6; ++k) set_lane(a.s[k], i, value.s[k]);
 }
 
 // Keep a covariance possible where rounding has spoilt it: variances of what lies within these ranges,
@@ -84,6 +64,8 @@ inline void make_possible(Sym<double>& covariance, const Vec<double>& ranges) {
 // What a model finds of the overlap without its second moments.
 template <class T>
 struct PointAndVolume {
+  static constexpr bool has_normal = false;  // a normal of the model's own
+
   T volume;         // [m³]
   Vec<T> centroid;  // in A's frame from a kernel, in the common frame from a model [m]
 };
@@ -93,37 +75,5 @@ template <class T>
 struct Moments : PointAndVolume<T> {
   Sym<T> covariance;  // second central moments by the volume, common frame [m²]
 };
-
-// Whether a model finds a normal of its own, from the caller's A, common frame.
-template <class Found, class = void>
-constexpr bool has_normal = false;
-template <class Found>
-constexpr bool has_normal<Found, std::void_t<decltype(Found::normal)>> = true;
-
-template <class T, class N>
-BC_INLINE void set_lane(PointAndVolume<T>& found, int i, const PointAndVolume<N>& value) {
-  set_lane(found.volume, i, value.volume);
-  set_lane(found.centroid, i, value.centroid);
-}
-template <class T, class N>
-BC_INLINE void set_lane(Moments<T>& found, int i, const Moments<N>& value) {
-  set_lane(found.volume, i, value.volume);
-  set_lane(found.centroid, i, value.centroid);
-  set_lane(found.covariance, i, value.covariance);
-}
-
-// Put what was found of the chosen pairs in its place.
-template <class T>
-BC_INLINE void put(Mask<T> chosen, const PointAndVolume<T>& from, PointAndVolume<T>& found) {
-  found.volume = select<T>(chosen, from.volume, found.volume);
-  found.centroid = select(chosen, from.centroid, found.centroid);
-}
-template <class T>
-BC_INLINE void put(Mask<T> chosen, const Moments<T>& from, Moments<T>& found) {
-  found.volume = select<T>(chosen, from.volume, found.volume);
-  found.centroid = select(chosen, from.centroid, found.centroid);
-  for (int k = 0; k < 6; ++k)
-    found.covariance.s[k] = select<T>(chosen, from.covariance.s[k], found.covariance.s[k]);
-}
 
 }  // namespace box_contact::BOX_CONTACT_SET

@@ -47,23 +47,6 @@ BC_INLINE Columns<T> reciprocals(const Columns<T>& m, double least) {
   return {{by_two * b, by_two * a, by_all * (a * b)}};
 }
 
-// The number of a triple, and the column of a matrix, at the axis `place` (0, 1 or 2).
-template <class T>
-BC_INLINE T at(const Triple<T>& x, Place<T> place) {
-  if constexpr (is_scalar<T>) {
-    return x[place];
-  } else {
-    return select<T>(place == 0.0, x[0], select<T>(place == 1.0, x[1], x[2]));
-  }
-}
-template <class T>
-BC_INLINE Triple<T> at(const Columns<T>& m, Place<T> place) {
-  if constexpr (is_scalar<T>) {
-    return m[place];
-  } else {
-    return select(place == 0.0, m[0], select(place == 1.0, m[1], m[2]));
-  }
-}
 // One of two things: of a single pair the thing itself, without a copy.
 template <class T, class Thing>
 using OneOf = std::conditional_t<is_scalar<T>, const Thing&, Thing>;
@@ -75,6 +58,16 @@ BC_INLINE OneOf<T, Thing> one_of(Mask<T> mask, const Thing& a, const Thing& b) {
     return select<T>(mask, a, b);
   } else {
     return select(mask, a, b);
+  }
+}
+
+// The number of a triple, or the column of a matrix, at the axis `place` (0, 1 or 2).
+template <class T, class Things>
+BC_INLINE auto at(const Things& of, Place<T> place) {
+  if constexpr (is_scalar<T>) {
+    return of[place];
+  } else {
+    return one_of<T>(place == 0.0, of[0], one_of<T>(place == 1.0, of[1], of[2]));
   }
 }
 
@@ -135,6 +128,18 @@ struct Box {
   }
 };
 
+// The depth of a pair on a face axis, 0 to 5 [m].
+template <class T>
+BC_INLINE T depth_on(const Pair<T>& pair, Place<T> face) {
+  Mask<T> of_a = face < splat<Place<T>>(3);
+  Place<T> z = select<Place<T>>(of_a, face, face - splat<Place<T>>(3));
+  Triple<T> across = at<T>(one_of<T>(of_a, pair.a_in_b, pair.b_in_a), z);
+  Triple<T> own = select(of_a, pair.half_a, pair.half_b);
+  Triple<T> other = select(of_a, pair.half_b, pair.half_a);
+  T offset = at<T>(select(of_a, pair.offset_a, pair.offset_b), z);
+  return (at<T>(own, z) + dot(abs(across), other)) - abs(offset);
+}
+
 // A pair in the frames of the box P with the best face and of the other, Q.
 template <class T>
 struct PairOfBoxes {
@@ -145,7 +150,10 @@ struct PairOfBoxes {
   Triple<T> offset;                    // Q − P in P's frame [m]
   Box<T> p, q;
 
-  BC_INLINE explicit PairOfBoxes(const Pair<T>& pair, const SeparatingAxis<T>& axis)
+  // `from_a`, `from_b`: from each box to the other, in its own frame [m]. `depth`: on the best face axis
+  // [m].
+  BC_INLINE PairOfBoxes(const Pair<T>& pair, const SeparatingAxis<T>& axis, const Triple<T>& from_a,
+                        const Triple<T>& from_b, T depth)
       : p_is_a(axis.face < splat<Place<T>>(3)),
         columns(one_of<T>(p_is_a, pair.b_in_a, pair.a_in_b)),
         rows(transposed_columns(pair)) {
@@ -159,6 +167,17 @@ struct PairOfBoxes {
       sines2[i] = y * y + z * z;
     }
     scales = reciprocals(sines2, 0.5 * least_sine2);
+    p.half = one_of<T>(p_is_a, pair.half_a, pair.half_b);
+    q.half = one_of<T>(p_is_a, pair.half_b, pair.half_a);
+    offset = one_of<T>(p_is_a, from_a, from_b);
+    find_planes(pair, axis, depth);
+  }
+  // Take the sums about a point, given in P's frame.
+  BC_INLINE void take_sums_about(const Triple<T>& origin) {
+    p.origin = origin;
+    q.origin = rows * (origin - offset);
+    p.place_planes();
+    q.place_planes();
   }
 
  private:
@@ -170,102 +189,59 @@ struct PairOfBoxes {
       return transpose(columns);
     }
   }
-};
 
-// The depth of a pair on a face axis, 0 to 5 [m].
-template <class T>
-BC_INLINE T depth_on(const Pair<T>& pair, Place<T> face) {
-  Mask<T> of_a = face < splat<Place<T>>(3);
-  Place<T> z = select<Place<T>>(of_a, face, face - splat<Place<T>>(3));
-  Triple<T> across = at<T>(one_of<T>(of_a, pair.a_in_b, pair.b_in_a), z);
-  Triple<T> own = select(of_a, pair.half_a, pair.half_b);
-  Triple<T> other = select(of_a, pair.half_b, pair.half_a);
-  T offset = at<T>(select(of_a, pair.offset_a, pair.offset_b), z);
-  return (at<T>(own, z) + dot(abs(across), other)) - abs(offset);
-}
+  BC_INLINE void find_planes(const Pair<T>& pair, const SeparatingAxis<T>& axis, T depth) {
+    // 1. Q's part below the contact face.
+    Place<T> z = select<Place<T>>(p_is_a, axis.face, axis.face - splat<Place<T>>(3));
+    T slack = place_slack * pair.size;
+    Triple<T> zero{}, up = at<T>(rows, z), c = offset;
+    T height = at<T>(c, z);
+    // Of faces that tie, the best may be deeper by the tolerance.
+    Triple<T> reach = min(q.half, (0.5 * (depth + tie * pair.size)) * abs(at<T>(by_rows, z)));
+    Triple<T> middle_q = choose(height * up >= zero, reach - q.half, q.half - reach);
+    Triple<T> centre = c + columns * middle_q, radius = abs(columns) * reach;
+    Triple<T> high = centre + radius, low = centre - radius;
+    // P's sides: strictly through it. The contact face counts, unless Q does not come out of it.
+    Triple<T> comes_out = 2.0 * (abs(c) - p.half) + depth;
+    Flags<T> contact_face = is_at<T>(z) & (comes_out > uniform(max(flush_limit * depth, slack)));
+    Flags<T> top = contact_face & (c >= zero), bottom = contact_face & (zero > c);
+    // Where a side is nearly flush, the overlap's extent is twice the less of the two.
+    Triple<T> extent = 2.0 * min(radius, p.half);
+    Triple<T> side = p.half + max(flush_limit * extent, uniform(slack));
+    Triple<T> most = min(high, side), least = max(low, -side);
+    p.choose_planes((high > side) | top, (-low > side) | bottom, most, least, slack);
 
-// Where the two edges of an edge axis cross: the middle of the shortest way between them, in P's frame.
-template <class T>
-BC_INLINE Triple<T> crossing(const Pair<T>& pair, const SeparatingAxis<T>& axis,
-                             const PairOfBoxes<T>& boxes) {
-  Mask<T> is_a = boxes.p_is_a;
-  Place<T> of_a = edge_of_a(axis.axis), of_b = edge_of_b(axis.axis);
-  Place<T> i = select<Place<T>>(is_a, of_a, of_b), j = select<Place<T>>(is_a, of_b, of_a);
-  Triple<T> zero{}, n_a = axis.normal, n_b = pair.a_in_b * n_a;
-  Triple<T> n_p = select(is_a, n_a, -n_b), n_q = select(is_a, n_b, -n_a);
-  auto corner = [&](const Triple<T>& half, const Triple<T>& direction) {
-    return choose(direction >= zero, half, -half);
-  };
-  Triple<T> on_p = choose(is_at<T>(i), zero, corner(boxes.p.half, n_p));
-  Triple<T> on_q = choose(is_at<T>(j), zero, corner(boxes.q.half, n_q));
-  Triple<T> along = at<T>(boxes.columns, j), way = (boxes.offset - boxes.columns * on_q) - on_p;
-  T cosine = at<T>(at<T>(boxes.rows, i), j), way_i = at<T>(way, i), way_j = dot(way, along);
-  T scale = 1.0 / max(1.0 - cosine * cosine, splat<T>(1e-20));
-  T s = (way_i - cosine * way_j) * scale, t = (cosine * way_i - way_j) * scale;
-  return on_p + 0.5 * ((choose(is_at<T>(i), uniform(s), zero) + way) + t * along);
-}
+    // 2. P's part within its bounds, and the faces of Q that touch it.
+    Triple<T> middle = 0.5 * (most + least), in_q = rows * (middle - c);
+    Triple<T> radius_q = abs(rows) * (0.5 * (most - least));
+    Triple<T> most_q = min(in_q + radius_q, middle_q + reach);
+    Triple<T> least_q = max(in_q - radius_q, middle_q - reach), edge = q.half + (-slack);
+    q.choose_planes(most_q >= edge, -least_q >= edge, most_q, least_q, slack);
 
-// Find the planes that may meet the overlap. `from_a`, `from_b`: from each box to the other, in its own
-// frame [m]. `depth`: on the best face axis [m].
-template <class T>
-BC_INLINE void find_planes(const Pair<T>& pair, const SeparatingAxis<T>& axis,
-                           const Triple<T>& from_a, const Triple<T>& from_b, T depth,
-                           PairOfBoxes<T>& boxes) {
-  Box<T>&p = boxes.p, &q = boxes.q;
-  Mask<T> is_a = boxes.p_is_a;
-  const Columns<T>& m = boxes.columns;
-  p.half = one_of<T>(is_a, pair.half_a, pair.half_b);
-  q.half = one_of<T>(is_a, pair.half_b, pair.half_a);
-  OneOf<T, Triple<T>> c = one_of<T>(is_a, from_a, from_b);
-  boxes.offset = c;
-
-  // 1. Q's part below the contact face.
-  Place<T> z = select<Place<T>>(is_a, axis.face, axis.face - splat<Place<T>>(3));
-  T slack = place_slack * pair.size;
-  Triple<T> zero{}, up = at<T>(boxes.rows, z);
-  T height = at<T>(c, z);
-  // Of faces that tie, the best may be deeper by the tolerance.
-  Triple<T> reach = min(q.half, (0.5 * (depth + tie * pair.size)) * abs(at<T>(boxes.by_rows, z)));
-  Triple<T> middle_q = choose(height * up >= zero, reach - q.half, q.half - reach);
-  Triple<T> centre = c + m * middle_q, radius = abs(m) * reach;
-  Triple<T> high = centre + radius, low = centre - radius;
-  // P's sides: strictly through it. The contact face counts, unless Q does not come out of it.
-  Triple<T> comes_out = 2.0 * (abs(c) - p.half) + depth;
-  Flags<T> contact_face = is_at<T>(z) & (comes_out > uniform(max(flush_limit * depth, slack)));
-  Flags<T> top = contact_face & (c >= zero), bottom = contact_face & (zero > c);
-  // Where a side is nearly flush, the overlap's extent is twice the less of the two.
-  Triple<T> extent = 2.0 * min(radius, p.half);
-  Triple<T> side = p.half + max(flush_limit * extent, uniform(slack));
-  Flags<T> plus = (high > side) | top, minus = (-low > side) | bottom;
-
-  // 2. P's part within its bounds, and the faces of Q that touch it.
-  Triple<T> most = min(high, side), least = max(low, -side);
-  p.choose_planes(plus, minus, most, least, slack);
-  p.origin = 0.5 * (most + least);
-  Triple<T> in_q = boxes.rows * (p.origin - c), radius_q = abs(boxes.rows) * (0.5 * (most - least));
-  Triple<T> most_q = min(in_q + radius_q, middle_q + reach);
-  Triple<T> least_q = max(in_q - radius_q, middle_q - reach), edge = q.half + (-slack);
-  q.choose_planes(most_q >= edge, -least_q >= edge, most_q, least_q, slack);
-
-  // The origin: the middle of P's part. A contact of two edges may be small in it.
-  Mask<T> by_edges = axis.axis >= splat<Place<T>>(first_edge_axis);
-  if (any(by_edges)) {
-    p.origin = select(by_edges, crossing(pair, axis, boxes), p.origin);
-    in_q = boxes.rows * (p.origin - c);
+    // The origin: the middle of P's part. A contact of two edges may be small in it.
+    Mask<T> by_edges = axis.axis >= splat<Place<T>>(first_edge_axis);
+    if (any(by_edges)) middle = select(by_edges, crossing(pair, axis), middle);
+    take_sums_about(middle);
   }
-  q.origin = in_q;
-  p.place_planes();
-  q.place_planes();
-}
 
-// Take the sums about another point, given in P's frame.
-template <class T>
-BC_INLINE void move_origin(PairOfBoxes<T>& boxes, const Triple<T>& origin) {
-  boxes.p.origin = origin;
-  boxes.q.origin = boxes.rows * (origin - boxes.offset);
-  boxes.p.place_planes();
-  boxes.q.place_planes();
-}
+  // Where the two edges of an edge axis cross: the middle of the shortest way between them, in P's frame.
+  BC_INLINE Triple<T> crossing(const Pair<T>& pair, const SeparatingAxis<T>& axis) const {
+    Place<T> of_a = edge_of_a(axis.axis), of_b = edge_of_b(axis.axis);
+    Place<T> i = select<Place<T>>(p_is_a, of_a, of_b), j = select<Place<T>>(p_is_a, of_b, of_a);
+    Triple<T> zero{}, n_a = axis.normal, n_b = pair.a_in_b * n_a;
+    Triple<T> n_p = select(p_is_a, n_a, -n_b), n_q = select(p_is_a, n_b, -n_a);
+    auto corner = [&](const Triple<T>& half, const Triple<T>& direction) {
+      return choose(direction >= zero, half, -half);
+    };
+    Triple<T> on_p = choose(is_at<T>(i), zero, corner(p.half, n_p));
+    Triple<T> on_q = choose(is_at<T>(j), zero, corner(q.half, n_q));
+    Triple<T> along = at<T>(columns, j), way = (offset - columns * on_q) - on_p;
+    T cosine = at<T>(at<T>(rows, i), j), way_i = at<T>(way, i), way_j = dot(way, along);
+    T scale = 1.0 / max(1.0 - cosine * cosine, splat<T>(1e-20));
+    T s = (way_i - cosine * way_j) * scale, t = (cosine * way_i - way_j) * scale;
+    return on_p + 0.5 * ((choose(is_at<T>(i), uniform(s), zero) + way) + t * along);
+  }
+};
 
 }  // namespace planes
 

@@ -43,16 +43,12 @@ struct Weighted {
 template <class T>
 struct Squares {
   Triple<T> diagonal{}, beside{};
+
+  BC_INLINE Sym<T> sym() const {
+    return {{diagonal[0], diagonal[1], diagonal[2], beside[0], beside[1], beside[2]}};
+  }
 };
 
-template <class T>
-BC_INLINE Squares<T> square_of(const Triple<T>& x) {
-  return {x * x, rotated(x) * rotated_back(x)};
-}
-template <class T>
-BC_INLINE Sym<T> sym(const Squares<T>& s) {
-  return {{s.diagonal[0], s.diagonal[1], s.diagonal[2], s.beside[0], s.beside[1], s.beside[2]}};
-}
 // A tensor of the frame with these axes.
 template <class T>
 BC_INLINE Squares<T> turned(const Columns<T>& axes, const Squares<T>& s) {
