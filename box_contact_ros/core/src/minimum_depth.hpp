@@ -36,7 +36,8 @@ template <class T>
 BC_INLINE void enforce_minimum_depth(Pair<T>& pair, SeparatingAxis<T> axis, Mask<T> moved) {
   for (int i = 0; i < most_presses; ++i) {
     T distance = select<T>(moved, depth_floor * pair.size + axis.separation, T{});
-    move_against(pair, distance, axis.normal);
+    pair.offset_a = pair.offset_a - distance * axis.normal;
+    pair.offset_b = pair.offset_b - distance * (pair.a_in_b * axis.normal);
     moved &= has_too_little_depth(pair);
     if (!any(moved)) return;
     axis = separating_axis(pair);

@@ -99,12 +99,12 @@ inline Pose<double> pose_in_common_frame(const Pose<double>& body, const Pose<do
 // Comparisons are written so that NaN fails them. An overflown square is infinite and fails too.
 template <class T>
 BC_INLINE Mask<T> pose_valid(const Triple<T>& position, T norm2) {
-  return all_of(abs(position) <= uniform(splat<T>(length_max))) &
+  return all_of(uniform(splat<T>(length_max)) >= abs(position)) &
          (norm2 >= quaternion_min * quaternion_min) & (norm2 <= quaternion_max * quaternion_max);
 }
 template <class T>
 BC_INLINE Mask<T> size_valid(const Triple<T>& size) {
-  return all_of((size >= uniform(splat<T>(length_min))) & (size <= uniform(splat<T>(length_max))));
+  return all_of((size >= uniform(splat<T>(length_min))) & (uniform(splat<T>(length_max)) >= size));
 }
 
 // Distance from a positive number to the next larger one: 0.75 · 2⁻⁵² · x lies between 0.75 and
@@ -174,13 +174,6 @@ BC_INLINE void prepare(const Pose<T>& a, const Pose<T>& b, const Vec<T>& size_a,
   T reach = largest(max(abs(at_a), abs(at_b)));
   pair.touch = contact_ulps * ulp(max(reach, pair.size));
   pair.valid = valid;
-}
-
-// Move B by `distance` [m] against a direction given in A's frame.
-template <class T>
-BC_INLINE void move_against(Pair<T>& pair, T distance, const Triple<T>& direction) {
-  pair.offset_a = pair.offset_a - distance * direction;
-  pair.offset_b = pair.offset_b - distance * (pair.a_in_b * direction);
 }
 
 // Bring a point from A's frame to the common frame [m].

@@ -32,17 +32,24 @@ BC_INLINE To converted(From x) {
   return __builtin_convertvector(x, To);
 }
 
+template <class T, int... k>
+BC_INLINE Floats<T> joined(const T& a, const T& b, std::integer_sequence<int, k...>) {
+  using Half = Lanes<float, width<T>>;
+  return __builtin_shufflevector(converted<Half>(a), converted<Half>(b), k...);
+}
+template <class T, int... k>
+BC_INLINE T part(const Floats<T>& x, std::integer_sequence<int, k...>, bool second) {
+  return converted<T>(second ? __builtin_shufflevector(x, x, width<T> + k...)
+                             : __builtin_shufflevector(x, x, k...));
+}
+
 // A number of each block: `of(0)`, `of(1)`.
 template <class T, class Of>
 BC_INLINE Floats<T> floats(const Of& of) {
   if constexpr (is_scalar<T>) {
     return float(of(0));
   } else {
-    using Half = Lanes<float, width<T>>;
-    Half halves[2] = {converted<Half>(T(of(0))), converted<Half>(T(of(1)))};
-    Floats<T> both;
-    std::memcpy(&both, halves, sizeof both);
-    return both;
+    return joined<T>(of(0), of(1), std::make_integer_sequence<int, 2 * width<T>>());
   }
 }
 template <class T, class Of>
@@ -60,9 +67,7 @@ BC_INLINE T doubles(const Floats<T>& x, int block) {
   if constexpr (is_scalar<T>) {
     return x;
   } else {
-    Lanes<float, width<T>> halves[2];
-    std::memcpy(halves, &x, sizeof x);
-    return converted<T>(halves[block]);
+    return part<T>(x, std::make_integer_sequence<int, width<T>>(), block == 1);
   }
 }
 template <class T>

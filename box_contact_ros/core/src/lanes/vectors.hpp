@@ -66,10 +66,6 @@ template <class T>
 BC_INLINE Vec<Mask<T>> operator>=(const Vec<T>& a, const Vec<T>& b) {
   return {a[0] >= b[0], a[1] >= b[1], a[2] >= b[2]};
 }
-template <class T>
-BC_INLINE Vec<Mask<T>> operator<=(const Vec<T>& a, const Vec<T>& b) {
-  return {a[0] <= b[0], a[1] <= b[1], a[2] <= b[2]};
-}
 template <class M>
 BC_INLINE Vec<M> operator&(const Vec<M>& a, const Vec<M>& b) {
   return {M(a[0] & b[0]), M(a[1] & b[1]), M(a[2] & b[2])};

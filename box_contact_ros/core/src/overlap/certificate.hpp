@@ -75,11 +75,11 @@ BC_INLINE Certificate<T> certificate(const Columns<T>& x_n, const Triple<T>& nor
   Columns<T> entries = diagonals(x_n);
   Triple<T> own = abs(entries[0] + (-volume)) * uniform(pair_size);
   Triple<T> beside = max(abs(entries[1]), abs(entries[2]));
-  Mask<T> closes = all_of(abs(normal) * uniform(pair_size) <= closure * size);
+  Mask<T> closes = all_of(closure * size >= abs(normal) * uniform(pair_size));
   Mask<T> has_digits = gross <= (6.0 * most_cancelled) * volume;
   Mask<T> holds = closes & has_digits & (volume > 0.0);
   holds &= rounding_of_size * pair_size * lever <= lever_share * error * volume;
-  holds &= all_of((own <= uniform(diagonal * volume)) & (beside <= off_diagonal * size));
+  holds &= all_of((uniform(T(diagonal * volume)) >= own) & (off_diagonal * size >= beside));
   Mask<T> cancelled = closes & ((has_digits == 0) | (way2 > most_way2 * trace));
   return {holds, cancelled};
 }

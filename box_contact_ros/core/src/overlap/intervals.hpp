@@ -18,7 +18,7 @@ constexpr double along_an_axis = 0.9;
 template <class T>
 BC_INLINE Mask<T> are_parallel(const Pair<T>& pair) {
   auto across_or_along = [](const Triple<T>& x) {
-    return (abs(x) <= uniform(splat<T>(parallel_boxes))) |
+    return (uniform(splat<T>(parallel_boxes)) >= abs(x)) |
            (abs(x) >= uniform(splat<T>(along_an_axis)));
   };
   const Columns<T>& r = pair.b_in_a;
