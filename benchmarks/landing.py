@@ -14,9 +14,9 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from itertools import groupby, product
-from multiprocessing import Pool
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -252,11 +252,11 @@ def main(args: Sequence[str] | None = None) -> int:
     folder = output.results_folder(parser, options)
     step, timings = (QUICK, [SHOWN_TIMING]) if options.quick else (1, TIMINGS)
     planned = [*grid()[SHOWN % step::step], *(ADDED[::3] if options.quick else ADDED)]
-    with Pool() as pool:
-        planned = list(tqdm(pool.imap(aimed, planned), 'aiming', len(planned), unit=''))
+    with ProcessPoolExecutor() as pool:
+        planned = list(tqdm(pool.map(aimed, planned), 'aiming', len(planned), unit=''))
         jobs = list(landings(options.ways, timings, planned, step=step))
-        results = [pool.apply_async(run, job) for job in jobs]
-        outcomes = [result.get() for result in tqdm(results, 'landings', unit='')]
+        results = [pool.submit(run, *job) for job in jobs]
+        outcomes = [result.result() for result in tqdm(results, 'landings', unit='')]
     shown, = (landing.scenario for landing in planned if landing.name == f'grid {SHOWN}')
     draw(folder / 'landing.png', shown)
     output.write_csv(folder / 'landing.csv', map(csv_row, outcomes),

@@ -7,6 +7,8 @@ from __future__ import annotations
 import csv
 import dataclasses
 import math
+import signal
+from collections.abc import Iterator
 
 import pytest
 
@@ -102,6 +104,15 @@ def stays(way: str, timing: LoopTiming, planned: PlannedLanding) -> landing.Outc
         RESTS, corner_speed=0.0, creep=0.0, static_tilt=0.0))
 
 
+@pytest.fixture
+def sigterm_is_handled() -> Iterator[None]:
+    """Handle SIGTERM, as rclpy does: the processes of the report must end without it."""
+    before = signal.signal(signal.SIGTERM, lambda *_: None)
+    yield
+    signal.signal(signal.SIGTERM, before)
+
+
+@pytest.mark.usefixtures('sigterm_is_handled')
 def test_a_run_writes_table_and_rows(tmp_path, monkeypatch, capsys):
     """One landing of the grid, and one added; the picture is of a real one."""
     monkeypatch.setattr(landing, 'run', stays)
