@@ -103,8 +103,9 @@ template <class T>
 
 }  // namespace planes
 
-// Find the overlap of a pair of boxes, `depth` deep [m], with its centroid in P's frame. Found: Moments<T>, or PointAndVolume<T>, without second moments
-// and with the equations that the centroid needs alone. `two_sided`: an axis may have two planes.
+// Find the overlap of a pair of boxes, `depth` deep [m], with its centroid in P's frame. Found:
+// Moments<T>, or PointAndVolume<T>, without second moments and with the equations that the centroid needs
+// alone. `two_sided`: an axis may have two planes.
 template <bool two_sided, class Found, class T>
 BC_INLINE planes::Certificate<T> overlap_by_planes(const Pair<T>& pair,
                                                    const planes::PairOfBoxes<T>& boxes, T depth,
@@ -131,8 +132,8 @@ BC_INLINE planes::Certificate<T> overlap_by_planes(const Pair<T>& pair,
   T trace{}, way2{};
   if constexpr (squares) {
     OneOf<T, Columns<T>> axes = one_of<T>(boxes.p_is_a, pair.axes_a, pair.axes_b);
-    Squares<T> from_q = turned<T>(m, q.second), mean2;
-    mean2 = {from_origin * from_origin, rotated(from_origin) * rotated_back(from_origin)};
+    Squares<T> from_q = turned<T>(m, q.second);
+    Squares<T> mean2{from_origin * from_origin, rotated(from_origin) * rotated_back(from_origin)};
     T by_20_volume = 0.05 * by_volume;
     Squares<T> covariance{by_20_volume * (p.second.diagonal + from_q.diagonal) - mean2.diagonal,
                           by_20_volume * (p.second.beside + from_q.beside) - mean2.beside};
