@@ -12,10 +12,6 @@
 
 namespace box_contact::BOX_CONTACT_SET {
 
-// Blocks whose axes are found before their overlaps, so that the code of either stays in the first
-// cache. Eight of eight pairs have 32 kB.
-constexpr int blocks_at_once = 8;
-
 // Pairs side by side, and their rows.
 template <class T>
 struct Block {
@@ -50,74 +46,71 @@ class Queue {
   BC_INLINE Queue(const Model& model, const Results& results, Counts& counts)
       : model_(model), results_(results), counts_(counts) {}
 
-  // Solve the pairs of a block that touch: at once where all do, or it is the only block; else when
-  // they fill one.
-  BC_INLINE void add(Block<T>& block, bool only_block) {
-    unsigned touching = bits(block.query.touching);
-    if (__builtin_popcount(touching) == width<T> || (touching && only_block)) {
-      solve(block);
+  // Where the axes of the next pairs are found.
+  BC_INLINE Block<T>& next() { return *next_; }
+
+  // Solve those of them that touch: at once where all do, or there are no others; else when they fill a
+  // block.
+  BC_INLINE void add_next(bool no_others) {
+    unsigned touching = bits(next_->query.touching);
+    if (__builtin_popcount(touching) == width<T> || (touching && no_others)) {
+      solve(next_);
       return;
     }
     for (; touching; touching &= touching - 1)
-      if (waiting_.take(block, __builtin_ctz(touching))) solve_waiting();
-  }
-  // The memory of the blocks that were added is about to be used anew.
-  BC_INLINE void keep() {
-    if (first_ && first_ != &kept_) {
-      kept_ = *first_;
-      first_ = &kept_;
-    }
+      if (waiting_->take(*next_, __builtin_ctz(touching))) solve_waiting();
   }
   BC_INLINE void finish() {
-    if (waiting_.count) solve_waiting();
-    if constexpr (!Model::takes_two)
-      if (left_.count) solve_left();
-    if (first_) solve_two(*first_, *first_);
+    if (waiting_->count) solve_waiting();
+    if (held_->count) solve_held(*held_);
   }
 
  private:
-  BC_INLINE void solve(const Block<T>& block) {
+  // A block that is held changes places with a free one.
+  BC_INLINE void solve(Block<T>*& block) {
     if constexpr (Model::takes_two) {
-      if (first_) solve_two(*first_, block);
-      first_ = first_ ? nullptr : &block;
+      if (held_->count) {
+        solve_held(*block);
+      } else {
+        std::swap(held_, block);
+        held_->count = width<T>;
+      }
     } else {
       typename Model::template Found<T> found{};
-      unsigned left = model_.solve(block.query, found, counts_),
-               touching = bits(block.query.touching);
-      write_overlaps<T>(found, touching & ~left, block.rows, results_);
+      unsigned left = model_.solve(block->query, found, counts_),
+               touching = bits(block->query.touching);
+      write_overlaps<T>(found, touching & ~left, block->rows, results_);
       for (left &= touching; left; left &= left - 1)
-        if (left_.take(block, __builtin_ctz(left))) solve_left();
-    }
-  }
-  BC_INLINE void solve_two(const Block<T>& one, const Block<T>& other) {
-    if constexpr (Model::takes_two) {
-      typename Model::template Found<T> found, other_found;
-      model_.solve_two(one.query, other.query, found, other_found);
-      write_overlaps<T>(found, bits(one.query.touching), one.rows, results_);
-      write_overlaps<T>(other_found, bits(other.query.touching), other.rows, results_);
+        if (held_->take(*block, __builtin_ctz(left))) solve_held(*held_);
     }
   }
   BC_INLINE void solve_waiting() {
-    waiting_.fill();
+    waiting_->fill();
     solve(waiting_);
-    keep();
-    waiting_.count = 0;
+    waiting_->count = 0;
   }
-  [[gnu::noinline]] void solve_left() {
-    left_.fill();
+  // With the second of two blocks, where the model solves two at once.
+  [[gnu::noinline]] void solve_held(const Block<T>& second) {
     typename Model::template Found<T> found{};
-    model_.solve_left(left_.query, found, counts_);
-    write_overlaps<T>(found, bits(left_.query.touching), left_.rows, results_);
-    left_.count = 0;
+    if constexpr (Model::takes_two) {
+      typename Model::template Found<T> of_second;
+      model_.solve_two(held_->query, second.query, found, of_second);
+      write_overlaps<T>(of_second, bits(second.query.touching), second.rows, results_);
+    } else {
+      held_->fill();
+      model_.solve_left(held_->query, found, counts_);
+    }
+    write_overlaps<T>(found, bits(held_->query.touching), held_->rows, results_);
+    held_->count = 0;
   }
 
   const Model& model_;
   const Results& results_;
   Counts& counts_;
-  Block<T> waiting_;                 // for others, to fill a block
-  Block<T> left_;                    // by the model, for others of their kind
-  const Block<T>* first_ = nullptr;  // of two that a model solves at once, and waits for the second
-  Block<T> kept_;                    // it, where its memory is used anew
+  Block<T> blocks_[3];
+  Block<T>* next_ = &blocks_[0];
+  Block<T>* waiting_ = &blocks_[1];  // for others, to fill a block
+  Block<T>* held_ = &blocks_[2];     // the first of two, or what the model left for others like it
 };
 
 // A row alone. No model leaves it.
@@ -146,24 +139,18 @@ template <class T, class Model>
   long refused = -1, first = begin;
   auto note = [&](long row) { refused = refused < 0 ? row : refused; };
   if constexpr (!is_scalar<T>) {
-    Block<T> blocks[blocks_at_once];
     Queue<T, Model> queue(model, results, counts);
     constexpr int lanes = width<T>;
     constexpr long few = lanes <= 2 ? 0 : 2;
-    bool only_block = end - begin <= lanes;
-    while (end - first > few) {
-      int count = 0;
-      for (; count < blocks_at_once && end - first > few; ++count, first += lanes) {
-        Block<T>& block = blocks[count];
-        long last = min(first + lanes, end);
-        fetch_rows(results, first, last);
-        query_rows(rows, first, last, block.query);
-        note(write_query(block.query, first, last, results));
-        for (int i = 0; i < lanes; ++i) block.rows[i] = first + i;
-      }
-      if (!want_overlap(results)) continue;
-      for (int n = 0; n < count; ++n) queue.add(blocks[n], only_block);
-      queue.keep();
+    bool no_others = end - begin <= lanes;
+    for (; end - first > few; first += lanes) {
+      long last = min(first + lanes, end);
+      fetch_rows(results, first, last);
+      Block<T>& block = queue.next();
+      query_rows(rows, first, last, block.query);
+      note(write_query(block.query, first, last, results));
+      for (int i = 0; i < lanes; ++i) block.rows[i] = first + i;
+      if (want_overlap(results)) queue.add_next(no_others);
     }
     queue.finish();
   }
