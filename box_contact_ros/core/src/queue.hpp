@@ -12,11 +12,6 @@
 
 namespace box_contact::BOX_CONTACT_SET {
 
-// Blocks whose axes are found before their overlaps. The code of all ways to an overlap does not fit
-// the first cache, so blocks of four gain by it. Blocks of eight do not.
-template <class T>
-constexpr int blocks_at_once = width<T> < 8 ? 8 : 1;
-
 // Pairs side by side, and their rows.
 template <class T>
 struct Block {
@@ -48,9 +43,13 @@ struct Block {
 template <class T, class Model>
 class Queue {
  public:
+  // Blocks whose axes are found before their overlaps. The code of all ways to an overlap does not fit
+  // the first cache, so blocks of four gain by it. Blocks of eight do not.
+  static constexpr int blocks_at_once = width<T> < 8 ? 8 : 1;
+
   BC_INLINE Queue(const Model& model, const Results& results, Counts& counts)
       : model_(model), results_(results), counts_(counts) {
-    for (int n = 0; n < blocks_at_once<T>; ++n) next_[n] = &blocks_[n];
+    for (int n = 0; n < blocks_at_once; ++n) next_[n] = &blocks_[n];
   }
 
   // Where the axes of the next pairs are found.
@@ -114,10 +113,10 @@ class Queue {
   const Model& model_;
   const Results& results_;
   Counts& counts_;
-  Block<T> blocks_[blocks_at_once<T> + 2];
-  Block<T>* next_[blocks_at_once<T>];
-  Block<T>* waiting_ = &blocks_[blocks_at_once<T>];   // for others, to fill a block
-  Block<T>* held_ = &blocks_[blocks_at_once<T> + 1];  // the first of two, or what the model left
+  Block<T> blocks_[blocks_at_once + 2];
+  Block<T>* next_[blocks_at_once];
+  Block<T>* waiting_ = &blocks_[blocks_at_once];   // for others, to fill a block
+  Block<T>* held_ = &blocks_[blocks_at_once + 1];  // the first of two, or what the model left
 };
 
 // A row alone. No model leaves it.
@@ -152,7 +151,7 @@ template <class T, class Model>
     bool no_others = end - begin <= lanes;
     while (end - first > few) {
       int count = 0;
-      for (; count < blocks_at_once<T> && end - first > few; ++count, first += lanes) {
+      for (; count < queue.blocks_at_once && end - first > few; ++count, first += lanes) {
         Block<T>& block = queue.next(count);
         long last = min(first + lanes, end);
         fetch_rows(results, first, last);
