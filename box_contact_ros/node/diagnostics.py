@@ -261,7 +261,7 @@ def _lateness(load: Load, sent: float, overtaken: int) -> Iterator[Finding]:
         yield Finding('late', f'answers are late: {late}; {lost} poses lost',
                       'the node is too slow for these poses; give it a core of its own, list fewer '
                       'pairs, set pair_topics to false, or send poses less often')
-    elif overtaken:
+    elif lost:
         yield Finding('burst', f'a burst of poses was lost: {lost}',
                       'more came at once than the queue holds, or the node stood still; send them '
                       'evenly, or raise the depth by qos_overrides')

@@ -63,6 +63,10 @@ class PoseQueue:
         self._sequence, self._arrived = sequence, arrived
         return arrived < self._new_from
 
+    def restart(self) -> None:
+        """Begin before the next pose: those that come while nobody asks for any are not lost."""
+        self._sequence = None
+
     def take_lost(self) -> int:
         """Return how many poses never came since the last call."""
         lost, self._lost = self._lost, 0
@@ -105,6 +109,7 @@ class TickAnswerer:
 
         def callback(data: bytes, info: Mapping[str, Any]) -> None:
             if not self.active:
+                queue.restart()
                 return
             self._counts['poses'] += 1
             arrived = info['received_timestamp']
@@ -128,8 +133,8 @@ class TickAnswerer:
 
         Several publishers of one box number their poses each from 1: nobody knows what is lost.
         """
-        return sum(queue.take_lost() for box, queue in self._queues.items()
-                   if self._topics.publisher_count(box) == 1)
+        lost = {box: queue.take_lost() for box, queue in self._queues.items()}
+        return sum(count for box, count in lost.items() if self._topics.publisher_count(box) == 1)
 
     def _read_all(self, data: bytes) -> StampedPose:
         """Return the poses of all that moves; a bad one is counted, and its name absent."""

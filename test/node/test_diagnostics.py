@@ -13,6 +13,7 @@ import pytest
 from box_contact_ros import SceneSolver
 from box_contact_ros.node import diagnostics
 from box_contact_ros.node.diagnostics import ACTIVE, Diagnostics, TickMonitor
+from box_contact_ros.node.tick import PoseQueue
 from box_contact_ros.scene.pairing import OVERTAKEN, StampedPose, StampPairing
 from box_contact_ros.scene.scene import two_boxes
 
@@ -33,12 +34,12 @@ def node(monkeypatch):
     pairing = StampPairing(SOLVER.scene, max_age=MAX_AGE)
     topics = Mock(why_silent=lambda box: f'nobody publishes {box}')
 
-    def report(seconds, *checks, age=None):
+    def report(seconds, *checks, age=None, lost=0):
         """Report after so long, with times of requests [s]; age: of an answer [ns]."""
         if age is not None:
             monitor.evaluated(10_000, age, [])
         clock[0] += seconds
-        reporter.report(ACTIVE, SOLVER.scene, 'exact', pairing, topics, 0, checks)
+        reporter.report(ACTIVE, SOLVER.scene, 'exact', pairing, topics, lost, checks)
         status = node.create_publisher().publish.call_args.args[0].status[0]
         report.level, report.lines = status.level, node.get_logger().warning.call_args_list
         report.values = {entry.key: entry.value for entry in status.values}
@@ -97,6 +98,27 @@ def test_a_burst_that_is_lost_is_not_a_node_that_is_late(node):
     assert 'raise the depth' in report.lines[-1].args[0]
     counts.update({'poses': 200, OVERTAKEN: 100})
     assert report(1.0, age=10**9).startswith('answers are late: 1000 ms, 100 ticks; 100 poses lost')
+
+
+def test_poses_that_never_came_are_told(node):
+    """Where the process stood still, the queue has pushed them out before the node took any."""
+    counts, report = node
+    counts['poses'] += 20
+    assert report(5.0, age=10**5, lost=1000) == 'a burst of poses was lost: 1000'
+    assert 'stood still' in report.lines[-1].args[0]
+    counts['poses'] += 200
+    assert report(1.0, age=10**5) == 'answering'
+
+
+def test_poses_that_an_inactive_node_leaves_are_not_lost():
+    """Their numbers are missing, as those of lost poses are."""
+    for restarts, lost in ((False, 498), (True, 0)):
+        queue = PoseQueue()
+        queue.is_overtaken(1, 0)
+        if restarts:
+            queue.restart()
+        queue.is_overtaken(500, 10**9)
+        assert queue.take_lost() == lost
 
 
 @pytest.mark.parametrize('stamps, words', [
