@@ -20,7 +20,7 @@ from box_contact_msgs.msg import Contacts
 
 from ..scene.scene import ALL_BOXES, Pair, Scene
 from ..solver.checks import short_repr
-from .rclpy_workarounds import RCLError, with_info
+from .rclpy_workarounds import RCLError, qos_refusals, with_info
 
 MOST_PAIRS_WITH_TOPICS = 1000
 """Two publishers a pair take milliseconds and memory, here and in every process that listens."""
@@ -91,11 +91,12 @@ class SceneTopics:
     def subscribe(self, scene: Scene, callback_of: Callable[[str, str], PoseCallback]) -> None:
         """Subscribe to all poses, with the callback for the bytes of a name and its topic."""
         for box, topic in scene.sources.items():
-            self._subscriptions[box] = self._node.create_subscription(
-                PoseArray if box == ALL_BOXES else PoseStamped, topic,
-                with_info(callback_of(box, topic)), pose_qos(box), raw=True,
-                event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
-                qos_overriding_options=QOS_OVERRIDES)
+            with qos_refusals(self._node.resolve_topic_name(topic)):
+                self._subscriptions[box] = self._node.create_subscription(
+                    PoseArray if box == ALL_BOXES else PoseStamped, topic,
+                    with_info(callback_of(box, topic)), pose_qos(box), raw=True,
+                    event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+                    qos_overriding_options=QOS_OVERRIDES)
 
     def close(self) -> None:
         """Destroy all topics."""
@@ -138,6 +139,7 @@ class SceneTopics:
     def _publisher(self, message: type, topic: str, **options: Any) -> Publisher:
         # Without events: an event that waits in EventsExecutor outlives a publisher that is
         # destroyed, and ends the process.
-        return self._node.create_publisher(
-            message, topic, contact_qos(),
-            event_callbacks=PublisherEventCallbacks(use_default_callbacks=False), **options)
+        with qos_refusals(self._node.resolve_topic_name(topic)):
+            return self._node.create_publisher(
+                message, topic, contact_qos(),
+                event_callbacks=PublisherEventCallbacks(use_default_callbacks=False), **options)

@@ -196,6 +196,10 @@ def test_a_bad_start_is_one_clear_line(tmp_path):
         ({'scene': str(long_topics(tmp_path)), 'size_a': SIZE, 'size_b': SIZE},
          "/contact/point': failed to resolve name: topic length should not exceed"),
         ({'qos_overrides./box_a/pose.subscription.depth': 'deep'}, "'deep' of type 'STRING'"),
+        ({'qos_overrides./box_a/pose.subscription.reliability': 'relyable'},
+         'qos_overrides of /box_a/pose: Unexpected QoS override for policy `reliability`'),
+        ({'qos_overrides./contacts.publisher.reliability': 'relyable'},
+         'qos_overrides of /contacts: Unexpected QoS override'),
         ({'size_a': '{2.0'}, "Couldn't parse"))
     starts = [arguments(**CUBES | given) for given in values]
     done = subprocess.run(
