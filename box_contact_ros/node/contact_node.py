@@ -120,7 +120,8 @@ def scene_of(values: Mapping[str, Any]) -> Scene:
 class ContactNode(GuardedNode, LifecycleNode):
     """Wires parameters, topics, ticks and diagnostics to the states of a lifecycle node.
 
-    Any executor of rclpy's may serve it, beside other nodes. `start` configures and activates it.
+    A SingleThreadedExecutor or an EventsExecutor may serve it, beside other nodes; a
+    MultiThreadedExecutor is too slow for 100 ticks a second. `start` configures and activates it.
 
     A node on another method derives from this one. It sets `name`, the `prefix` of its contact
     topics and its `parameters` (all of these but `model`), and names the model.

@@ -113,7 +113,8 @@ class RejectedPose(NamedTuple):
                     'publish the poses of a tick together')
         if reason == OLD:
             return (f'{box}: stamp {stamp} is older than {newest}; refused: publish in the order '
-                    'of the stamps, from one publisher')
+                    'of the stamps, from one publisher, and call ~/reset before an episode begins '
+                    'anew')
         assert reason == REPEATED
         if self.stamps == 1:
             return (f'{box}: stamp {stamp} does not advance; refused: set header.stamp (`ros2 '
