@@ -122,6 +122,13 @@ def test_a_scene_of_bodies_alone(scene_of):
     assert scene_of(text + 'pairs: [{a: goods, b: truck}]\n').pair_count == 2
 
 
+@pytest.mark.parametrize('number', [1e-05, 1e+16, 2.5e-07])
+def test_numbers_are_read_as_json_writes_them(scene_of, number):
+    """YAML 1.1 wants a point in each float."""
+    size = json.dumps([6, 2.4, number])
+    assert scene_of(GOOD.replace('[6, 2.4, 0.5]', size)).boxes['spreader'].size[2] == number
+
+
 @pytest.mark.parametrize('old, new, words', [
     ('[6, 2.4, 0.5]', '[6, 2.4, -0.5]', 'boxes.spreader.size[2]: -0.5 is less than or equal'),
     ('[6, 2.4, 0.5]', '[6, 2.4]', 'boxes.spreader.size: [6, 2.4] is too short'),
