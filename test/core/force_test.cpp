@@ -67,6 +67,12 @@ int main() {
   }
   const BodyBox boxes[] = {{0, {{{0, 0, 0}, {0, 0, 0, 1}}, size}}, {1, {{{0, 0, 0}, {0, 0, 0, 1}}, size}}};
   copy.set_boxes(boxes);
+  const std::int64_t half_a_pair[3] = {0, 1, 0};
+  try {
+    copy.hold(Patches(half_a_pair));
+    ++failures;
+  } catch (const std::invalid_argument&) {
+  }
   copy.hold(Patches(pair));
   const long before = allocations;
   for (int step = 0; step < 10; ++step) copy.advance(0.001, poses, velocities, outside);

@@ -81,6 +81,7 @@ class PatchForces {
   }
 
   // Change masses, add bodies at the end, or drop bodies there with their patches.
+  // A body that has boxes is not dropped: set_boxes without them first.
   void set_bodies(Span<const Body> bodies) {
     detail::check(bc_patch_forces_set_bodies(forces_.get(), plain_of(bodies), std::int64_t(bodies.size())));
   }
@@ -100,6 +101,7 @@ class PatchForces {
   void hold(const Patches& answer, Span<const Pose> poses = {}) {
     const Results& found = answer.results;
     if (found.separation) check_count(poses.size());
+    if (answer.pairs.size() % 2) detail::raise(BC_BAD_ARGUMENT, "pairs must be two indices a row");
     const std::size_t count = answer.pairs.size() / 2;
     check_column(answer.friction, count);
     check_column(answer.surface, 3 * count);
