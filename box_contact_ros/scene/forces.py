@@ -163,7 +163,8 @@ class PatchForces:
     torque about the centre of mass. All are in the common frame.
 
     To take a body out of the middle, put the last one in its place, `forget` both, and
-    `set_bodies` without the last.
+    `set_bodies` without the last. Where `set_boxes` was called, call it before with the boxes that
+    are left; with those of a new body, after.
     """
 
     def __init__(self, bodies: Sequence[Body], *, friction: float = FRICTION, substeps: int = 4,

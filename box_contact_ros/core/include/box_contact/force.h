@@ -119,7 +119,8 @@ BC_API bc_status bc_patch_forces_copy(const bc_patch_forces* forces, bc_patch_fo
 BC_API void bc_patch_forces_destroy(bc_patch_forces* forces);
 BC_API int64_t bc_patch_forces_bodies(const bc_patch_forces* forces); /* how many there are */
 
-/* Change masses, add bodies at the end, or drop bodies there with their patches. */
+/* Change masses, add bodies at the end, or drop bodies there with their patches. A body that has boxes
+ * is not dropped: set the others' boxes first. */
 BC_API bc_status bc_patch_forces_set_bodies(bc_patch_forces* forces, const bc_body* bodies,
                                             int64_t count);
 /* Say which boxes the bodies have: pairs are then of boxes, and poses of bodies. Patches of boxes that
