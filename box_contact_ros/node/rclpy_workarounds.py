@@ -34,8 +34,8 @@ Test: test_parameters.py::test_a_word_that_ros_does_not_know_ends_the_program.""
 
 
 @contextmanager
-def qos_refusals(topic: str) -> Iterator[None]:
-    """Raise `ValueError` with the topic where a word of its QoS overrides is refused.
+def qos_refusals(node: Node, topic: str) -> Iterator[None]:
+    """Raise `ValueError` with the topic's full name where a word of its QoS overrides is refused.
 
     Symptom: rclpy raises a RuntimeError that names the policy alone. Not reported.
     Test: test_contact_node.py::test_a_bad_start_is_one_clear_line.
@@ -45,7 +45,8 @@ def qos_refusals(topic: str) -> Iterator[None]:
     except RCLError:  # of another cause
         raise
     except RuntimeError as error:
-        raise ValueError(f'qos_overrides of {topic}: {error}') from error
+        name = node.resolve_topic_name(topic)
+        raise ValueError(f'qos_overrides of {name}: {error}') from error
 
 
 def parameter_overrides(node: Node) -> dict[str, Any]:

@@ -91,7 +91,7 @@ class SceneTopics:
     def subscribe(self, scene: Scene, callback_of: Callable[[str, str], PoseCallback]) -> None:
         """Subscribe to all poses, with the callback for the bytes of a name and its topic."""
         for box, topic in scene.sources.items():
-            with qos_refusals(self._node.resolve_topic_name(topic)):
+            with qos_refusals(self._node, topic):
                 self._subscriptions[box] = self._node.create_subscription(
                     PoseArray if box == ALL_BOXES else PoseStamped, topic,
                     with_info(callback_of(box, topic)), pose_qos(box), raw=True,
@@ -139,7 +139,7 @@ class SceneTopics:
     def _publisher(self, message: type, topic: str, **options: Any) -> Publisher:
         # Without events: an event that waits in EventsExecutor outlives a publisher that is
         # destroyed, and ends the process.
-        with qos_refusals(self._node.resolve_topic_name(topic)):
+        with qos_refusals(self._node, topic):
             return self._node.create_publisher(
                 message, topic, contact_qos(),
                 event_callbacks=PublisherEventCallbacks(use_default_callbacks=False), **options)
