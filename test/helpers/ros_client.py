@@ -26,7 +26,6 @@ from rclpy.qos import QoSProfile
 from typed_messages import contacts_by_pair, pose_stamped
 
 from box_contact_msgs.msg import Contacts
-from box_contact_ros.node.rclpy_workarounds import ends_within
 from box_contact_ros.scene.message_bytes import NANOSECONDS
 from box_contact_ros.solver.contact import Contact
 
@@ -188,10 +187,9 @@ class Client:
 
     def close(self) -> None:
         """Leave the network."""
-        with ends_within(PATIENCE):
-            self.executor.shutdown()
-            self.node.destroy_node()
-            self.context.try_shutdown()
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
 
 
 def overrides(**parameters: Any) -> list[Parameter]:

@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -12,6 +14,7 @@ from unittest.mock import Mock
 
 import pytest
 from conftest import pytest_collection_modifyitems
+from patience import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[2]
 NAME = 'box_contact_ros'
@@ -104,6 +107,17 @@ def test_tests_wait_as_long_as_a_busy_machine_needs() -> None:
              for limit in [*(arguments[-1:] if name in waiting else []), options.get('timeout')]
              if isinstance(limit, ast.Constant) and isinstance(limit.value, (int, float))]
     assert short == []
+
+
+def test_a_test_that_hangs_is_ended(tmp_path: Path) -> None:
+    """Although it has Python's lock, as it has where Fast DDS hangs; the traceback names it."""
+    (tmp_path / 'test_hanging.py').write_text('from ctypes import PyDLL\n'
+                                              'def test_it(): PyDLL(None).sleep(1000)\n')
+    done = subprocess.run(
+        [sys.executable, '-m', 'pytest', '-c', ROOT / 'pyproject.toml', '--rootdir', tmp_path,
+         '-o', 'faulthandler_timeout=0.2', tmp_path], capture_output=True, text=True,
+        timeout=PATIENCE)
+    assert done.returncode == 1 and 'test_hanging.py", line 2 in test_it' in done.stderr
 
 
 def test_hypothesis_has_no_limit_of_time() -> None:
