@@ -108,6 +108,23 @@ def test_the_depth_at_rest_is_that_of_the_spring() -> None:
     assert 0.5 - world.poses[1, 2] == pytest.approx(WEIGHT / stiffness, rel=1e-3)
 
 
+@pytest.mark.parametrize('ratio', [100, 3000])
+def test_a_heavy_body_rests_on_a_light_one(ratio: int) -> None:
+    """As deep as the spring says, although pushing out has a limit of speed, which 1,000 exceed."""
+    depths = []
+    for masses in ([MASS], [MASS, ratio * MASS]):
+        world = World(*(pose(z=k + 0.5) for k in range(len(masses))))
+        world.bodies = [FIXED, *(Body.of_box(CUBE, mass) for mass in masses)]
+        world.forces = PatchForces(world.bodies)
+        world.outside[1:, 2] = -GRAVITY * np.array(masses)
+        for _ in range(300):
+            world.hold()
+            world.step(1 / 60)
+        assert np.abs(world.velocities).max() < 1e-6
+        depths.append(0.5 - world.poses[1, 2])
+    assert depths[1] == pytest.approx((1 + ratio) * depths[0], rel=0.05)
+
+
 def test_a_centre_of_mass_beyond_the_edge_tips() -> None:
     """At 0.45 of the length the box stays, at 0.55 it tips."""
     for centre, tips in ((0.45, False), (0.55, True)):

@@ -26,7 +26,7 @@ constexpr double late_frequency = 2.5;
 constexpr double soft_damping_ratio = 5.0;
 // The same where answers are late, or a patch has a stiffness of its own.
 constexpr double slow_damping_ratio = 2.0;
-// Speed at which an overlap is pushed out, at most [m/s].
+// Speed at which an overlap is pushed out, at most [m/s]. The spring bears as much as without the limit.
 constexpr double push_out_limit = 1.0;
 // An answer that is overdue by so many periods [1] pushes nothing out.
 constexpr double overdue_periods = 3.0;
@@ -146,8 +146,9 @@ inline void soften(const Patch& patch, const SubStep& step, double depth, const 
     rows.mass = softened(pressed, rows.softness);
     block.relaxed = rows;
   }
-  rows.softness[0] = softness * pressed[0][0];
-  rows.bias[0] = -std::min(push_out_limit, rate * depth);
+  double slowed = std::min(1.0, push_out_limit / (rate * depth));
+  rows.softness[0] = slowed * softness * pressed[0][0];
+  rows.bias[0] = -slowed * rate * depth;
   rows.mass = softened(pressed, rows.softness);
   if (is_spring) block.relaxed = rows;
 }
