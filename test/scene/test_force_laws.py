@@ -215,6 +215,16 @@ def test_remainders_of_a_frame_do_no_harm() -> None:
     assert np.abs(world.velocities).max() < 1e-9
 
 
+@pytest.mark.parametrize('steps', [(0.003,) * 5 + (0.1 / 60,), (0.003, 0.002, 1e-18)])
+def test_steps_that_take_turns_leave_a_tower_at_rest(steps: tuple[float, ...]) -> None:
+    """A frame of 1/60 s in steps of 3 ms at most, and two kinds of shorter ones; for 6 s."""
+    world = ten_cubes()
+    for dt in steps * round(6.0 / sum(steps)):
+        world.hold()
+        world.step(dt)
+    assert np.abs(world.velocities).max() < 1e-9
+
+
 @pytest.mark.parametrize('at', [1, 5, 100])
 @pytest.mark.parametrize('tiny', [(1e-9,), (1e-9, 1e-6, 1e-12), (5e-5,)])
 def test_a_tiny_step_among_others_does_no_harm(tiny: tuple[float, ...], at: int) -> None:

@@ -195,14 +195,14 @@ class PatchForces {
   void advance(double dt, const bc_pose* poses, const bc_velocity* velocities,
                const bc_wrench* outside, const bc_motion& motion) {
     // A late answer bears no stiffer patches in shorter sub-steps: all iterations are in one.
-    clock_.step = std::max(dt, clock_.step / window_shrinkage);
+    double least = clock_.step / window_shrinkage;
+    clock_.step = std::max({dt, clock_.advance, clock_.advance_before, least});
     bool is_late = frequency_of(clock_.late, clock_.period) < soft_frequency / clock_.step;
     int parts = is_late ? 1 : options_.substeps;
-    double least_window = clock_.window / window_shrinkage;
     Advance step{dt,     dt / parts, parts, options_.substeps / parts, poses, velocities, outside,
                  motion, {},         {}};
-    step.first = sub_step(step, least_window);
-    step.later = sub_step(step, least_window);
+    step.first = sub_step(step);
+    step.later = sub_step(step);
     if (!is_grouped_) islands_.group(bodies_, patches_);
     is_grouped_ = true;
     loads_.resize(patches_.size());
@@ -210,6 +210,7 @@ class PatchForces {
     for (size_t k = 0; k < bodies_.size(); ++k)
       if (!bodies_[k].is_free()) move_alone(k, step);
     if (clock_.since >= 0.0) clock_.since += dt;
+    clock_.advance_before = clock_.advance;
     clock_.advance = dt;
   }
 
@@ -281,9 +282,10 @@ class PatchForces {
     double since = -1.0;                    // the last answer [s]; below 0: there was none
     double period = 0.0;                    // between answers [s]
     double late = 0.0;                      // age of the last answer when it came [s]
-    double step = 0.0;                      // the last one, or more than most of the one before [s]
+    double step = 0.0;                      // the longest one lately [s]
     double window = 0.0;                    // in which the patches' impulses were given [s]
     double advance = 0.0;                   // length of the last one [s]
+    double advance_before = 0.0;            // and of the one before [s]
     double intervals[intervals_kept] = {};  // between answers, the last one first; 0: none [s]
 
     double least_interval() const {
@@ -295,7 +297,8 @@ class PatchForces {
     bool is_sound() const {
       return (since == -1.0 || is_amount(since)) && is_amount(period) && is_amount(late) &&
              is_amount(window) && window < step_limit && is_amount(step) && step < step_limit &&
-             is_amount(advance) && advance < step_limit &&
+             is_amount(advance) && advance < step_limit && is_amount(advance_before) &&
+             advance_before < step_limit &&
              std::all_of(intervals, intervals + intervals_kept, is_amount);
     }
   };
@@ -412,9 +415,9 @@ class PatchForces {
   }
 
   // A sub-step of an advance. Its window begins the next one.
-  SubStep sub_step(const Advance& step, double least_window) {
+  SubStep sub_step(const Advance& step) {
     double before = clock_.window, h = step.h;
-    clock_.window = std::max(h, least_window);
+    clock_.window = clock_.step / step.parts;
     return {h,
             clock_.window,
             before > 0.0 ? std::min(h / before, most_again) : 1.0,
