@@ -82,8 +82,12 @@ def support(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike, contacts: Cont
     for box, own in zip(boxes, np.split(corners[order], first[1:])):
         margin[box] = _depth_inside(own.reshape(-1, 2))
     share[on_ground], margin[on_ground] = 1.0, np.inf
-    # Where the centre is above an edge, rounding would decide.
-    inside = margin > DEPTH_FLOOR * sizes.max(axis=1)
+    # Of boxes that merely touch, the solver's depth is a share of the larger one. An edge below the
+    # centre is then a patch so wide: it carries nothing.
+    largest = sizes.max(axis=1)
+    scale = largest.copy()
+    np.maximum.at(scale, upper, largest[carried_by[:, 0]])
+    inside = margin > DEPTH_FLOOR * scale
     return Support(carried_by, share, margin, _standing(carried_by, inside, on_ground))
 
 

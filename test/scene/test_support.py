@@ -47,6 +47,17 @@ def test_a_bridge_stands_while_its_pillars_do():
     assert fallen.margin[3] == bridge.margin[3]
 
 
+@pytest.mark.parametrize('floor', [1.0, 100.0, 10_000.0])
+@pytest.mark.parametrize('width', [0.1, 1.0, 2.0])
+def test_a_box_on_its_edge_does_not_stand(floor, width):
+    """Its centre is above the edge, which merely touches a floor of any size."""
+    turn = np.arctan(width) / 2
+    pose = upright((0, 0, -0.5), (0, 0, np.hypot(width, 1.0) / 2))
+    pose[1, 3:] = 0, np.sin(turn), 0, np.cos(turn)
+    found = supported([(floor, floor, 1), (width, 1, 1)], pose, ground=0)
+    assert len(found.carried_by) == 1 and not found.stands[1]
+
+
 def test_without_ground_nothing_stands():
     """A pile in the air, and four boxes of which each carries the next, in a ring."""
     pile = supported((1, 1, 1), upright((0, 0, 0), (0, 0, 1)))
