@@ -5,7 +5,7 @@
 
 A plan in SMDG BAPLIE has a slot (bay, row, tier) and an ISO 6346 size type for each container. The
 slots say nothing of metres: adapt the grid below to your ship. A container is on what is below it,
-or on the ship. It prints:
+or on the ship. Slots that are taken twice and other size types are refused. It prints:
 
     8 containers, 5 contacts, deepest 0.0 mm
     0100304 42G1 does not stand: its centre is 38 mm outside, 0.50 of its base is on others
@@ -22,25 +22,39 @@ from box_contact_ros import contacts_of, support
 
 PLAN = Path(__file__).with_name('files') / 'ship.edi'
 Slot = tuple[int, int, int, str]  # bay, row, tier, size type
-CONTAINER = re.compile(r'LOC\+147\+(\d{3})(\d\d)(\d\d)(?:(?!LOC\+147).)*?EQD\+\w+\+[^+]*\+(\w{4})',
-                       re.DOTALL)
-LENGTHS, HIGH, WIDE = {'2': 6.058, '4': 12.192, 'L': 13.716}, '5E', 'E'  # [m]; 9 ft 6 in; 2.5 m
+SLOT = re.compile(r'LOC\+147\+(\d{3})(\d\d)(\d\d)((?:(?!LOC\+147).)*)', re.DOTALL)
+TYPE = re.compile(r'EQD\+\w+\+[^+]*\+(\w{4})')
+LENGTHS = {'2': 6.058, '4': 12.192, 'L': 13.716}  # [m], by the first character; see ISO 6346
+HEIGHTS = {'0': 2.438, '2': 2.591, '4': 2.743, '5': 2.896, '8': 1.295, 'C': 2.591, 'D': 2.743,
+           'E': 2.896}  # [m], by the second; letters have a width of 2.5 m
 BAY, ROW, TIER, DECK = 14.6, 2.5, 2.591, 30.0  # pitches, and height of tier 80 [m]
 
 
 def read_slots(text: str) -> list[Slot]:
     """Return the slots and size types of the containers of a plan, from below to above."""
-    return sorted(((int(bay), int(row), int(tier), kind)
-                   for bay, row, tier, kind in CONTAINER.findall(text)), key=lambda slot: slot[2])
+    slots: dict[str, Slot] = {}
+    for bay, row, tier, rest in SLOT.findall(text):
+        slot, kind = bay + row + tier, TYPE.search(rest)
+        if kind is None:
+            print(f'not read: {slot} has no EQD with a size type', file=sys.stderr)
+        elif slot in slots:
+            raise ValueError(f'two containers are in {slot}')
+        elif kind[1][0] not in LENGTHS or kind[1][1] not in HEIGHTS:
+            raise ValueError(f'{slot} has the size type {kind[1]}, of which no size is known here')
+        else:
+            slots[slot] = int(bay), int(row), int(tier), kind[1]
+    if not slots:
+        raise ValueError('there is no container (LOC+147 and EQD)')
+    return sorted(slots.values(), key=lambda slot: slot[2])
 
 
 def stow(slots: list[Slot]) -> tuple[np.ndarray, np.ndarray, list[int]]:
     """Return full extents (n, 3), poses (n, 7), and the containers that have none below them."""
     size, pose = np.zeros((len(slots), 3)), np.zeros((len(slots), 7))
-    stacks, lowest = defaultdict(list), []
+    stacks: dict[tuple[int, bool], list[int]] = defaultdict(list)
+    lowest = []
     for n, (bay, row, tier, kind) in enumerate(slots):
-        size[n] = (LENGTHS[kind[0]], 2.5 if kind[1] in WIDE else 2.438,
-                   2.896 if kind[1] in HIGH else 2.591)
+        size[n] = LENGTHS[kind[0]], 2.5 if kind[1].isalpha() else 2.438, HEIGHTS[kind[1]]
         x = BAY * (bay // 4) + (bay % 4 - 2) * 3.067  # odd bays hold 20 ft at an end of the 40 ft
         y = ROW * ((row + 1) // 2 - 0.5) * (1 if row % 2 else -1) if row else 0.0
         stack = stacks[row, tier < 80]
@@ -56,7 +70,11 @@ def stow(slots: list[Slot]) -> tuple[np.ndarray, np.ndarray, list[int]]:
 
 def main() -> None:
     """Read a plan, and tell what does not stand."""
-    slots = read_slots(Path(sys.argv[1] if len(sys.argv) > 1 else PLAN).read_text('latin-1'))
+    path = Path(sys.argv[1] if len(sys.argv) > 1 else PLAN)
+    try:
+        slots = read_slots(path.read_text('latin-1'))
+    except (OSError, ValueError) as error:
+        sys.exit(f'{path}: {error}')
     size, pose, lowest = stow(slots)
     pairs, contacts = contacts_of(size, pose)
     found = support(size, pose, pairs, contacts, ground=lowest)

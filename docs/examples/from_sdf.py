@@ -4,7 +4,8 @@
 """What touches in a world of boxes? `python docs/examples/from_sdf.py [WORLD]`.
 
 The world is an SDF file, as Gazebo reads it. Each model is a body, whose boxes are no pairs. Those
-that are static never move. Poses that are relative to another frame are not read. It prints:
+that are static never move. What is included, nested or no box is named, and not read. A pose in
+degrees, or relative to another frame, is refused. It prints:
 
     truck/chassis/bed and load/container/box: 1.0 mm deep
     load/container/box and spreader/frame/beam: 1.0 mm deep
@@ -25,6 +26,9 @@ WORLD = Path(__file__).with_name('files') / 'yard.sdf'
 
 def pose_of(part: ElementTree.Element) -> np.ndarray:
     """Return a part's <pose> as x y z qx qy qz qw; the file has x y z roll pitch yaw."""
+    pose = part.find('pose')
+    if pose is not None and any(pose.attrib.values()):
+        raise ValueError(f'the pose of {part.get("name")} has {pose.attrib}, which is not read')
     x, y, z, *turn = map(float, (part.findtext('pose') or '0 0 0 0 0 0').split())
     (sr, sp, sy), (cr, cp, cy) = ([f(angle / 2) for angle in turn] for f in (sin, cos))
     return np.array([x, y, z, sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy,
@@ -39,26 +43,54 @@ def within(frame: np.ndarray, pose: np.ndarray) -> np.ndarray:
                  w * turn[3] - v @ turn[:3]]
 
 
+def boxes_of(model: ElementTree.Element) -> dict[str, Box]:
+    """Return the boxes of a model by model/link/collision."""
+    boxes, body = {}, model.get('name', '')
+    for link in model.iterfind('link'):
+        for part in link.iterfind('collision'):
+            name = f'{body}/{link.get("name")}/{part.get("name")}'
+            size = part.findtext('geometry/box/size')
+            if name in boxes:
+                raise ValueError(f'two collisions have the name {name}')
+            if size is None:
+                print(f'not read: {name} is no box', file=sys.stderr)
+                continue
+            boxes[name] = Box(np.array(size.split(), float),
+                              within(pose_of(link), pose_of(part)), body=body)
+    return boxes
+
+
 def read_world(path: str | Path) -> tuple[Scene, np.ndarray]:
     """Return the scene of a world, and the poses (n, 7) of the models that move."""
-    boxes, bodies, moving = {}, {}, []
-    for model in ElementTree.parse(path).iterfind('world/model'):
-        name, pose = model.get('name'), pose_of(model)
-        is_static = model.findtext('static') in ('true', '1')
+    world = ElementTree.parse(path).find('world')
+    if world is None:
+        raise ValueError('there is no <world>')
+    for part in [*world.iter('include'), *world.iterfind('model//model')]:
+        print(f'not read: {part.tag} {part.findtext("uri", part.get("name"))}', file=sys.stderr)
+    boxes: dict[str, Box] = {}
+    bodies: dict[str, Frame] = {}
+    moving = []
+    for model in world.iterfind('model'):
+        own, name, pose = boxes_of(model), model.get('name', ''), pose_of(model)
+        if not own:
+            continue
+        if name in bodies:
+            raise ValueError(f'two models have the name {name}')
+        boxes |= own
+        is_static = model.findtext('static', '').strip() in ('true', '1')
         bodies[name] = Frame(pose) if is_static else Frame()
         moving += [] if is_static else [pose]
-        for link in model.iterfind('link'):
-            for part in link.iterfind('collision'):
-                if size := part.findtext('geometry/box/size'):
-                    boxes[f'{name}/{link.get("name")}/{part.get("name")}'] = Box(
-                        np.array(size.split(), float), within(pose_of(link), pose_of(part)),
-                        body=name)
-    return Scene(boxes, bodies=bodies, patterns=(('*', '*'),), pose_array=True), np.array(moving)
+    scene = Scene(boxes, bodies=bodies, patterns=(('*', '*'),), pose_array=True)
+    return scene, np.array(moving).reshape(-1, 7)
 
 
 def main() -> None:
     """Read a world, and tell what touches in it."""
-    scene, moving = read_world(sys.argv[1] if len(sys.argv) > 1 else WORLD)
+    path = sys.argv[1] if len(sys.argv) > 1 else WORLD
+    try:
+        scene, moving = read_world(path)
+    except (OSError, ValueError, ElementTree.ParseError) as error:
+        sys.exit(f'{path}: {error}')
     for pair, contact in SceneSolver(scene)(moving).named():
         print(f'{pair.a} and {pair.b}: {-1e3 * contact.separation:.1f} mm deep')
 

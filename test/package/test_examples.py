@@ -14,6 +14,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 from patience import PATIENCE
@@ -59,6 +60,46 @@ def test_example(name: str, program, tmp_path: Path) -> None:
         printed, expected = ([re.sub(r'[-\d.,]+', '#', line) for line in lines]
                              for lines in (printed, expected))
     assert printed == expected
+
+
+def run_with_other_file(name: str, file: Path, old: str, new: str) -> Any:
+    """Run an example with its file, in which some words are others."""
+    text = (EXAMPLES / 'files' / file.name).read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))
+    return subprocess.run([sys.executable, EXAMPLES / name, file], capture_output=True, text=True,
+                          timeout=PATIENCE)
+
+
+@pytest.mark.parametrize(('name', 'file', 'old', 'new', 'words'), [
+    ('from_sdf.py', 'yard.sdf', '<pose>0 6 0', '<pose degrees="true">0 6 0', 'pose of truck has'),
+    ('from_sdf.py', 'yard.sdf', 'name="spreader"', 'name="load"', 'the name load'),
+    ('from_sdf.py', 'yard.sdf', 'name="axles"', 'name="bed"', 'the name truck/chassis/bed'),
+    ('from_sdf.py', 'yard.sdf', 'world', 'model', 'no <world>'),
+    ('from_sdf.py', 'yard.sdf', '</sdf>', '', 'no element found'),
+    ('from_baplie.py', 'ship.edi', 'LOC', '', 'no container'),
+    ('from_baplie.py', 'ship.edi', '0110302', '0110102', 'two containers are in 0110102'),
+    ('from_baplie.py', 'ship.edi', '45G1', '4CG1', ''),
+    ('from_baplie.py', 'ship.edi', '45G1', '4ZG1', 'size type 4ZG1')])
+def test_a_file_that_is_misread_is_refused(name: str, file: str, old: str, new: str, words: str,
+                                           tmp_path: Path) -> None:
+    """By one line, that names the file and what is wrong."""
+    done = run_with_other_file(name, tmp_path / file, old, new)
+    assert done.returncode == bool(words) and done.stderr.count('\n') == bool(words), done.stderr
+    assert done.stderr.startswith(f'{tmp_path / file}: ' if words else '') and words in done.stderr
+
+
+@pytest.mark.parametrize(('name', 'file', 'old', 'new', 'words'), [
+    ('from_sdf.py', 'yard.sdf', '<size>12.4 2.5 0.2</size></box>', '</box><sphere/>',
+     'truck/chassis/bed is no box'),
+    ('from_sdf.py', 'yard.sdf', '</world>', '<include><uri>crane</uri></include></world>',
+     'include crane'),
+    ('from_baplie.py', 'ship.edi', "EQD+CN+TEST0000001+22G1+++5'", '', '0090102 has no EQD')])
+def test_what_is_not_read_is_named(name: str, file: str, old: str, new: str, words: str,
+                                   tmp_path: Path) -> None:
+    done = run_with_other_file(name, tmp_path / file, old, new)
+    assert done.returncode == 0 and done.stderr == f'not read: {done.stderr[10:]}'
+    assert words in done.stderr and done.stderr.count('\n') == 1
 
 
 def refused(client: Sequence[str | Path], program) -> bool:
