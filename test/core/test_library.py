@@ -44,7 +44,7 @@ LINKED = (str(LIBRARY), f'-Wl,-rpath,{LIBRARY.parent}')
 EACH_FUNCTION_ONCE = '-Dalways_inline=noinline'
 """Compile no function of the core in each of its callers: a kernel takes 2 s in place of 12."""
 EXAMPLE = ROOT / 'docs' / 'examples' / 'cpp'
-STRICT = ('-Wall', '-Wextra', '-Werror', '-pedantic')
+STRICT = ('-Wall', '-Wextra', '-Wshadow', '-Wconversion', '-Werror', '-pedantic')
 EXAMPLE_SAYS = [
     'height 2.600 m: no contact, gap 0.009 m',
     'height 2.590 m: contact, depth 0.001 m, normal (0.000, 0.000, -1.000), '

@@ -38,10 +38,10 @@ struct Patches {
   double age = 0.0;                // since the answer was asked for [s]
   double period = 0.0;             // from one question to the next [s]; 0: by the last answers
 
-  explicit Patches(Span<const std::int64_t> pairs, const Results& results = {})
-      : pairs(pairs), results(results) {}
-  Patches(const Rows& rows, const Results& results)
-      : Patches(rows.pairs.value_or(Span<const std::int64_t>()), results) {}
+  explicit Patches(Span<const std::int64_t> boxes, const Results& found = {})
+      : pairs(boxes), results(found) {}
+  Patches(const Rows& rows, const Results& found)
+      : Patches(rows.pairs.value_or(Span<const std::int64_t>()), found) {}
 };
 
 struct Body {
