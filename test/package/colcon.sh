@@ -14,6 +14,8 @@ python=$(realpath -s "${1:-$root/.venv/bin/python}")
 # All files are read. Left out are slow tests, and long files that no installation changes.
 long='core|faults|laws|markers|readme|scene_node|series'
 quick=(-m 'not slow' -k "not (test_${long//|/ or test_})")
+# For hangs alone: half an hour, then ten seconds to end in.
+limited=(timeout --kill-after=10 1800)
 arguments=("${@:2}")
 if [ $# -lt 2 ]; then arguments=("${quick[@]}"); fi
 work=$(mktemp -d)
@@ -64,16 +66,16 @@ workspace() {
     cd "$work/$1"
     ln -s box_contact_ros/box_contact_msgs src/box_contact_msgs
     cp -r src/box_contact_ros/test/package/linked src/linked
-    colcon build "${@:2}"
+    "${limited[@]}" colcon build "${@:2}"
     linked
     # A second build compiles nothing.
     local library=install/box_contact_ros/lib/libbox_contact.so before
     before=$(stat --dereference --format %Y "$library")
-    colcon build "${@:2}" --packages-select box_contact_ros
+    "${limited[@]}" colcon build "${@:2}" --packages-select box_contact_ros
     [ "$(stat --dereference --format %Y "$library")" = "$before" ]
     # Where `ros2 run` and `ros2 launch` look.
     ls install/box_contact_ros/{lib/box_contact_ros/contact_node,share/box_contact_ros/package.xml}
-    colcon test --packages-select box_contact_ros --pytest-args "${arguments[@]}"
+    "${limited[@]}" colcon test --packages-select box_contact_ros --pytest-args "${arguments[@]}"
     colcon test-result --verbose
 }
 
