@@ -24,9 +24,10 @@ PLAN = Path(__file__).with_name('files') / 'ship.edi'
 Slot = tuple[int, int, int, str]  # bay, row, tier, size type
 SLOT = re.compile(r'LOC\+147\+(\d{3})(\d\d)(\d\d)((?:(?!LOC\+147).)*)', re.DOTALL)
 TYPE = re.compile(r'EQD\+\w+\+[^+]*\+(\w{4})')
-LENGTHS = {'2': 6.058, '4': 12.192, 'L': 13.716}  # [m], by the first character; see ISO 6346
-HEIGHTS = {'0': 2.438, '2': 2.591, '4': 2.743, '5': 2.896, '8': 1.295, 'C': 2.591, 'D': 2.743,
-           'E': 2.896}  # [m], by the second; letters have a width of 2.5 m
+LENGTHS = {'2': 6.058, '4': 12.192, 'L': 13.716}
+"""[m], by the first character of the size type; see ISO 6346."""
+HEIGHTS = {'0': 2.438, '2': 2.591, '3': 2.591, '5': 2.896, 'C': 2.591, 'D': 2.743, 'E': 2.896}
+"""[m], by the second; 3 is of the standard's year 1985. A letter means that the width is 2.5 m."""
 BAY, ROW, TIER, DECK = 14.6, 2.5, 2.591, 30.0  # pitches, and height of tier 80 [m]
 
 
