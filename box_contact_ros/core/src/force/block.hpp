@@ -11,11 +11,11 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// A window is a sub-step of the longest of three steps, as a frame may end with two shorter ones, or at
-// least the window before divided by the first. A step begins with at most the second times the
-// impulses of a window [1]. What iterations leave is as large in a step of 1 ns as in one of 5 ms:
-// divided by the step it would be any force. A window that is halved by each tiny step loses a tower's
-// impulses in three of them.
+// A window shrinks by the first where three steps are shorter by more: a frame may end with two shorter
+// ones, and a step that is measured varies. A step begins with at most the second times the impulses of
+// a window [1]. What iterations leave is as large in a step of 1 ns as in one of 5 ms: divided by the
+// step it would be any force. A window that is halved by each tiny step loses a tower's impulses in
+// three of them.
 constexpr double window_shrinkage = 1.25, most_again = 2.0;
 // Angular frequency of a soft constraint times the window [1]: a quarter turn. A box that rests on a
 // whole face is 0.4·g·step² deep.

@@ -195,8 +195,9 @@ class PatchForces {
   void advance(double dt, const bc_pose* poses, const bc_velocity* velocities,
                const bc_wrench* outside, const bc_motion& motion) {
     // A late answer bears no stiffer patches in shorter sub-steps: all iterations are in one.
-    double least = clock_.step / window_shrinkage;
-    clock_.step = std::max({dt, clock_.advance, clock_.advance_before, least});
+    double longest = std::max({dt, clock_.advance, clock_.advance_before});
+    double shrunk = clock_.step / window_shrinkage;
+    if (longest > clock_.step || longest < shrunk) clock_.step = std::max(longest, shrunk);
     bool is_late = frequency_of(clock_.late, clock_.period) < soft_frequency / clock_.step;
     int parts = is_late ? 1 : options_.substeps;
     Advance step{dt,     dt / parts, parts, options_.substeps / parts, poses, velocities, outside,
@@ -282,7 +283,7 @@ class PatchForces {
     double since = -1.0;                    // the last answer [s]; below 0: there was none
     double period = 0.0;                    // between answers [s]
     double late = 0.0;                      // age of the last answer when it came [s]
-    double step = 0.0;                      // the longest one lately [s]
+    double step = 0.0;                      // the longest one lately, or a little more [s]
     double window = 0.0;                    // in which the patches' impulses were given [s]
     double advance = 0.0;                   // length of the last one [s]
     double advance_before = 0.0;            // and of the one before [s]
