@@ -214,7 +214,7 @@ class PatchForces:
         friction: μ (k,).
         surface_velocity: (k, 3) of B's surface relative to A's [m/s], as of a belt. That of the
         bodies is added.
-        stiffness: (k,) [N/m]. 0 is as stiff as step and answers allow.
+        stiffness: (k,) [N/m]. 0 is as stiff as step and answers allow, the most.
         age: how long ago the answer was asked for [s].
         period: from one question to the next [s]. 0 is the least of the last intervals between
         answers.

@@ -71,7 +71,7 @@ typedef struct bc_patches {
                                period are 0 to 1e50 */
   const double* surface;    /* (count, 3): velocity of B's surface relative to A's, beside that of the
                                bodies, as of a belt [m/s]; NULL: none */
-  const double* stiffness;  /* [N/m]; 0, or NULL: as stiff as step and answers bear */
+  const double* stiffness;  /* [N/m]; 0, or NULL: as stiff as step and answers bear, the most */
   double age;               /* since the answer was asked for [s] */
   double period;            /* from one question to the next [s]; 0: from the answer before */
 } bc_patches;

@@ -34,7 +34,7 @@ struct Patches {
   Results results;                 // separation, normal, point, volume and covariance
   Span<const double> friction{};   // Coulomb's μ of each pair
   Span<const double> surface{};    // velocity of B's surface relative to A's, three numbers a row [m/s]
-  Span<const double> stiffness{};  // of each pair [N/m]; 0: as stiff as step and answers bear
+  Span<const double> stiffness{};  // of each pair [N/m]; 0: as stiff as step and answers bear, the most
   double age = 0.0;                // since the answer was asked for [s]
   double period = 0.0;             // from one question to the next [s]; 0: by the last answers
 

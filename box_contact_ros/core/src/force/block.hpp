@@ -134,9 +134,11 @@ inline void soften(const Patch& patch, const SubStep& step, double depth, const 
   if (is_apart || patch.age > step.overdue) return;
   double frequency = soft_frequency / step.window;
   double bearable = frequency_of(patch.late, step.period);
-  bool is_late = bearable < frequency * step.share, is_spring = patch.stiffness > 0.0;
+  bool is_late = bearable < frequency * step.share;
   if (is_late) frequency = bearable;
-  if (is_spring) frequency = std::sqrt(patch.stiffness * pressed[0][0]);
+  double own = std::sqrt(patch.stiffness * pressed[0][0]);
+  bool is_spring = 0.0 < own && own < frequency;
+  if (is_spring) frequency = own;
   double damping = is_late || is_spring ? slow_damping_ratio : soft_damping_ratio;
   double rate = frequency / (2.0 * damping + h * frequency);
   double softness = rate / (h * frequency * frequency);
@@ -149,7 +151,7 @@ inline void soften(const Patch& patch, const SubStep& step, double depth, const 
     rows.mass = softened(pressed, rows.softness);
     block.relaxed = rows;
   }
-  double slowed = std::min(1.0, push_out_limit / (rate * depth));
+  double slowed = is_spring ? 1.0 : std::min(1.0, push_out_limit / (rate * depth));
   rows.softness[0] = slowed * softness * pressed[0][0];
   rows.bias[0] = -slowed * rate * depth;
   rows.mass = softened(pressed, rows.softness);
