@@ -21,6 +21,9 @@ from ..solver.pose import rotation_matrix
 UPRIGHT = 0.9
 """Least cosine between `up` and the normal of a contact that carries: 26°, which friction 0.5
 holds."""
+SQUARE = 1e-3
+"""A patch is a square where its variances differ from their mean by a smaller share: all directions
+have its covariance."""
 _CORNERS = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
 
 
@@ -47,7 +50,7 @@ def support(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike, contacts: Cont
     ground: what stands by itself, by index: a box or boxes.
     up: the direction against gravity, of any length.
 
-    Raises ValueError, with the field and the value, for bad input.
+    Raises ValueError, with the field and the value, for bad input, as a pair that is given twice.
     """
     sizes, poses = as_boxes(sizes, poses)
     count = len(poses)
@@ -56,13 +59,17 @@ def support(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike, contacts: Cont
         raise ValueError(f'contacts must be Contacts of {len(rows)} pairs, not '
                          f'{short_repr(contacts)}')
     direction = as_floats(up, 'up', 'a direction (3,)', (3,))
-    length = np.linalg.norm(direction)
-    if not 0.0 < length < np.inf:
+    largest = np.abs(direction).max()
+    if not 0.0 < largest < np.inf:
         raise ValueError(f'up must have a length, not {short_repr(up)}')
     on_ground = np.zeros(count, bool)
     for box in ground if np.iterable(ground) else [ground]:
         on_ground[as_whole(box, 'ground', 0, count - 1)] = True
-    direction = direction / length
+    direction = direction / largest
+    direction = direction / np.linalg.norm(direction)
+    unique, times = np.unique(np.sort(rows, axis=1), axis=0, return_counts=True)
+    if (times > 1).any():
+        raise ValueError(f'pairs has boxes {tuple(unique[times.argmax()].tolist())} twice')
 
     slope = contacts.normal @ direction
     carries = contacts.colliding & (np.abs(slope) >= UPRIGHT)
@@ -70,13 +77,14 @@ def support(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike, contacts: Cont
     if not np.isfinite(contacts.covariance).all():
         raise ValueError('contacts must have covariances: solve them with patch=True')
     carried_by = np.where(slope[:, None] > 0.0, rows[carries], rows[carries, ::-1])
-    upper = carried_by[:, 1]
+    lower, upper = carried_by.T
 
     turned = np.abs(direction @ rotation_matrix(poses[:, 3:]))
     base = sizes.prod(axis=1) / sizes[np.arange(count), turned.argmax(axis=1)]
     share = np.bincount(upper, patch_areas(contacts), minlength=count) / base
     margin = np.full(count, -np.inf)
-    corners = _corners(contacts, poses[upper, :3], direction)
+    smaller = np.where(base[lower] < base[upper], lower, upper)
+    corners = _corners(contacts, poses[upper, :3], poses[smaller, 3:], direction)
     order = np.argsort(upper, kind='stable')
     boxes, first = np.unique(upper[order], return_index=True)
     for box, own in zip(boxes, np.split(corners[order], first[1:])):
@@ -84,9 +92,9 @@ def support(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike, contacts: Cont
     share[on_ground], margin[on_ground] = 1.0, np.inf
     # Of boxes that merely touch, the solver's depth is a share of the larger one. An edge below the
     # centre is then a patch so wide: it carries nothing.
-    largest = sizes.max(axis=1)
-    scale = largest.copy()
-    np.maximum.at(scale, upper, largest[carried_by[:, 0]])
+    longest = sizes.max(axis=1)
+    scale = longest.copy()
+    np.maximum.at(scale, upper, longest[lower])
     inside = margin > DEPTH_FLOOR * scale
     return Support(carried_by, share, margin, _standing(carried_by, inside, on_ground))
 
@@ -104,10 +112,24 @@ def _standing(carried_by: np.ndarray, inside: np.ndarray, on_ground: np.ndarray)
         stands = higher
 
 
-def _corners(contacts: Contacts, centre: np.ndarray, up: np.ndarray) -> np.ndarray:
-    """Return the corners (k, 4, 2) of patches across `up`, from centres (k, 3)."""
+def _corners(contacts: Contacts, centre: np.ndarray, turn: np.ndarray,
+             up: np.ndarray) -> np.ndarray:
+    """Return the corners (k, 4, 2) of patches across `up`, from centres (k, 3).
+
+    Squares have the sides of the boxes with quaternions `turn` (k, 4).
+    """
     across = np.linalg.svd(up[None])[2][1:]  # two unit vectors
-    variances, axes = np.linalg.eigh(across @ contacts.covariance @ across.T)
+    moments = across @ contacts.covariance @ across.T
+    mean = np.trace(moments, axis1=1, axis2=2) / 2.0
+    off, mixed = (moments[:, 0, 0] - moments[:, 1, 1]) / 2.0, moments[:, 0, 1]
+    edges = rotation_matrix(turn)
+    level = np.abs(up @ edges).argmin(axis=1)
+    edge = edges[np.arange(len(edges)), :, level] @ across.T
+    is_square = np.hypot(off, mixed) < SQUARE * mean
+    angle = np.where(is_square, np.arctan2(edge[:, 1], edge[:, 0]), np.arctan2(mixed, off) / 2.0)
+    sine, cosine = np.sin(angle), np.cos(angle)
+    axes = np.moveaxis(np.array([[cosine, -sine], [sine, cosine]]), 2, 0)
+    variances = np.einsum('kji,kjl,kli->ki', axes, moments, axes)
     half = axes * np.sqrt(3.0 * np.maximum(variances, 0.0))[:, None]  # a rectangle's half edges
     middle: np.ndarray = (contacts.point - centre) @ across.T
     return middle[:, None] + _CORNERS @ half.transpose(0, 2, 1)
@@ -119,6 +141,7 @@ def _depth_inside(points: np.ndarray) -> float:
     edge = np.roll(hull, -1, axis=0) - hull
     length = np.maximum(np.hypot(*edge.T), np.finfo(float).tiny)  # of one point
     offset = (edge[:, 1] * hull[:, 0] - edge[:, 0] * hull[:, 1]) / length
+    offset[length < DEPTH_FLOOR * length.max()] = np.inf  # between corners that rounding parts
     if len(hull) > 2 and offset.min() >= 0.0:
         return float(offset.min())
     along = np.clip(-(hull * edge).sum(axis=1) / length**2, 0.0, 1.0)

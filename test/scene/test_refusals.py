@@ -219,6 +219,7 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: support(UNIT, POSES, [(0, 1)], CONTACTS, ground=2), 'ground', '2'),
     (lambda: support(UNIT, POSES, [(0, 1)], CONTACTS, ground=['a']), 'ground', "'a'"),
     (lambda: support(UNIT, POSES, [(0, 1)], CONTACTS, up=(0, 0, 0)), 'up', '(0, 0, 0)'),
+    (lambda: support(UNIT, POSES, [(0, 1), (1, 0)], CONTACTS[[0, 0]]), 'pairs', '(0, 1)'),
     (lambda: support(UNIT, POSES, [(0, 1)], CONTACTS, up=(0, NAN, 0)), 'up', '(0, nan, 0)'),
     (lambda: read_scene(5), 'path', '5'),
     (lambda: read_scene('no.yaml'), 'scene', "'no.yaml'"),

@@ -117,6 +117,30 @@ def test_up_is_any_direction():
     assert np.array_equal(found.stands, wanted.stands) and 50 < found.stands.sum() < 250
 
 
+@pytest.mark.parametrize('yaw', range(0, 91, 5))
+def test_a_square_patch_has_the_sides_of_its_box(yaw):
+    """A crate of which 0.4 x 0.4 m is on a pallet, both turned; and a cube turned on a floor."""
+    half = np.radians(yaw) / 2
+    turn = np.array([[0.0, 0.0, np.sin(half), np.cos(half)]])
+    pose = poses.moved(upright((0, 0, 0.05), (0.45, 0, 0.25)), np.zeros(3), turn)
+    crate = supported([(0.85, 0.4, 0.1), (0.85, 0.4, 0.3)], pose, ground=0)
+    assert crate.margin[1] == pytest.approx(-0.025, abs=1e-8) and not crate.stands[1]
+    pose[0] = upright((0, 0, 0.05))[0]
+    cube = supported([(30, 30, 0.1), (0.4, 0.4, 0.3)], pose, ground=0)
+    assert cube.margin[1] == pytest.approx(0.2, abs=1e-8) and cube.stands[1]
+
+
+def test_corners_that_rounding_parts_are_one():
+    """Five boxes below a sixth, in one of many frames: the margin is that of the hull."""
+    size = [(1, 1, 1)] * 4 + [(2, 2, 1)]
+    pose = upright((-0.5, -0.5, 0), (0.5, -0.5, 0), (-0.5, 0.5, 0), (0.5, 0.5, 0), (0, 0, 1))
+    turns = poses.unit_quaternions(np.random.default_rng(5), 200)
+    for turn in turns:
+        up = poses.moved(upright((0, 0, 1)), np.zeros(3), turn[None])[0, :3]
+        found = supported(size, poses.moved(pose, np.zeros(3), turn[None]), up=1e300 * up)
+        assert found.margin[4] == pytest.approx(1.0, abs=1e-7)
+
+
 def test_a_steep_slope_carries_nothing():
     """Of two boxes in one frame, tilted: up to 25.8° the lower carries the upper."""
     for degrees, carries in ((25.0, True), (26.0, False)):
