@@ -168,6 +168,21 @@ def on_a_slope(degrees: float) -> World:
     return World(pose(z=0.25), size=(1.0, 1.0, 0.5), gravity=lean).run(1000)
 
 
+@pytest.mark.parametrize('degrees', [0.0, 10.0, 37.0, 45.0])
+def test_a_square_patch_has_the_sides_of_its_box(degrees: float) -> None:
+    """A plate whose centre is 25 mm outside of a patch of 0.4 x 0.4 m tips in any direction."""
+    half = math.radians(degrees) / 2.0
+    turn = (0.0, 0.0, math.sin(half), math.cos(half))
+    aside = 0.45 * math.cos(2.0 * half), 0.45 * math.sin(2.0 * half)
+    world = World(pose(turn=turn), pose(*aside, 0.1, turn), size=(0.85, 0.4, 0.1))
+    world.bodies = [FIXED, FIXED, Body.of_box((0.85, 0.4, 0.1), MASS)]
+    world.forces = PatchForces(world.bodies)
+    world.pairs = np.array([(1, 2)])
+    world.outside[1] = 0.0
+    world.run(2000)
+    assert world.poses[2, 2] < 0.0
+
+
 def test_coulombs_limit_on_a_slope() -> None:
     """μ = 0.5 holds up to 26.57°; beyond it the acceleration is g·(sin θ − μ·cos θ)."""
     still = on_a_slope(26.5)
@@ -250,7 +265,7 @@ def test_what_is_pushed_out_does_not_jump(overlap: float, fall: float) -> None:
     (0.003,) * 5 + (0.1 / 60,), (0.003, 0.002, 1e-18),
     tuple(1 / 240 * np.random.default_rng(5).normal(1.0, 0.05, 240).clip(0.85, 1.15))])
 def test_steps_of_other_lengths_leave_a_tower_at_rest(steps: tuple[float, ...]) -> None:
-    """A frame of 1/60 s in steps of 3 ms at most, two kinds of shorter ones, measured steps: 6 s."""
+    """A frame of 1/60 s in steps of 3 ms at most, two kinds of shorter ones, measured ones."""
     world = ten_cubes()
     for dt in steps * round(6.0 / sum(steps)):
         world.hold()

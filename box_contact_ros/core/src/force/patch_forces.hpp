@@ -384,13 +384,24 @@ class PatchForces {
     patch.asked_b = placed_at(poses[patch.b], bodies_[size_t(patch.b)].centre);
     patch.normal = sign * vector_at(answer.normal + 3 * k);
     patch.point = vector_at(answer.point + 3 * k);
-    patch.shape = rectangle_of(patch.normal, answer.covariance + 9 * k);
+    patch.shape = rectangle_of(patch.normal, answer.covariance + 9 * k, [&] {
+      // The lighter body is more often the smaller one, whose face the patch is.
+      bool is_b = bodies_[size_t(patch.a)].inverse_mass < bodies_[size_t(patch.b)].inverse_mass;
+      return axes_of(is_b ? patch.box_b : patch.box_a, poses[is_b ? patch.b : patch.a]);
+    });
     patch.depth = answer.volume[k] / (4.0 * patch.shape.half_1 * patch.shape.half_2);
     patch.friction = answer.friction ? answer.friction[k] : options_.friction;
     patch.stiffness = answer.stiffness ? answer.stiffness[k] : 0.0;
     if (answer.surface) patch.surface = sign * vector_at(answer.surface + 3 * k);
     patch.late = answer.age;
     return patch;
+  }
+
+  // The axes of a box, with its body at `body`.
+  Mat<double> axes_of(int32_t box, const bc_pose& body) const {
+    bool is_body = boxes_.empty();
+    return rotation_matrix(
+        (is_body ? body : in_common_frame(body, boxes_[size_t(box)].box.pose)).quaternion);
   }
 
   // Hand on the impulses of the patches before, and keep the patches of stale pairs.

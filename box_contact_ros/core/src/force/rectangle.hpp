@@ -21,6 +21,9 @@ constexpr double radius_of_line = 0.866025403784438647, radius_of_square = 0.937
 // Torsion of the patches of real overlaps, divided by that of their rectangles [1]: the mean.
 constexpr double torsion_share = 0.966;
 
+// A patch is a square where its variances differ from their mean by less [1].
+constexpr double square_slack = 1e-3;
+
 // By how much the length of a normal may differ from 1 [1].
 constexpr double normal_slack = 1e-6;
 // By how much of its trace an eigenvalue of a covariance may be below zero [1]: rounding.
@@ -60,7 +63,21 @@ struct Rectangle {
   }
 };
 
-inline Rectangle rectangle_of(const Vec<double>& normal, const double* covariance) {
+// The edge of a box with such axes that is most along its patch, as a direction in the plane of that.
+inline Vec<double> edge_in_plane(const Vec<double>& normal, const Mat<double>& axes) {
+  Vec<double> edge = column(axes, 0);
+  for (int k = 1; k < 3; ++k) {
+    Vec<double> other = column(axes, k);
+    if (std::fabs(dot(other, normal)) < std::fabs(dot(edge, normal))) edge = other;
+  }
+  edge = edge - dot(edge, normal) * normal;
+  return (1.0 / length(edge)) * edge;
+}
+
+// `box_axes()` are those of the box whose sides a square has: all directions have its covariance.
+template <class BoxAxes>
+Rectangle rectangle_of(const Vec<double>& normal, const double* covariance,
+                       const BoxAxes& box_axes) {
   Vec<double> u, v;
   tangents(normal, u, v);
   auto moment = [&](const Vec<double>& p, const Vec<double>& q) {
@@ -76,6 +93,10 @@ inline Rectangle rectangle_of(const Vec<double>& normal, const double* covarianc
   double along_v = uv < 0.0 ? -1.0 : 1.0;
   Vec<double> axis_1 = off < 0.0 ? lesser * u + (along_v * larger) * v
                                  : larger * u + (along_v * lesser) * v;
+  if (spread < square_slack * mean) {
+    axis_1 = edge_in_plane(normal, box_axes());
+    spread = moment(axis_1, axis_1) - mean;
+  }
   double e1 = std::max(0.0, mean + spread);
   double e2 = std::max(mean - spread, thinnest * thinnest * e1);
   double squareness = e1 > 0.0 ? 2.0 * std::sqrt(e1 * e2) / (e1 + e2) : 1.0;
