@@ -456,6 +456,18 @@ def test_a_kinematic_body_carries_along() -> None:
     assert world.velocities[:, 2] == pytest.approx([0.5, 0.5], abs=1e-6)
 
 
+@pytest.mark.parametrize('step', [0.001, 1 / 60])
+def test_a_turntable_carries_along(step: float) -> None:
+    """At half of what friction holds, 3 m from the axis, for 10 s: the cube stays where it is."""
+    world = World(pose(3.0, z=0.5))
+    for _ in range(round(10.0 / step)):
+        world.velocities[0, 5] += min(1e-3, math.sqrt(0.25 * GRAVITY / 3.0) - world.velocities[0, 5])
+        world.hold()
+        world.step(step)
+    assert world.velocities[1, 5] == pytest.approx(world.velocities[0, 5], rel=1e-6)
+    assert np.hypot(*world.poses[1, :2]) == pytest.approx(3.0, abs=1e-3)
+
+
 def test_a_stale_pair_keeps_its_patch() -> None:
     world = World(pose(z=0.5)).run(100)
     stale = replace(world.contacts(), separation=np.array([math.nan]))

@@ -158,6 +158,13 @@ inline void soften(const Patch& patch, const SubStep& step, double depth, const 
   if (is_spring) block.relaxed = rows;
 }
 
+// From a body's centre of mass to a point. On one that no force moves, a point goes around by the chord
+// of the step: by the tangent, what lies on a turntable would creep outward.
+inline Vec<double> arm_of(const Moving& body, const Vec<double>& point, double h) {
+  Vec<double> arm = point - body.placed.position;
+  return body.inverse_mass > 0.0 ? arm : arm + 0.5 * h * cross(body.angular, arm);
+}
+
 // Make the rows of a patch, where its bodies are now.
 inline void prepare(const Patch& patch, const Moving& a, const Moving& b, const SubStep& step,
                     Block& block) {
@@ -167,8 +174,8 @@ inline void prepare(const Patch& patch, const Moving& a, const Moving& b, const 
   Vec<double> way_b = carried(patch.asked_b, b.placed, patch.point) - patch.point;
   double share = a.inverse_mass > 0.0 ? b.inverse_mass > 0.0 ? 0.5 : 1.0 : 0.0;
   Vec<double> point = patch.point + (1.0 - share) * way_a + share * way_b;
-  block.arm_a = point - a.placed.position;
-  block.arm_b = point - b.placed.position;
+  block.arm_a = arm_of(a, point, step.length);
+  block.arm_b = arm_of(b, point, step.length);
   block.normal = patch.normal;
   block.surface = patch.surface;
   block.shape = shape;
