@@ -259,7 +259,7 @@ class PatchForces:
         return Motion._make(found)
 
     def loads(self) -> Loads:
-        """Return what each pair carried in the last step."""
+        """Return what each pair carried in the last step; none, once patches were dropped since."""
         return Loads._make(self._native.loads())
 
     def forget(self, bodies: ArrayLike) -> None:

@@ -78,10 +78,19 @@ int main() {
   for (int step = 0; step < 10; ++step) copy.advance(0.001, poses, velocities, outside);
   failures += allocations != before;
   failures += !(copy.loads()[0].pressing > 1e5);
+  try {
+    const Patches unnamed(Rows{}, Results{});
+    ++failures;
+  } catch (const std::invalid_argument&) {
+  }
   copy.forget(pair);
+  failures += !copy.loads().empty();
   copy.set_boxes({});
   copy.set_bodies({bodies, 1});
   copy.advance(0.001, {poses, 1}, {velocities, 1});
+  PatchForces empty{Span<const Body>()};
+  empty.hold(Patches(Span<const std::int64_t>()));
+  empty.advance(0.001, {}, {});
   std::printf("%d failures\n", failures);
   return failures != 0;
 }

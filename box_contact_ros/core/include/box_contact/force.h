@@ -148,8 +148,8 @@ BC_API bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, con
                                          const bc_velocity* velocities, const bc_wrench* outside,
                                          const bc_motion* motion);
 
-/* Write what each pair carried, by the lower and the higher box, and return how many there are; nothing
- * is written if `capacity` is less. */
+/* Write what each pair carried in the last advance, by the lower and the higher box, and return how many
+ * there are: none once patches were dropped since. Nothing is written if `capacity` is less. */
 BC_API int64_t bc_patch_forces_loads(const bc_patch_forces* forces, bc_load* loads, int64_t capacity);
 
 /* Write the state as bytes, for machines of the same byte order, and return how many there are;

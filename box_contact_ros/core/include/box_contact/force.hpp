@@ -40,8 +40,13 @@ struct Patches {
 
   explicit Patches(Span<const std::int64_t> boxes, const Results& found = {})
       : pairs(boxes), results(found) {}
-  Patches(const Rows& rows, const Results& found)
-      : Patches(rows.pairs.value_or(Span<const std::int64_t>()), found) {}
+  Patches(const Rows& rows, const Results& found) : Patches(pairs_of(rows), found) {}
+
+ private:
+  static Span<const std::int64_t> pairs_of(const Rows& rows) {
+    if (!rows.pairs) detail::raise(BC_BAD_ARGUMENT, "rows must have pairs, which name the bodies");
+    return *rows.pairs;
+  }
 };
 
 struct Body {
@@ -125,7 +130,8 @@ class PatchForces {
     advance(dt, poses, velocities, outside, {sizeof(bc_motion), nullptr, nullptr, found.data()});
   }
 
-  // What each pair carried, by the lower and the higher box: the mean of the last advance.
+  // What each pair carried, by the lower and the higher box: the mean of the last advance. None, once
+  // patches were dropped since.
   std::vector<Load> loads() const {
     std::vector<Load> found(std::size_t(bc_patch_forces_loads(forces_.get(), nullptr, 0)));
     bc_patch_forces_loads(forces_.get(), found.data(), std::int64_t(found.size()));

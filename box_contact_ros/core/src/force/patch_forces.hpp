@@ -341,8 +341,10 @@ class PatchForces {
     return bodies_[size_t(a)].is_free() || bodies_[size_t(b)].is_free();
   }
 
+  // Loads name boxes, which may be others or none from now on.
   template <class Condition>
   void drop(Condition condition) {
+    loads_.clear();
     patches_.erase(std::remove_if(patches_.begin(), patches_.end(), condition), patches_.end());
     is_grouped_ = false;
   }

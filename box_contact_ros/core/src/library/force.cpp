@@ -328,8 +328,8 @@ bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches* answer
     if (!forces || !answer) return refuse_null(forces ? "answer" : "forces");
     bc_patches all{};
     if (!read(answer, all)) return fail(BC_BAD_ABI, "answer.size is unknown");
-    if (all.separation && !poses) return refuse_null("poses");
     PatchForces& self = forces_of(forces);
+    if (all.separation && !poses && !self.bodies().empty()) return refuse_null("poses");
     if (bc_status status = check_answer(all, self, poses)) return status;
     return explain(all.separation ? self.hold(all, poses) : self.hold_own(all));
   });
@@ -339,11 +339,11 @@ bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, const bc_p
                                   const bc_velocity* velocities, const bc_wrench* outside,
                                   const bc_motion* motion) {
   return guarded([&] {
-    if (!forces || !poses || !velocities || !motion)
-      return refuse_null(!forces ? "forces" : !poses ? "poses" : motion ? "velocities" : "motion");
+    if (!forces || !motion) return refuse_null(forces ? "motion" : "forces");
+    size_t bodies = forces_of(forces).bodies().size();
+    if (bodies > 0 && !(poses && velocities)) return refuse_null(poses ? "velocities" : "poses");
     bc_motion all{};
     if (!read(motion, all)) return fail(BC_BAD_ABI, "motion.size is unknown");
-    size_t bodies = forces_of(forces).bodies().size();
     if (bc_status status = check_step(dt, bodies, poses, velocities, outside)) return status;
     PatchForces& self = forces_of(forces);
     if (self.own().count() > 0)
