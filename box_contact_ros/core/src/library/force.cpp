@@ -71,7 +71,7 @@ bc_status read_bodies(const bc_body* given, int64_t count, std::vector<Body>& bo
   return BC_OK;
 }
 
-constexpr int64_t state_format = 0x3346504342;  // "BCPF3"
+constexpr int64_t state_format = 0x3446504342;  // "BCPF4"
 
 int64_t state_size(const PatchForces& forces) {
   size_t size = 0;
