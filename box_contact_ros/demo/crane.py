@@ -25,11 +25,11 @@ import numpy as np
 from ..extras import require
 
 require('sim')  # a missing MuJoCo ends in one line
-import mujoco  # noqa: E402
+import mujoco
 
-from ..scene.forces import GRAVITY, Body  # noqa: E402
-from ..scene.scene import CONTAINER  # noqa: E402
-from ..solver.pose import cross, rotation_matrix  # noqa: E402
+from ..scene.forces import GRAVITY, Body
+from ..scene.scene import CONTAINER
+from ..solver.pose import cross, rotation_matrix
 
 PHYSICS_STEP = 5e-4
 """Longest physics step [s]. A tick of publication is cut into equal steps no longer than this."""

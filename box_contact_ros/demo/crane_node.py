@@ -21,6 +21,9 @@ from collections.abc import Callable, Sequence
 from itertools import count
 from typing import Any
 
+from ..extras import require
+
+require('ros', 'sim')
 import numpy as np
 from geometry_msgs.msg import Point, PoseStamped, Vector3, WrenchStamped
 from rclpy.context import Context

@@ -2,3 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """What shows a scene: the page in the browser, and markers for RViz."""
+
+from ..extras import require
+
+require('ros')

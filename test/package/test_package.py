@@ -15,7 +15,7 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
-from conftest import PROGRAMS
+from conftest import EXTRAS, PROGRAMS
 from patience import PATIENCE
 
 import box_contact_ros
@@ -118,6 +118,16 @@ def test_a_missing_extra_is_one_line_that_names_it() -> None:
     assert "pip install -c constraints.txt -e '.[view]'" in done.stderr
     done = _run('-c', code.replace('extras.require("view")', 'import box_contact_ros.no_such'))
     assert 'Traceback' in done.stderr and 'no_such' in done.stderr
+
+
+@pytest.mark.parametrize('module', PROGRAMS.values())
+def test_a_program_without_extras_ends_in_one_line(module: str) -> None:
+    """Before it imports what it misses."""
+    absent = [name for modules in EXTRAS.values() for name in modules if name != 'safetensors']
+    done = _run('-c', f'import sys; sys.modules.update(dict.fromkeys({absent}))\n'
+                      f'import box_contact_ros.{module}')
+    assert (done.returncode, done.stderr.count('\n')) == (1, 1), done.stderr
+    assert 'pip install' in done.stderr
 
 
 @pytest.mark.parametrize('program, module', PROGRAMS.items())
