@@ -401,8 +401,9 @@ def _check_kinds(scene: Scene) -> None:
         rows = getattr(scene, part)
         check(isinstance(rows, tuple | list), (part,), f'a tuple of {part}', rows)
         for number, row in enumerate(rows):
-            check(isinstance(row, Pair) if part == 'pairs' else len(row) == 2, (part, number),
-                  'a Pair' if part == 'pairs' else 'the names a and b', row)
+            check(isinstance(row, Pair) if part == 'pairs' else
+                  isinstance(row, tuple | list) and len(row) == 2, (part, number),
+                  'a Pair' if part == 'pairs' else 'a tuple of the names a and b', row)
             for value in row:
                 check(isinstance(value, str), (part, number), 'of text', row)
     check(isinstance(scene.frame_id, str), ('frame_id',), 'text', scene.frame_id)

@@ -187,6 +187,8 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: scene(pairs=(('a', 'b'),)), 'pairs[0]', "('a', 'b')"),
     (lambda: scene(pairs=(Pair('p', 'a', 'c'),)), 'pairs[0].b', "'c'"),
     (lambda: scene(patterns=('*',)), 'patterns[0]', "'*'"),
+    (lambda: scene(patterns=('a*', 'b*')), 'patterns[0]', "'a*'"),
+    (lambda: scene(patterns=(5,)), 'patterns[0]', '5'),
     (lambda: scene(FIXED), 'pairs[0]', 'leave `pose` out of a box that moves, and give its'),
     (lambda: scene(FIXED, (), patterns=(('*', '*'),)), 'patterns[0]', 'ask contacts_of'),
     (lambda: scene(frame_id=5), 'frame_id', '5'),
