@@ -1,10 +1,11 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Which boxes of a real pallet are not supported? `python docs/examples/palletising.py [PICTURE]`.
+"""Which boxes of a pallet lack support? `python docs/examples/palletising.py [PLANS [PICTURE]]`.
 
-Five packing plans of real orders are read from pallets/packing_plans.json. `contacts_of` finds what
-touches. `support` tells how far inside the hull of what carries it the centre of each box is.
+PLANS is a file like pallets/packing_plans.json, which has the plans of five real orders.
+`contacts_of` finds what touches. `support` tells how far inside the hull of what carries it the
+centre of each box is.
 
 For each order it names the boxes whose centre is outside, by number. It prints:
 
@@ -59,18 +60,22 @@ def draw(path: str, plans: list[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> N
 
 def main() -> None:
     """Judge order by order."""
+    path = Path(sys.argv[1]) if len(sys.argv) > 1 else PLANS
+    try:
+        read = {order: read_plan(plan) for order, plan in json.loads(path.read_bytes()).items()}
+    except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+        sys.exit(f'{path}: cannot be read as packing plans: {error!r}')
     plans = []
-    for order, plan in json.loads(PLANS.read_text('utf-8')).items():
-        numbers, size, pose = read_plan(plan)
+    for order, (numbers, size, pose) in read.items():
         with_floor = np.vstack((size, FLOOR[0])), np.vstack((pose, FLOOR[1]))
         pairs, contacts = contacts_of(*with_floor)
-        left = support(*with_floor, pairs, contacts, ground=len(plan)).margin[:-1]
+        left = support(*with_floor, pairs, contacts, ground=len(size)).margin[:-1]
         outside = ' '.join(str(numbers[row]) for row in np.flatnonzero(left < 0.0))
         print(f'{order}: {len(pairs)} contacts, worst {1e3 * left.min():.1f} mm, '
               f'not supported: {outside}')
         plans.append((size, pose, left))
-    if len(sys.argv) > 1:
-        draw(sys.argv[1], plans)
+    if len(sys.argv) > 2:
+        draw(sys.argv[2], plans)
 
 
 if __name__ == '__main__':

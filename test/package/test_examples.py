@@ -64,7 +64,7 @@ def test_example(name: str, program, tmp_path: Path) -> None:
 
 def run_with_other_file(name: str, file: Path, old: str, new: str) -> Any:
     """Run an example with its file, in which some words are others."""
-    text = (EXAMPLES / 'files' / file.name).read_text()
+    text = next(EXAMPLES.glob(f'*/{file.name}')).read_text()
     assert old in text
     file.write_text(text.replace(old, new))
     return subprocess.run([sys.executable, EXAMPLES / name, file], capture_output=True, text=True,
@@ -72,6 +72,9 @@ def run_with_other_file(name: str, file: Path, old: str, new: str) -> Any:
 
 
 @pytest.mark.parametrize(('name', 'file', 'old', 'new', 'words'), [
+    ('palletising.py', 'packing_plans.json', '"00100408"', '"mine"', ''),
+    ('palletising.py', 'packing_plans.json', '"00100408"', '', 'JSONDecodeError'),
+    ('palletising.py', 'packing_plans.json', 'length/mm', 'length', "KeyError('length/mm')"),
     ('from_sdf.py', 'yard.sdf', '<pose>0 6 0', '<pose degrees="true">0 6 0', 'pose of truck has'),
     ('from_sdf.py', 'yard.sdf', 'name="spreader"', 'name="load"', 'the name load'),
     ('from_sdf.py', 'yard.sdf', 'name="axles"', 'name="bed"', 'the name truck/chassis/bed'),
