@@ -29,7 +29,10 @@ def pose_of(part: ElementTree.Element) -> np.ndarray:
     pose = part.find('pose')
     if pose is not None and any(pose.attrib.values()):
         raise ValueError(f'the pose of {part.get("name")} has {pose.attrib}, which is not read')
-    x, y, z, *turn = map(float, (part.findtext('pose') or '0 0 0 0 0 0').split())
+    numbers = (part.findtext('pose') or '0 0 0 0 0 0').split()
+    if len(numbers) != 6:
+        raise ValueError(f'the pose of {part.get("name")} has {len(numbers)} numbers, not 6')
+    x, y, z, *turn = map(float, numbers)
     (sr, sp, sy), (cr, cp, cy) = ([f(angle / 2) for angle in turn] for f in (sin, cos))
     return np.array([x, y, z, sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy,
                      cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy])
@@ -74,6 +77,10 @@ def read_world(path: str | Path) -> tuple[Scene, np.ndarray]:
         own, name, pose = boxes_of(model), model.get('name', ''), pose_of(model)
         if not own:
             continue
+        if not name:
+            raise ValueError('a model has no name')
+        if frame := model.get('placement_frame'):
+            raise ValueError(f'model {name} has the placement_frame {frame}, which is not read')
         if name in bodies:
             raise ValueError(f'two models have the name {name}')
         boxes |= own
@@ -92,7 +99,7 @@ def main() -> None:
     except (OSError, ValueError, ElementTree.ParseError) as error:
         sys.exit(f'{path}: {error}')
     for pair, contact in SceneSolver(scene)(moving).named():
-        print(f'{pair.a} and {pair.b}: {-1e3 * contact.separation:.1f} mm deep')
+        print(f'{pair.a} and {pair.b}: {max(0.0, -1e3 * contact.separation):.1f} mm deep')
 
 
 if __name__ == '__main__':

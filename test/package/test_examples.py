@@ -76,6 +76,9 @@ def run_with_other_file(name: str, file: Path, old: str, new: str) -> Any:
     ('palletising.py', 'packing_plans.json', '"00100408"', '', 'JSONDecodeError'),
     ('palletising.py', 'packing_plans.json', 'length/mm', 'length', "KeyError('length/mm')"),
     ('from_sdf.py', 'yard.sdf', '<pose>0 6 0', '<pose degrees="true">0 6 0', 'pose of truck has'),
+    ('from_sdf.py', 'yard.sdf', '<pose>0 6 0 0 0', '<pose>0 6 0', 'pose of truck has 4 numbers'),
+    ('from_sdf.py', 'yard.sdf', 'model name="load"', 'model', 'a model has no name'),
+    ('from_sdf.py', 'yard.sdf', 'name="load"', 'name="load" placement_frame="box"', 'load has the'),
     ('from_sdf.py', 'yard.sdf', 'name="spreader"', 'name="load"', 'the name load'),
     ('from_sdf.py', 'yard.sdf', 'name="axles"', 'name="bed"', 'the name truck/chassis/bed'),
     ('from_sdf.py', 'yard.sdf', 'world', 'model', 'no <world>'),
@@ -90,6 +93,12 @@ def test_a_file_that_is_misread_is_refused(name: str, file: str, old: str, new: 
     done = run_with_other_file(name, tmp_path / file, old, new)
     assert done.returncode == bool(words) and done.stderr.count('\n') == bool(words), done.stderr
     assert done.stderr.startswith(f'{tmp_path / file}: ' if words else '') and words in done.stderr
+
+
+def test_exact_touch_is_zero_deep(tmp_path: Path) -> None:
+    """Without a sign."""
+    done = run_with_other_file('from_sdf.py', tmp_path / 'yard.sdf', '3.939', '3.94')
+    assert 'load/container/box and spreader/frame/beam: 0.0 mm deep' in done.stdout
 
 
 @pytest.mark.parametrize(('name', 'file', 'old', 'new', 'words'), [
