@@ -3,8 +3,9 @@
 
 """What touches in a model of MuJoCo? `python docs/examples/from_mjcf.py [MODEL]`.
 
-MuJoCo reads the MJCF file, so includes, defaults and frames work. Geoms of one body, or of a body
-and its parent, are no pair. Other geoms than boxes, `contype` and `<exclude>` are left out.
+MuJoCo reads the MJCF file, so includes, defaults and frames work. As in MuJoCo, geoms of one body,
+or of a body and its parent, are no pair, nor are those that `contype` and `conaffinity` keep apart.
+Only boxes are read, and no `<exclude>`.
 
 It prints:
 
@@ -38,6 +39,8 @@ def read_model(path: str | Path) -> tuple[list[str], np.ndarray, np.ndarray, np.
     parent[parent == 0] = -1  # the world collides with its children
     a, b = np.triu_indices(len(geoms), 1)
     apart = (body[a] != body[b]) & (parent[a] != body[b]) & (body[a] != parent[b])
+    kind, others = model.geom_contype[geoms], model.geom_conaffinity[geoms]
+    apart &= (kind[a] & others[b] | kind[b] & others[a]) != 0
     names = [model.geom(geom).name or f'geom {geom}' for geom in geoms]
     return names, 2.0 * model.geom_size[geoms], pose, np.stack((a, b), axis=1)[apart]
 
@@ -46,7 +49,7 @@ def main() -> None:
     """Read a model, and tell what touches in it."""
     names, size, pose, allowed = read_model(sys.argv[1] if len(sys.argv) > 1 else MODEL)
     for (a, b), contact in zip(*contacts_of(size, pose, allowed)):
-        print(f'{names[a]} and {names[b]}: {-1e3 * contact.separation:.1f} mm deep, '
+        print(f'{names[a]} and {names[b]}: {max(0.0, -1e3 * contact.separation):.1f} mm deep, '
               f'{1e4 * patch_area(contact):.1f} cm2')
 
 

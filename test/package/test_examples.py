@@ -95,6 +95,15 @@ def test_a_file_that_is_misread_is_refused(name: str, file: str, old: str, new: 
     assert done.stderr.startswith(f'{tmp_path / file}: ' if words else '') and words in done.stderr
 
 
+@pytest.mark.parametrize('kinds', ['contype="0" conaffinity="0"', 'contype="2" conaffinity="4"'])
+def test_geoms_that_never_collide_are_no_pair(kinds: str, tmp_path: Path) -> None:
+    """As by MuJoCo: neither has a `contype` that is among the bits of the other's `conaffinity`."""
+    pytest.importorskip('mujoco')
+    done = run_with_other_file('from_mjcf.py', tmp_path / 'gripper.xml', 'name="table"',
+                               f'name="table" {kinds}')
+    assert done.stdout.splitlines() == shown('from_mjcf.py')[1:]
+
+
 def test_exact_touch_is_zero_deep(tmp_path: Path) -> None:
     """Without a sign."""
     done = run_with_other_file('from_sdf.py', tmp_path / 'yard.sdf', '3.939', '3.94')
