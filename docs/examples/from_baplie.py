@@ -5,7 +5,8 @@
 
 A plan in SMDG BAPLIE has a slot (bay, row, tier) and an ISO 6346 size type for each container. The
 slots say nothing of metres: adapt the grid below to your ship. A container is on what is below it,
-or on the ship. Slots that are taken twice and other size types are refused. It prints:
+or on the ship. Slots that are taken twice or above an empty one are refused, and other size types.
+It prints:
 
     8 containers, 5 contacts, deepest 0.0 mm
     0100304 42G1 does not stand: its centre is 38 mm outside, 0.50 of its base is on others
@@ -50,22 +51,29 @@ def read_slots(text: str) -> list[Slot]:
 
 
 def stow(slots: list[Slot]) -> tuple[np.ndarray, np.ndarray, list[int]]:
-    """Return full extents (n, 3), poses (n, 7), and the containers that have none below them."""
+    """Return full extents (n, 3), poses (n, 7), and the containers that have none below them.
+
+    Rows 01 and 02 are beside row 00 if a bay has one, else beside each other.
+    """
     size, pose = np.zeros((len(slots), 3)), np.zeros((len(slots), 7))
     stacks: dict[tuple[int, bool], list[int]] = defaultdict(list)
     lowest = []
+    centred = {(bay // 4, tier < 80) for bay, row, tier, _ in slots if row == 0}
     for n, (bay, row, tier, kind) in enumerate(slots):
         size[n] = LENGTHS[kind[0]], 2.5 if kind[1].isalpha() else 2.438, HEIGHTS[kind[1]]
         x = BAY * (bay // 4) + (bay % 4 - 2) * 3.067  # odd bays hold 20 ft at an end of the 40 ft
-        y = ROW * ((row + 1) // 2 - 0.5) * (1 if row % 2 else -1) if row else 0.0
+        y = (row + 1) // 2 - (0.0 if (bay // 4, tier < 80) in centred else 0.5)
         stack = stacks[row, tier < 80]
-        below = [pose[m, 2] + size[m, 2] / 2 for m in stack
-                 if abs(pose[m, 0] - x) < (size[m, 0] + size[n, 0]) / 2]
+        below = [m for m in stack if abs(pose[m, 0] - x) < (size[m, 0] + size[n, 0]) / 2]
         stack.append(n)
         if not below:
             lowest.append(n)
-            below = [TIER * (tier - 2) / 2 if tier < 80 else DECK + TIER * (tier - 80) / 2]
-        pose[n] = x, y, max(below) + size[n, 2] / 2, 0.0, 0.0, 0.0, 1.0
+            floor = TIER * (tier - 2) / 2 if tier < 80 else DECK + TIER * (tier - 80) / 2
+        elif tier - 2 > max(slots[m][2] for m in below):
+            raise ValueError(f'{bay:03}{row:02}{tier:02} is above an empty slot')
+        else:
+            floor = max(pose[m, 2] + size[m, 2] / 2 for m in below)
+        pose[n] = x, ROW * (y if row % 2 else -y), floor + size[n, 2] / 2, 0.0, 0.0, 0.0, 1.0
     return size, pose, lowest
 
 
@@ -74,9 +82,9 @@ def main() -> None:
     path = Path(sys.argv[1] if len(sys.argv) > 1 else PLAN)
     try:
         slots = read_slots(path.read_text('latin-1'))
+        size, pose, lowest = stow(slots)
     except (OSError, ValueError) as error:
         sys.exit(f'{path}: {error}')
-    size, pose, lowest = stow(slots)
     pairs, contacts = contacts_of(size, pose)
     found = support(size, pose, pairs, contacts, ground=lowest)
     deepest = 1e3 * max(0.0, -contacts.separation.min(initial=0.0))

@@ -85,6 +85,7 @@ def run_with_other_file(name: str, file: Path, old: str, new: str) -> Any:
     ('from_sdf.py', 'yard.sdf', '</sdf>', '', 'no element found'),
     ('from_baplie.py', 'ship.edi', 'LOC', '', 'no container'),
     ('from_baplie.py', 'ship.edi', '0110302', '0110102', 'two containers are in 0110102'),
+    ('from_baplie.py', 'ship.edi', '0100304', '0100308', '0100306 is above an empty slot'),
     ('from_baplie.py', 'ship.edi', '45G1', '4CG1', ''),
     ('from_baplie.py', 'ship.edi', '45G1', '4ZG1', 'size type 4ZG1')])
 def test_a_file_that_is_misread_is_refused(name: str, file: str, old: str, new: str, words: str,

@@ -19,11 +19,17 @@ EXAMPLES = Path(__file__).parents[2] / 'docs' / 'examples'
 
 
 @pytest.fixture(scope='module')
-def ship():
-    """Return slots, full extents, poses and the lowest containers, as the example stows them."""
+def stow():
+    """Return the function of the example."""
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(EXAMPLES)
         from from_baplie import stow
+    return stow
+
+
+@pytest.fixture(scope='module')
+def ship(stow):
+    """Return slots, full extents, poses and the lowest containers, as the example stows them."""
     with Path(__file__).with_name('stowage_plan.csv').open() as file:
         # ISO 6346 has no length 5: five boxes `5EGB` are stowed as those of 40 ft.
         slots = [(int(row['bay']), int(row['row']), int(row['tier']),
@@ -45,6 +51,16 @@ def test_contacts_are_those_in_half_millimetres(ship):
     pairs, contacts = contacts_of(size, pose)
     assert len(size) == 1936 and len(pairs) == 1590 and np.array_equal(pairs, wanted)
     assert np.abs(contacts.separation).max() < 1e-13
+
+
+def test_rows_are_beside_a_centre_row(stow):
+    """If their bay has one: 04, 02, 00, 01, 03 on deck of bay 10; 04, 02, 01, 03 elsewhere."""
+    rows = [4, 2, 0, 1, 3]
+    places = [(10, row, 82) for row in rows], *(
+        [(bay, row, tier) for row in rows if row] for bay, tier in ((10, 2), (14, 82)))
+    slots = [(*place, '42G1') for bay in places for place in bay]
+    y = stow(slots)[1][:, 1] / 2.5
+    assert y.tolist() == [-2, -1, 0, 1, 2] + 2 * [-1.5, -0.5, 0.5, 1.5]
 
 
 def test_what_rests_on_one_twenty_footer_does_not_stand(ship):
