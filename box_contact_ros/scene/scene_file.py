@@ -51,9 +51,10 @@ def _plain(pattern: re.Pattern[str], read: type) -> Any:
 # YAML 1.1, which PyYAML knows, reads 010 as eight and 1:30 as ninety.
 _Loader.add_constructor('tag:yaml.org,2002:int', _plain(PLAIN_INT, int))
 _Loader.add_constructor('tag:yaml.org,2002:float', _plain(PLAIN_FLOAT, float))
-# It takes 1e-05 for a word, as JSON writes 0.00001.
+# It takes 1e-05 and 1.5E0 for words, which are numbers in JSON.
 _Loader.add_implicit_resolver('tag:yaml.org,2002:float',
-                              re.compile(r'[-+]?[0-9]+[eE][-+]?[0-9]+$'), list('-+0123456789'))
+                              re.compile(r'[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+$'),
+                              list('-+0123456789'))
 # A scene has no dates; PyYAML fails at 2026-02-31.
 _Loader.add_constructor('tag:yaml.org,2002:timestamp', _Loader.construct_yaml_str)
 

@@ -122,11 +122,11 @@ def test_a_scene_of_bodies_alone(scene_of):
     assert scene_of(text + 'pairs: [{a: goods, b: truck}]\n').pair_count == 2
 
 
-@pytest.mark.parametrize('number', [1e-05, 1e+16, 2.5e-07])
+@pytest.mark.parametrize('number', ['1e-05', '1e+16', '2.5e-07', '1E5', '1.5E0', '2.50e3'])
 def test_numbers_are_read_as_json_writes_them(scene_of, number):
-    """YAML 1.1 wants a point in each float."""
-    size = json.dumps([6, 2.4, number])
-    assert scene_of(GOOD.replace('[6, 2.4, 0.5]', size)).boxes['spreader'].size[2] == number
+    """YAML 1.1 wants a point in each float, and a sign in each exponent."""
+    text = GOOD.replace('[6, 2.4, 0.5]', f'[6, 2.4, {number}]')
+    assert scene_of(text).boxes['spreader'].size[2] == json.loads(number)
 
 
 @pytest.mark.parametrize('old, new, words', [
