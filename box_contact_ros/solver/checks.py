@@ -121,7 +121,7 @@ def as_floats(value: ArrayLike, name: str, shapes: str, *accepted: tuple[int | N
               ) -> np.ndarray:
     """Return `value` as a contiguous float64 array of an `accepted` shape (None: any length).
 
-    shapes: what the error calls the accepted shapes.
+    shapes: what the error calls the accepted shapes. An empty list has no rows of any shape.
     """
     try:
         array = value if _is_plain(value, np.float64) else _converted(value)
@@ -131,6 +131,8 @@ def as_floats(value: ArrayLike, name: str, shapes: str, *accepted: tuple[int | N
         if len(shape) == array.ndim and all(
                 want is None or want == have for want, have in zip(shape, array.shape)):
             return array
+        if array.shape == (0,) and not shape[0]:
+            return array.reshape(0, *filter(None, shape))
     raise ValueError(f'{name} must be {shapes}, not an array of shape {array.shape}')
 
 

@@ -19,6 +19,10 @@ def supported(size, pose, **options):
     return support(size, pose, *contacts_of(size, pose), **options)
 
 
+def test_an_empty_list_has_no_boxes():
+    assert len(supported([], []).share) == 0 and len(contacts_of((1, 1, 1), [])[0]) == 0
+
+
 @pytest.mark.parametrize('overhang', [-0.3, 0.0, 0.4, 0.5, 0.6, 1.2])
 def test_a_box_that_overhangs(overhang):
     """A cube of 1 m on a table: half a metre is the most that it may overhang."""
