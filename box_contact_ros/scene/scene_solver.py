@@ -15,6 +15,7 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..core import LENGTH_MAX, native
 from ..solver.checks import as_floats, as_number, as_whole, short_repr
@@ -113,7 +114,7 @@ class SceneSolver:
                            size_b=np.ascontiguousarray(size_b))
         self([None] * len(self.scene.moving))
 
-    def __call__(self, poses: Sequence[np.ndarray | None] | np.ndarray) -> Answer:
+    def __call__(self, poses: Sequence[np.ndarray | None] | ArrayLike) -> Answer:
         """Return the answer to one tick: a pose (7,) or None for each of `scene.moving`.
 
         Or an array (n, 7) with a row for each, all NaN for None.
@@ -128,21 +129,19 @@ class SceneSolver:
         pairs, contacts = in_contact(near, contacts, self.margin)
         return Answer(pairs, contacts, len(near), stale, self.scene)
 
-    def _set_poses(self, poses: Sequence[np.ndarray | None] | np.ndarray) -> None:
+    def _set_poses(self, poses: Sequence[np.ndarray | None] | ArrayLike) -> None:
         """Take the poses of the boxes and bodies that move."""
         if native.write_poses(self._rows, self._moving, poses):  # those of every node
             return
-        is_array = isinstance(poses, np.ndarray) and poses.ndim > 0
-        if not is_array and (not isinstance(poses, Sequence) or isinstance(poses, str)):
-            raise ValueError('poses must be a list of a pose or None for each box and body that '
-                             'moves, not '
-                             f'{short_repr(poses)}')
+        if not isinstance(poses, Sequence) or isinstance(poses, str):
+            poses = as_floats(poses, 'poses', 'a list of a pose or None for each box and body that '
+                              'moves, or an array (n, 7)', (None, 7))
         if len(poses) != len(self._moving):
             raise ValueError(f'{len(poses)} poses, but {len(self._moving)} boxes and bodies move: '
                              f'{short_repr(list(self.scene.moving))}; give a list of a pose or '
                              'None for each')
         if isinstance(poses, np.ndarray):
-            self._rows[self._moving] = as_floats(poses, 'poses', 'rows (n, 7)', (None, 7))
+            self._rows[self._moving] = poses
             return
         for name, index, pose in zip(self.scene.moving, self._moving, poses):
             self._rows[index] = NOWHERE if pose is None else as_floats(

@@ -197,6 +197,19 @@ def test_a_name_is_no_longer_than_ros_takes():
             scene(*arguments)
 
 
+class Table:
+    """Rows of numbers that are neither an array nor a list, as pandas has them."""
+
+    def __array__(self, *_, **__):
+        return np.array([IDENTITY, IDENTITY], float)
+
+
+def test_a_tick_takes_what_numpy_reads():
+    """Each row is a pose."""
+    solver = SceneSolver(two_boxes((1, 1, 1), (1, 1, 1)))
+    poses.assert_same_bits(solver(Table()).contacts, solver([IDENTITY] * 2).contacts)
+
+
 @pytest.mark.parametrize('size, pose', [
     ((1, 2, 3), (0, 0, 0, 0, 0, 0, 1)), ([1.0, 2.0, 3.0], [0, 0, 0, 0, 0, 0, 1]),
     (np.array([1, 2, 3]), np.array([0, 0, 0, 0, 0, 0, 1], np.float32))])
