@@ -10,8 +10,8 @@ pairs at the poses of each physics step, and gives the wrench.
 It prints:
 
     0.06 s: 0.0 mm deep, 589 mm/s
-    0.13 s: 0.2 mm deep, 981 mm/s
-    0.26 s: 0.0 mm deep, 68 mm/s
+    0.13 s: 0.3 mm deep, 980 mm/s
+    0.26 s: 0.0 mm deep, 2 mm/s
     0.51 s: 0.0 mm deep, 0 mm/s
     1.01 s: 0.0 mm deep, 0 mm/s
     at rest: force / weight 1.0000, tilt below 0.001°: True
