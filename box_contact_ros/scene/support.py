@@ -67,9 +67,9 @@ def support(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike, contacts: Cont
         on_ground[as_whole(box, 'ground', 0, count - 1)] = True
     direction = direction / largest
     direction = direction / np.linalg.norm(direction)
-    unique, times = np.unique(np.sort(rows, axis=1), axis=0, return_counts=True)
-    if (times > 1).any():
-        raise ValueError(f'pairs has boxes {tuple(unique[times.argmax()].tolist())} twice')
+    keys = np.sort(rows.min(axis=1) * count + rows.max(axis=1))
+    if (twice := keys[:-1][keys[1:] == keys[:-1]]).size:
+        raise ValueError(f'pairs has boxes {divmod(int(twice[0]), count)} twice')
 
     slope = contacts.normal @ direction
     carries = contacts.colliding & (np.abs(slope) >= UPRIGHT)
