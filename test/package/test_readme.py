@@ -427,6 +427,7 @@ LIMITS = {
     'contributing/testing.md': (f'{sum(HARD):,} cases in {len(HARD)} families',),
     'explanation/force.md': (
         f'has {STEPS["substeps"].default} sub-steps',
+        f'{1e3 * float(constant("force/patch_forces.hpp", "sub_step_limit")):g} ms at most',
         f'up to {STEPS["iterations"].default} times',
         f'{STEPS["relaxations"].default} more iterations ',
         f'{constant("force/rectangle.hpp", "torsion_share")} times the mean',

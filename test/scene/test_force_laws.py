@@ -289,6 +289,17 @@ def test_a_tiny_step_among_others_does_no_harm(tiny: tuple[float, ...], at: int)
     assert fastest[1] < 1.1 * fastest[0] + 0.1 * GRAVITY * 0.005
 
 
+@pytest.mark.parametrize('long', [0.1, 0.5])
+def test_a_long_step_among_others_does_no_harm(long: float) -> None:
+    """The tower sinks by a centimetre, and is at rest again after a second."""
+    world = ten_cubes()
+    for dt in [0.005] * 100 + [long] + [0.005] * 300:
+        world.hold()
+        world.step(dt)
+        assert 9.49 < world.poses[-1, 2] < 9.5005
+    assert np.abs(world.velocities).max() < 1e-6
+
+
 @pytest.mark.parametrize('size', [(50.0, 1.0, 1.0), (3.0, 2.0, 1.0)])
 @pytest.mark.parametrize('step', [0.001, 0.02])
 def test_a_free_body_keeps_its_energy(size: tuple[float, ...], step: float) -> None:

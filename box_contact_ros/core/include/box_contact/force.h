@@ -78,7 +78,8 @@ typedef struct bc_patches {
 
 typedef struct bc_force_options {
   size_t size;     /* sizeof(bc_force_options) */
-  int substeps;    /* equal parts of an advance; heavy bodies on light ones need them */
+  int substeps;    /* equal parts of an advance, more if 5 ms are exceeded; heavy bodies on light
+                      ones need them */
   int iterations;  /* of sequential impulses in a sub-step, at most */
   int relaxations; /* iterations more, at most, which remove the speed of pushing out */
   int threads;     /* 1 to 1,024; bodies that patches join are moved by one of them */
