@@ -69,6 +69,7 @@ class TickMonitor:
 
     def __init__(self) -> None:
         self.absent: list[str] = []  # the boxes that the last array had no pose of
+        self.shared: list[str] = []  # the boxes whose publishers take turns
         self._times: deque[tuple[int, int]] = deque(maxlen=KEPT_TIMES)
         """Time in the solver and age of the answer [ns] of the last evaluations."""
         self._evaluations = 0
@@ -202,6 +203,7 @@ class Diagnostics:
         sent = (new['poses'] + load.lost) / len(scene.streams)
         if state == ACTIVE:
             findings += _lateness(load, sent, new[OVERTAKEN])
+            findings += _rivals(self._monitor.shared, topics)
         self._log(findings)
         times = {CHECK_TIME: f'{1e3 * np.percentile(checks, 99):.1f}'} if len(checks) else {}
         self.publish(findings, state=state, load=load, came=new['poses'] > 0, values=times | {
@@ -265,6 +267,14 @@ def _lateness(load: Load, sent: float, overtaken: int) -> Iterator[Finding]:
         yield Finding('burst', f'a burst of poses was lost: {lost}',
                       'more came at once than the queue holds, or the node stood still; send them '
                       'evenly, or raise the depth by qos_overrides')
+
+
+def _rivals(shared: Sequence[str], topics: SceneTopics) -> Iterator[Finding]:
+    """Yield what is published twice; shared: boxes whose publishers take turns."""
+    if shared:
+        yield Finding('shared', f'several publishers: {_some(shared)}',
+                      f'the poses of all are used; leave one that publishes '
+                      f'{topics.pose_topic(shared[0])}')
 
 
 def _findings(summary: Summary, refused: Sequence[str], unseen: Sequence[str],

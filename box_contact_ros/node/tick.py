@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -39,13 +40,17 @@ class PoseQueue:
     A full queue pushes its oldest pose out. EventsExecutor still has an event for it, and timers
     and services come behind all events. In a node that is too slow, they would wait ever longer.
     So poses that wait when a loss shows are dropped. That takes no time, and empties both queues.
+    Each publisher numbers its own poses. While there are several, losses are not told.
     """
 
-    def __init__(self) -> None:
-        """Begin before the first pose."""
+    def __init__(self, publisher_count: Callable[[], int]) -> None:
+        """Begin before the first pose; publisher_count: how many publish the stream now."""
+        self._publisher_count = publisher_count
         self._sequence: int | None = None  # number that the publisher gave the last pose
         self._arrived = self._new_from = 0  # by the wall clock [ns]
         self._lost = 0
+        self._has_several = False  # publishers, from a number that does not follow to a report
+        self._turns = 0  # how often numbers went back meanwhile
 
     def is_overtaken(self, sequence: int | None, arrived: int) -> bool:
         """Return whether newer poses wait, by a pose's number and its time of arrival [ns].
@@ -54,14 +59,21 @@ class PoseQueue:
         """
         if sequence is None:
             return False
-        if self._sequence is not None and sequence > self._sequence + 1:
-            periods = sequence - self._sequence
+        if self._sequence is not None and sequence != self._sequence + 1:
+            self._jumped(sequence - self._sequence, arrived)
+        self._sequence, self._arrived = sequence, arrived
+        return arrived < self._new_from
+
+    def _jumped(self, periods: int, arrived: int) -> None:
+        """Note a number that does not follow the last: of another publisher, or after a loss."""
+        self._has_several = self._has_several or self._publisher_count() > 1
+        if self._has_several:
+            self._turns += periods <= 0
+        elif periods > 0:
             self._lost += periods - 1
             now = time.time_ns()
             if (now - arrived) * periods > 2 * (arrived - self._arrived):  # not lost on the way
                 self._new_from = now
-        self._sequence, self._arrived = sequence, arrived
-        return arrived < self._new_from
 
     def restart(self) -> None:
         """Begin before the next pose: those that come while nobody asks for any are not lost."""
@@ -69,8 +81,16 @@ class PoseQueue:
 
     def take_lost(self) -> int:
         """Return how many poses never came since the last call."""
+        if self._has_several and self._publisher_count() < 2:
+            self._has_several, self._turns = False, 0
+            self.restart()
         lost, self._lost = self._lost, 0
         return lost
+
+    @property
+    def is_shared(self) -> bool:
+        """Return whether publishers take turns; numbers go back once where one is started anew."""
+        return self._turns > 1
 
 
 class TickAnswerer:
@@ -104,7 +124,7 @@ class TickAnswerer:
 
     def callback_of(self, box: str, topic: str) -> PoseCallback:
         """Return the callback for the bytes of a box, or of all; it raises nothing at all."""
-        queue = self._queues[box] = PoseQueue()
+        queue = self._queues[box] = PoseQueue(partial(self._topics.publisher_count, box))
         read = self._read_all if box == ALL_BOXES else self._reader.read_pose
 
         def callback(data: bytes, info: Mapping[str, Any]) -> None:
@@ -129,12 +149,10 @@ class TickAnswerer:
         return callback
 
     def take_lost(self) -> int:
-        """Return how many poses never came since the last call.
-
-        Several publishers of one box number their poses each from 1: nobody knows what is lost.
-        """
-        lost = {box: queue.take_lost() for box, queue in self._queues.items()}
-        return sum(count for box, count in lost.items() if self._topics.publisher_count(box) == 1)
+        """Return how many poses never came since the last call; note which boxes are shared."""
+        lost = sum(queue.take_lost() for queue in self._queues.values())
+        self._monitor.shared = [box for box, queue in self._queues.items() if queue.is_shared]
+        return lost
 
     def _read_all(self, data: bytes) -> StampedPose:
         """Return the poses of all that moves; a bad one is counted, and its name absent."""

@@ -109,7 +109,11 @@ class SceneTopics:
 
     def pose_topics(self) -> list[str]:
         """Return the full names of the topics that are subscribed to."""
-        return [subscription.topic_name for subscription in self._subscriptions.values()]
+        return list(map(self.pose_topic, self._subscriptions))
+
+    def pose_topic(self, box: str) -> str:
+        """Return the full name of the topic of a box's poses."""
+        return self._subscriptions[box].topic_name
 
     def publisher_count(self, box: str) -> int:
         """Return how many publish poses of a box."""

@@ -15,11 +15,12 @@ from contextlib import closing
 import numpy as np
 import poses
 import pytest
+from geometry_msgs.msg import PoseStamped
 from patience import PATIENCE
 from raw_client import APART, ORIGIN, TOUCHING
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from ros_client import CUBES, Client, arguments, serving
+from ros_client import CUBES, DEEP, TWO_BOXES, Client, arguments, serving
 from typed_messages import TOLD, contacts_by_pair
 
 from box_contact_msgs.msg import Contacts
@@ -76,6 +77,28 @@ def test_poses_pair_by_stamp_in_any_order(node, client):
     for stamp in stamps:
         contact = contacts_by_pair(client.contacts[stamp])[PAIR]
         assert -contact.separation == pytest.approx(2 - heights[stamp], abs=1e-14)
+
+
+def test_two_publishers_of_a_box(node, client):
+    """The poses of both are answered, and diagnostics name the box until one of them is gone."""
+    def status():
+        assert client.spin(lambda: client.diagnostics)
+        return client.diagnostics[-1].status[0]
+
+    def answer_in_turns():
+        client.publishers[0], other[0] = other[0], client.publishers[0]
+        client.ask(ORIGIN, TOUCHING)
+        return 'several publishers' in status().message
+
+    other = [client.node.create_publisher(PoseStamped, TWO_BOXES['box_a'], DEEP)]
+    assert client.spin(other[0].get_subscription_count)
+    deadline = time.monotonic() + PATIENCE
+    while not answer_in_turns():
+        assert time.monotonic() < deadline
+    assert (status().level, status().message) == (b'\1', 'several publishers: box_a')
+    assert not client.newest_diagnostic('dropped: newer poses wait')
+    client.node.destroy_publisher(other[0])
+    assert client.spin(lambda: 'several publishers' not in status().message)
 
 
 def test_an_error_inside_does_not_end_the_node(node, client, monkeypatch):

@@ -113,12 +113,35 @@ def test_poses_that_never_came_are_told(node):
 def test_poses_that_an_inactive_node_leaves_are_not_lost():
     """Their numbers are missing, as those of lost poses are."""
     for restarts, lost in ((False, 498), (True, 0)):
-        queue = PoseQueue()
+        queue = PoseQueue(lambda: 1)
         queue.is_overtaken(1, 0)
         if restarts:
             queue.restart()
         queue.is_overtaken(500, 10**9)
         assert queue.take_lost() == lost
+
+
+def test_numbers_of_several_publishers_are_not_compared():
+    """The poses of both are used, and a loss shows again once one of them is gone."""
+    publishers = [1]
+    queue = PoseQueue(lambda: publishers[0])
+    assert not any(queue.is_overtaken(number, 0) for number in range(1, 6000))
+    publishers[0] = 2
+    numbers = [number for turn in range(50) for number in (turn + 1, turn + 6000)]
+    assert not any(queue.is_overtaken(number, 0) for number in numbers)
+    assert queue.take_lost() == 0 and queue.is_shared
+    publishers[0] = 1
+    assert queue.take_lost() == 0 and not queue.is_shared
+    assert not queue.is_overtaken(6050, 0) and queue.is_overtaken(6060, 0)
+    assert queue.take_lost() == 9
+
+
+def test_a_publisher_that_is_started_anew_is_not_two():
+    """The network knows of the one that was killed for some more seconds."""
+    queue = PoseQueue(lambda: 2)
+    for number in (500, 501, 1, 2, 3):
+        assert not queue.is_overtaken(number, 0)
+    assert queue.take_lost() == 0 and not queue.is_shared
 
 
 @pytest.mark.parametrize('stamps, words', [
