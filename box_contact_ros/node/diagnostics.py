@@ -9,6 +9,7 @@ docs/reference/diagnostics.md lists all findings.
 """
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,7 +19,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
-from ..scene.pairing import OVERTAKEN, Pairing
+from ..scene.pairing import NO_PARTNER, OVERTAKEN, Pairing
 from ..scene.scene import Pair, Scene
 from .messages import make_header
 from .topics import SceneTopics
@@ -41,6 +42,7 @@ NAMED = 3  # boxes or pairs that a message names
 COMPARED = 16  # pairs at most whose stamps are compared for a report
 MARGIN = 1.2
 """A tolerance that is proposed is so much larger than half the period, as periods vary."""
+RECENT = 8  # stamps of the slower box of a pair that are compared with the other's
 FEWEST_STAMPS = 5  # of a box, before its period is known, even if there is a gap among them
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 ACTIVE = 'active'
@@ -199,7 +201,7 @@ class Diagnostics:
         stale = self._monitor.absent if scene.pose_array else pairing.stale()
         findings = [] if state != ACTIVE else list(_findings(
             summary, [name.partition(': ')[2] for name in new if name.startswith('refused')],
-            unseen, stale, scene, pairing, topics))
+            unseen, stale, scene, pairing, topics, mostly_alone=new[NO_PARTNER] > new['poses'] / 2))
         sent = (new['poses'] + load.lost) / len(scene.streams)
         if state == ACTIVE:
             findings += _lateness(load, sent, new[OVERTAKEN])
@@ -278,9 +280,12 @@ def _rivals(shared: Sequence[str], topics: SceneTopics) -> Iterator[Finding]:
 
 
 def _findings(summary: Summary, refused: Sequence[str], unseen: Sequence[str],
-              stale: Sequence[str], scene: Scene, pairing: Pairing, topics: SceneTopics,
-              ) -> Iterator[Finding]:
-    """Yield why pairs are not answered, as far as it can be told."""
+              stale: Sequence[str], scene: Scene, pairing: Pairing, topics: SceneTopics, *,
+              mostly_alone: bool) -> Iterator[Finding]:
+    """Yield why pairs are not answered, as far as it can be told.
+
+    mostly_alone: whether most poses were dropped for want of a partner.
+    """
     max_age = 1e-9 * pairing.max_age
     if summary.unanswered:
         pairs = [pair.label for pair in summary.unanswered]
@@ -298,8 +303,8 @@ def _findings(summary: Summary, refused: Sequence[str], unseen: Sequence[str],
             scene.pose_array or not summary.unmatched) else _why_stale(stale[0], pairing, topics))
     if summary.has_heard and 0 < max_age <= summary.quiet:
         yield Finding('stopped', f'poses have stopped: none for {summary.quiet:.0f} s')
-    elif summary.unmatched and not (refused or unseen or stale):
-        yield _without_partner(summary.unmatched, pairing)
+    elif (summary.unmatched or mostly_alone) and not (refused or unseen or stale):
+        yield from _without_partner(summary.unmatched, scene.watched, pairing)
 
 
 def _why_stale(box: str, pairing: Pairing, topics: SceneTopics) -> str:
@@ -309,28 +314,42 @@ def _why_stale(box: str, pairing: Pairing, topics: SceneTopics) -> str:
             f'{1e-9 * pairing.max_age:g} s; does its publisher live, and stamp by the same clock?')
 
 
-def _without_partner(unmatched: Sequence[Pair], pairing: Pairing) -> Finding:
-    """Return by how much the stamps of a pair differ, and the tolerance that would do."""
+def _without_partner(unmatched: Sequence[Pair], watched: Sequence[Pair], pairing: Pairing,
+                     ) -> Iterator[Finding]:
+    """Yield by how much the stamps of a pair differ, and the tolerance that would do.
+
+    Where each pair was answered, yield it only if most poses of the slower box have no partner: a
+    faster box has poses to spare.
+    """
     message = 'poses without a partner'
-    for pair in unmatched[:COMPARED]:
-        a, b = np.sort(pairing.stamps(pair.a)), np.sort(pairing.stamps(pair.b))
-        if max(len(a), len(b)) < FEWEST_STAMPS or not len(a) or not len(b):
+    answered = f'{"none" if unmatched else "few"} could be answered'
+    for pair in (unmatched or watched)[:COMPARED]:
+        fast, slow = sorted((np.sort(pairing.stamps(box)) for box in (pair.a, pair.b)), key=_period)
+        if len(fast) < FEWEST_STAMPS or not len(slow):
             continue
-        after = np.searchsorted(b, a)  # the first of b not before each of a
-        difference = 1e-9 * int(min(abs(a - b.take(near, mode='clip')).min()
-                                    for near in (after - 1, after)))
+        slow = slow[min(np.searchsorted(slow, fast[0]), len(slow) - 1):][-RECENT:]
+        after = np.searchsorted(fast, slow)  # the first of fast not before each of slow
+        difference = 1e-9 * float(np.median(np.minimum(*(
+            abs(slow - fast.take(near, mode='clip')) for near in (after - 1, after)))))
         if difference <= 1e-9 * pairing.tolerance:
             continue
         message += f': stamps of {pair.a} and {pair.b} differ by {difference:.3g} s'
         # Half a period of the faster box joins each pose of the slower one, wherever it falls.
-        tolerance = 0.5e-9 * MARGIN * min(
-            np.median(np.diff(stamps)) for stamps in (a, b) if len(stamps) > 1)
+        tolerance = 0.5e-9 * MARGIN * _period(fast)
         if difference > tolerance:
-            return Finding('clocks', message, 'none could be answered; stamp both by one clock '
-                                              '(use_sim_time for all, or for none)')
-        return Finding('apart', message, f'none could be answered; set tolerance:={tolerance:.2g}, '
-                                         'or start with pairing:=latest')
-    return Finding('alone', message, 'none could be answered, as no tick had all its boxes')
+            yield Finding('clocks', message, f'{answered}; stamp both by one clock (use_sim_time '
+                                             'for all, or for none)')
+        else:
+            yield Finding('apart', message, f'{answered}; set tolerance:={tolerance:.2g}, or start '
+                                            'with pairing:=latest')
+        return
+    if unmatched:
+        yield Finding('alone', message, f'{answered}, as no tick had all its boxes')
+
+
+def _period(stamps: np.ndarray) -> float:
+    """Return the period of sorted stamps [ns], inf for fewer than two."""
+    return float(np.median(np.diff(stamps))) if len(stamps) > 1 else math.inf
 
 
 def _some(names: Sequence[str]) -> str:

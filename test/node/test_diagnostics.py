@@ -31,7 +31,7 @@ def node(monkeypatch):
     node.get_fully_qualified_name.return_value = '/node'
     monitor = TickMonitor()
     reporter = Diagnostics(node, counts, monitor)
-    pairing = StampPairing(SOLVER.scene, max_age=MAX_AGE)
+    pairing = StampPairing(SOLVER.scene, max_age=MAX_AGE, counts=counts)
     topics = Mock(why_silent=lambda box: f'nobody publishes {box}')
 
     def report(seconds, *checks, age=None, lost=0):
@@ -44,6 +44,7 @@ def node(monkeypatch):
         report.level, report.lines = status.level, node.get_logger().warning.call_args_list
         report.values = {entry.key: entry.value for entry in status.values}
         return status.message
+    report.pairing, report.answer = pairing, lambda: monitor.evaluated(10_000, 0, [])
     return counts, report
 
 
@@ -142,6 +143,34 @@ def test_a_publisher_that_is_started_anew_is_not_two():
     for number in (500, 501, 1, 2, 3):
         assert not queue.is_overtaken(number, 0)
     assert queue.take_lost() == 0 and not queue.is_shared
+
+
+@pytest.mark.parametrize('every, off, told', [(1, 300_000, True), (10, 300_000, True),
+                                              (10, 0, False)])
+def test_few_answers_are_told_although_there_are_some(node, every, off, told):
+    """Box a at 100 Hz, box b at 1/every of it; each 50th stamp of b fits, and the others are off.
+
+    A slower box whose poses are all answered is told nothing.
+    """
+    counts, report = node
+    for number in range(400):
+        stamp = number * 10_000_000
+        events = [('box_a', stamp)]
+        if number % every == 0:
+            events.append(('box_b', stamp + (off if number % 50 else 0)))
+        for box, when in events:
+            counts['poses'] += 1
+            for _ in report.pairing.add(box, StampedPose((0, 0, 0, 0, 0, 0, 1), '', when)):
+                report.answer()
+        if number % 100 == 99:
+            message = report(1.0)
+    assert report.level == (b'\1' if told else b'\0')
+    assert message == ('poses without a partner: stamps of box_a and box_b differ by 0.0003 s'
+                       if told else 'answering')
+    if told:
+        line, = report.lines
+        assert line.args[0].endswith('few could be answered; set tolerance:=0.006, or start with '
+                                     'pairing:=latest')
 
 
 @pytest.mark.parametrize('stamps, words', [
