@@ -16,22 +16,18 @@ from launch_ros.substitutions import FindPackageShare
 
 ARGUMENTS = {
     'namespace': ('', 'namespace of the node'),
-    'use_sim_time': ('false', 'whether time comes from /clock'),
-    'autostart': ('true', 'whether the node configures and activates itself'),
     'use_respawn': ('false', 'whether a node that has ended is started anew'),
     'log_level': ('info', 'lowest level that is logged'),
 }
-PARAMETERS = ('scene', 'model', 'pairing')
-"""Parameters that most users set; the others are set in params_file."""
+PARAMETERS = {'scene': str, 'model': str, 'pairing': str, 'use_sim_time': bool, 'autostart': bool}
+"""Types of the parameters that most users set; the others are set in params_file."""
 
 
 def contact_node(context: LaunchContext) -> list[Node]:
     """Return the node with what was given."""
     given = {name: LaunchConfiguration(name) for name in (*ARGUMENTS, *PARAMETERS, 'params_file')}
-    values = {name: ParameterValue(given[name], value_type=str)
-              for name in PARAMETERS if given[name].perform(context)}
-    values |= {name: ParameterValue(given[name], value_type=bool)
-               for name in ('use_sim_time', 'autostart')}
+    values = {name: ParameterValue(given[name], value_type=kind)
+              for name, kind in PARAMETERS.items() if given[name].perform(context)}
     return [Node(
         package='box_contact_ros', executable='contact_node', output='screen',
         namespace=given['namespace'], ros_arguments=['--log-level', given['log_level']],
