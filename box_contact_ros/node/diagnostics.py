@@ -277,6 +277,10 @@ def _rivals(shared: Sequence[str], topics: SceneTopics) -> Iterator[Finding]:
         yield Finding('shared', f'several publishers: {_some(shared)}',
                       f'the poses of all are used; leave one that publishes '
                       f'{topics.pose_topic(shared[0])}')
+    if rivals := topics.rivals():
+        yield Finding('rivals', f'others publish {topics.contacts.topic_name}: {_some(rivals)}',
+                      'their answers are mixed with those of this node; stop all but one, or give '
+                      'each a topic of its own by -r contacts:=NAME')
 
 
 def _findings(summary: Summary, refused: Sequence[str], unseen: Sequence[str],

@@ -119,6 +119,18 @@ class SceneTopics:
         """Return how many publish poses of a box."""
         return int(self._subscriptions[box].get_publisher_count())
 
+    def rivals(self) -> list[str]:
+        """Return the full names of others that publish on the topic of all contacts."""
+        topic = self.contacts.topic_name
+        if self._node.count_publishers(topic) < 2:  # a tenth of the time
+            return []
+        names = [f'{offer.node_namespace.rstrip("/")}/{offer.node_name}'
+                 for offer in self._node.get_publishers_info_by_topic(topic)]
+        own = self._node.get_fully_qualified_name()
+        if own in names:
+            names.remove(own)  # once: another node may have the same name
+        return names
+
     def why_silent(self, box: str) -> str:
         """Return who publishes on the topic of a box that gives no pose."""
         subscription = self._subscriptions[box]

@@ -79,6 +79,20 @@ def test_poses_pair_by_stamp_in_any_order(node, client):
         assert -contact.separation == pytest.approx(2 - heights[stamp], abs=1e-14)
 
 
+def test_two_nodes_on_the_same_topics(node, client):
+    """Both are told, also where they have the same name; one that is alone is not."""
+    def are_told():
+        client.diagnostics.clear()
+        assert client.spin(lambda: len(client.diagnostics) > 4)
+        return {'others publish /contacts: /contact_node' in message.status[0].message
+                for message in client.diagnostics[2:]}
+
+    assert are_told() == {False}
+    with serving(ContactNode, size_a=[3.0, 2.0, 2.0]):
+        assert are_told() == {True}
+    assert are_told() == {False}
+
+
 def test_two_publishers_of_a_box(node, client):
     """The poses of both are answered, and diagnostics name the box until one of them is gone."""
     def status():

@@ -32,7 +32,7 @@ def node(monkeypatch):
     monitor = TickMonitor()
     reporter = Diagnostics(node, counts, monitor)
     pairing = StampPairing(SOLVER.scene, max_age=MAX_AGE, counts=counts)
-    topics = Mock(why_silent=lambda box: f'nobody publishes {box}')
+    topics = Mock(why_silent=lambda box: f'nobody publishes {box}', rivals=list)
 
     def report(seconds, *checks, age=None, lost=0):
         """Report after so long, with times of requests [s]; age: of an answer [ns]."""
