@@ -53,6 +53,7 @@ class SceneCheck:
                        if not np.isnan(pose[0])}
         self._rows = np.concatenate((np.full((MOST_BOXES, 7), np.nan), fixed))
         self._poses = self._rows[:len(self._names)]
+        self._body_of = np.concatenate((np.full(MOST_BOXES, -1), scene.body_of))
         self._is_fixed = np.concatenate((np.zeros(MOST_BOXES, bool), scene.is_fixed))
         self._by_margin: dict[float, tuple[native.BroadPhase, ContactSolver]] = {}
         self._label_of = lru_cache(MOST_PAIRS)(lambda a, b: scene.pair_of(a, b).label)
@@ -68,11 +69,10 @@ class SceneCheck:
         meets = np.zeros((count + 1, count + 1), np.uint8)
         meets[0] = 1  # guests come first, and meet everything
         meets[1:1 + len(allowed), 1:1 + len(allowed)] = allowed
-        groups, bodies = (np.concatenate((np.full(MOST_BOXES, guest), of_boxes)).astype(np.int32)
-                          for guest, of_boxes in ((0, group + 1), (-1, self._scene.body_of)))
+        groups = np.concatenate((np.zeros(MOST_BOXES), group + 1)).astype(np.int32)
         made = self._by_margin[margin] = (
             native.BroadPhase(self._sizes, self._is_fixed, margin, self._scene.rows + MOST_BOXES,
-                              groups, meets, bodies),
+                              groups, meets, self._body_of.astype(np.int32)),
             ContactSolver(model=self.solver.model, margin=margin))
         return made
 
@@ -215,6 +215,10 @@ class SceneCheck:
         for number, (a, b) in enumerate(pairs):
             if a == b:
                 raise ValueError(f'pairs[{number}]: {short_repr(a)} is both box_a and box_b')
-            places += product(boxes_of(a, f'pairs[{number}].box_a'),
-                              boxes_of(b, f'pairs[{number}].box_b'))
+            boxes_a, boxes_b = (boxes_of(name, f'pairs[{number}].{side}')
+                                for name, side in ((a, 'box_a'), (b, 'box_b')))
+            if -1 != self._body_of[boxes_a[0]] == self._body_of[boxes_b[0]]:
+                raise ValueError(f'pairs[{number}]: {short_repr(a)} and {short_repr(b)} are of '
+                                 'one body, whose boxes are never a pair')
+            places += product(boxes_a, boxes_b)
         return np.array(places)

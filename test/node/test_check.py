@@ -151,6 +151,10 @@ def test_a_body_is_a_question() -> None:
             (a_box('spreader', [0] * 7), "boxes[0] 'spreader': quaternion (x=0, y=0, z=0, w=0)")):
         assert words in asked(checker, box).message
     assert found(a_box('load', at(0, 1.9))) == ['load_stack']
+    for pair in (('spreader', 'beam'), ('foot', 'beam'), ('gate', 'post')):
+        answer = asked(checker, a_box('spreader', ORIGIN), pairs=[a_pair(*pair)])
+        assert answer.message == (f'pairs[0]: {pair[0]!r} and {pair[1]!r} are of one body, whose '
+                                  'boxes are never a pair')
     lost = asked(checker, a_box('load', ORIGIN), pairs=[a_pair('load', 'beam')])
     assert "pairs[0].box_b: 'beam' is neither a box of the request nor a fixed" in lost.message
 
