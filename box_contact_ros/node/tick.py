@@ -61,6 +61,8 @@ class PoseQueue:
             return False
         if self._sequence is not None and sequence != self._sequence + 1:
             self._jumped(sequence - self._sequence, arrived)
+        if arrived < self._arrived:  # the wall clock was set back
+            self._new_from = 0
         self._sequence, self._arrived = sequence, arrived
         return arrived < self._new_from
 

@@ -4,6 +4,7 @@
 """What a report says of a node that is busy, without DDS. Over DDS: test_first_run.py."""
 from __future__ import annotations
 
+import time
 from collections import Counter
 from types import SimpleNamespace
 from unittest.mock import Mock
@@ -135,6 +136,15 @@ def test_numbers_of_several_publishers_are_not_compared():
     assert queue.take_lost() == 0 and not queue.is_shared
     assert not queue.is_overtaken(6050, 0) and queue.is_overtaken(6060, 0)
     assert queue.take_lost() == 9
+
+
+def test_a_wall_clock_that_is_set_back_drops_no_pose():
+    """After a loss, poses that waited are old by the clock, but none is that comes later."""
+    queue, now = PoseQueue(lambda: 1), time.time_ns()
+    assert [queue.is_overtaken(number, now - age) for number, age in (
+        (1, 30_000), (9, 20_000), (10, 10_000))] == [False, True, True]
+    set_back = now - 30 * 10**9
+    assert not any(queue.is_overtaken(number, set_back + number) for number in range(11, 99))
 
 
 def test_a_publisher_that_is_started_anew_is_not_two():
