@@ -120,8 +120,9 @@ def scene_of(values: Mapping[str, Any]) -> Scene:
 class ContactNode(GuardedNode, LifecycleNode):
     """Wires parameters, topics, ticks and diagnostics to the states of a lifecycle node.
 
-    A SingleThreadedExecutor or an EventsExecutor may serve it, beside other nodes; a
-    MultiThreadedExecutor is too slow for 100 ticks a second. `start` configures and activates it.
+    `start` configures and activates it. A SingleThreadedExecutor may serve it, beside other nodes,
+    as `rclpy.spin` does. An EventsExecutor has to be spun with a timeout, as `runtime.spin` does:
+    without one, it hangs. A MultiThreadedExecutor is too slow for 100 ticks a second.
 
     A node on another method derives from this one. It sets `name`, the `prefix` of its contact
     topics and its `parameters` (all of these but `model`), and names the model.
