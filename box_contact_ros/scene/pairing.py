@@ -46,7 +46,8 @@ the same, and another box that began anew behind   RESETS: time went back; all b
 the others is near, or there are no others         begin anew
 ```
 A box that has begun anew behind the others may be the first one after a restart. So its ticks await
-the others, although their newest stamps are later.
+the others, although their newest stamps are later. So does a tick with a pose that is older than
+the newest of its box: time may have been set back by less than RESET.
 Policy `latest` makes a tick of every pose that is not OLD, with the last pose of each other box. A
 box is stale there if its newest stamp is more than max_age away from that of the pose.
 Why no library does this: docs/contributing/decisions/contact-node.md.
@@ -202,6 +203,7 @@ class WaitingTick:
     number: int = 0  # how many ticks were whole with it; 0: not whole
     passed: int = 0  # later ticks that are whole
     settled: int = 0  # how many boxes of the scene, from the first on, are not awaited
+    went_back: bool = False  # whether a pose in it is older than the newest of its box
 
 
 class Pairing(ABC):
@@ -331,6 +333,7 @@ class StampPairing(Pairing):
         """Take a pose; return the ticks that await nothing any more, in their order."""
         stamp = pose.stamp
         state = self._state_at(box, stamp)
+        went_back = stamp < state.newest
         if stamp > state.newest:
             state.newest = stamp
         else:
@@ -358,6 +361,8 @@ class StampPairing(Pairing):
         if box in tick.poses:  # with a tolerance: an earlier pose near the stamp of this one
             self.counts[NO_PARTNER] += 1
         tick.poses[box] = pose
+        if went_back and not tick.went_back:
+            tick.went_back, tick.settled = True, 0
         if len(tick.poses) == len(self._boxes) and not self._whole:  # as almost always
             self._whole_so_far += 1
             return [self._answer(key)]
@@ -418,7 +423,8 @@ class StampPairing(Pairing):
     def _may_come(self, state: BoxState, key: int, tick: WaitingTick) -> bool:
         if not state.came:
             return not self._has_answered
-        if state.is_late or (state.newest >= key and self._behind.isdisjoint(tick.poses)):
+        is_past = state.newest >= key and not tick.went_back
+        if state.is_late or (is_past and self._behind.isdisjoint(tick.poses)):
             return False
         gap = min(state.gaps, default=1)
         return gap - 1 <= tick.number - state.heard_at < gap + PATIENCE

@@ -261,6 +261,17 @@ def test_time_set_back_begins_anew(policy):
     assert pairing.rejections[RESETS][:3] == ('b', 0, 5 * RESET + 9 * MS)
 
 
+@pytest.mark.parametrize('step', [13 * MS, 153 * MS, 797 * MS, 999 * MS])
+@pytest.mark.parametrize('order', ['abc', 'cab'])
+def test_time_set_back_by_less_than_a_second_costs_no_pose(step, order):
+    """All poses of a tick come together, and each tick is answered at once with all of them."""
+    pairing = StampPairing(scene(), max_age=RESET)
+    events = [(box, stamp - step * ((stamp - START) // RESET)) for box, stamp in stream(order, 400)]
+    ticks = play(pairing, events)
+    assert [number for number, _ in ticks] == list(range(2, 1200, 3))
+    assert all(None not in tick for _, tick in ticks) and not pairing.counts
+
+
 def test_after_a_restart_the_first_box_waits_for_the_second():
     """Although it has a pair with a fixed box, and the second one has a later stamp."""
     pairing = StampPairing(scene('ab', ('ab', 'aF')), max_age=RESET)
