@@ -247,6 +247,15 @@ def test_remainders_of_a_frame_do_no_harm() -> None:
     assert np.abs(world.velocities).max() < 1e-9
 
 
+@pytest.mark.parametrize('late, limit', [(0.0, 0.1), (0.02, 1.0)])
+def test_the_speed_of_pushing_out_has_a_limit(late: float, limit: float) -> None:
+    """Of a cube 0.2 m deep; late answers bear nothing as hard as the lower limit makes a patch."""
+    world = World(pose(z=0.3))
+    world.hold(age=late)
+    world.step(0.005)
+    assert 0.5 * limit * 0.005 < world.poses[1, 2] - 0.3 < limit * 0.005
+
+
 @pytest.mark.parametrize('overlap, fall', [(0.002, 0.0), (0.01, 0.0), (0.0, 0.1), (0.0, 0.5)])
 def test_what_is_pushed_out_does_not_jump(overlap: float, fall: float) -> None:
     """Eight cubes put into each other, or dropped as a stack: their top rises by 2 cm at most."""

@@ -31,6 +31,8 @@ constexpr double slow_damping_ratio = 2.0;
 // Speeds add up in a stack, and relaxation leaves some: with 1, eight cubes that overlap by 2 mm jump by
 // 0.8 m.
 constexpr double push_out_limit = 0.1;
+// The same where answers are late, which bear nothing that is as hard.
+constexpr double late_push_out_limit = 1.0;
 // An answer that is overdue by so many periods [1] pushes nothing out.
 constexpr double overdue_periods = 3.0;
 
@@ -151,7 +153,8 @@ inline void soften(const Patch& patch, const SubStep& step, double depth, const 
     rows.mass = softened(pressed, rows.softness);
     block.relaxed = rows;
   }
-  double slowed = is_spring ? 1.0 : std::min(1.0, push_out_limit / (rate * depth));
+  double limit = is_late ? late_push_out_limit : push_out_limit;
+  double slowed = is_spring ? 1.0 : std::min(1.0, limit / (rate * depth));
   rows.softness[0] = slowed * softness * pressed[0][0];
   rows.bias[0] = -slowed * rate * depth;
   rows.mass = softened(pressed, rows.softness);
