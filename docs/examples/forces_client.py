@@ -10,7 +10,7 @@ it then moves the load.
 It prints:
 
     50 ms: -7.00 mm deep, 583.4 mm/s
-    100 ms: 0.25 mm deep, 0.0 mm/s
+    100 ms: 0.14 mm deep, 0.0 mm/s
     200 ms: 0.03 mm deep, 0.0 mm/s
     500 ms: 0.03 mm deep, 0.0 mm/s
     2000 ms: 0.03 mm deep, 0.0 mm/s
