@@ -41,6 +41,9 @@ MASS_MIN, MASS_MAX = native.MASS_MIN, native.MASS_MAX
 """Least and largest mass [kg] and moment of inertia [kg m²] that are accepted."""
 INERTIA_SLACK = native.INERTIA_SLACK
 """By how much of it a moment of inertia may exceed the sum of the two others."""
+SQUARE_SLACK = native.SQUARE_SLACK
+"""A patch is a square where its variances differ from their mean by a smaller share: all directions
+have its covariance."""
 THREADS_MAX = native.THREADS_MAX
 """Most threads that a batch is accepted with."""
 DEPTH_FLOOR = native.DEPTH_FLOOR

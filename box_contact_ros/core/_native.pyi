@@ -14,6 +14,7 @@ QUATERNION_MAX: float
 MASS_MIN: float
 MASS_MAX: float
 INERTIA_SLACK: float
+SQUARE_SLACK: float
 CONTACT_ULPS: float
 DEPTH_FLOOR: float
 

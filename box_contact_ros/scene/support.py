@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core import DEPTH_FLOOR
+from ..core import DEPTH_FLOOR, SQUARE_SLACK
 from ..solver.checks import as_boxes, as_floats, as_places, as_whole, short_repr
 from ..solver.contact import Contacts, patch_areas
 from ..solver.pose import rotation_matrix
@@ -21,9 +21,6 @@ from ..solver.pose import rotation_matrix
 UPRIGHT = 0.9
 """Least cosine between `up` and the normal of a contact that carries: 26°, which friction 0.5
 holds."""
-SQUARE = 1e-3
-"""A patch is a square where its variances differ from their mean by a smaller share: all directions
-have its covariance."""
 _CORNERS = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
 
 
@@ -125,7 +122,7 @@ def _corners(contacts: Contacts, centre: np.ndarray, turn: np.ndarray,
     edges = rotation_matrix(turn)
     level = np.abs(up @ edges).argmin(axis=1)
     edge = edges[np.arange(len(edges)), :, level] @ across.T
-    is_square = np.hypot(off, mixed) < SQUARE * mean
+    is_square = np.hypot(off, mixed) < SQUARE_SLACK * mean
     angle = np.where(is_square, np.arctan2(edge[:, 1], edge[:, 0]), np.arctan2(mixed, off) / 2.0)
     sine, cosine = np.sin(angle), np.cos(angle)
     axes = np.moveaxis(np.array([[cosine, -sine], [sine, cosine]]), 2, 0)

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The library as a Python extension: its functions and types.
+#include "../src/force/rectangle.hpp"
 #include "../src/force/rigid_body.hpp"
 #include "broad_phase.hpp"
 #include "forces.hpp"
@@ -108,6 +109,7 @@ PyObject* make_module() {
                              {"MASS_MIN", force::mass_min},
                              {"MASS_MAX", force::mass_max},
                              {"INERTIA_SLACK", force::inertia_slack},
+                             {"SQUARE_SLACK", force::square_slack},
                              {"CONTACT_ULPS", contact_ulps},
                              {"DEPTH_FLOOR", depth_floor}})
     add(name, PyFloat_FromDouble(value));
