@@ -53,7 +53,7 @@ class SceneCheck:
                        if not np.isnan(pose[0])}
         self._rows = np.concatenate((np.full((MOST_BOXES, 7), np.nan), fixed))
         self._poses = self._rows[:len(self._names)]
-        self._body_of = np.concatenate((np.full(MOST_BOXES, -1), scene.body_of))
+        self._body_of = np.concatenate((np.full(MOST_BOXES, -1), scene.body_of)).astype(np.int32)
         self._is_fixed = np.concatenate((np.zeros(MOST_BOXES, bool), scene.is_fixed))
         self._by_margin: dict[float, tuple[native.BroadPhase, ContactSolver]] = {}
         self._label_of = lru_cache(MOST_PAIRS)(lambda a, b: scene.pair_of(a, b).label)
@@ -72,7 +72,7 @@ class SceneCheck:
         groups = np.concatenate((np.zeros(MOST_BOXES), group + 1)).astype(np.int32)
         made = self._by_margin[margin] = (
             native.BroadPhase(self._sizes, self._is_fixed, margin, self._scene.rows + MOST_BOXES,
-                              groups, meets, self._body_of.astype(np.int32)),
+                              groups, meets, self._body_of),
             ContactSolver(model=self.solver.model, margin=margin))
         return made
 

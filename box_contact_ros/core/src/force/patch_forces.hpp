@@ -438,9 +438,9 @@ class PatchForces {
     double before = clock_.window, h = step.h;
     clock_.window = window;
     return {h,
-            clock_.window,
+            window,
             before > 0.0 ? std::min(h / before, most_again) : 1.0,
-            before > 0.0 ? (clock_.window - h) / before : 0.0,
+            before > 0.0 ? (window - h) / before : 0.0,
             1.0 / step.parts,
             clock_.period,
             overdue_periods * std::max(clock_.period, step.dt)};
