@@ -215,7 +215,7 @@ class PatchForces:
         friction: μ (k,).
         surface_velocity: (k, 3) of B's surface relative to A's [m/s], as of a belt. That of the
         bodies is added.
-        stiffness: (k,) [N/m]. 0 is as stiff as step and answers allow, the most.
+        stiffness: (k,) [N/m], up to what step and answers bear. 0 stands for that.
         age: how long ago the answer was asked for [s].
         period: from one question to the next [s]. 0 is the least of the last intervals between
         answers.
@@ -260,7 +260,10 @@ class PatchForces:
         return Motion._make(found)
 
     def loads(self) -> Loads:
-        """Return what each pair carried in the last step; none, once patches were dropped since."""
+        """Return what each pair carried in the last step.
+
+        None if bodies or boxes were changed, or patches forgotten, since.
+        """
         return Loads._make(self._native.loads())
 
     def forget(self, bodies: ArrayLike) -> None:

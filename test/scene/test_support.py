@@ -123,7 +123,7 @@ def test_up_is_any_direction():
 
 @pytest.mark.parametrize('yaw', range(0, 91, 5))
 def test_a_square_patch_has_the_sides_of_its_box(yaw):
-    """A crate of which 0.4 x 0.4 m is on a pallet, both turned; and a cube turned on a floor."""
+    """A crate with 0.4 x 0.4 m on its pallet, both turned. A cube that is turned on a floor."""
     half = np.radians(yaw) / 2
     turn = np.array([[0.0, 0.0, np.sin(half), np.cos(half)]])
     pose = poses.moved(upright((0, 0, 0.05), (0.45, 0, 0.25)), np.zeros(3), turn)

@@ -71,7 +71,7 @@ typedef struct bc_patches {
                                period are 0 to 1e50 */
   const double* surface;    /* (count, 3): velocity of B's surface relative to A's, beside that of the
                                bodies, as of a belt [m/s]; NULL: none */
-  const double* stiffness;  /* [N/m]; 0, or NULL: as stiff as step and answers bear, the most */
+  const double* stiffness;  /* [N/m], up to what step and answers bear; 0, or NULL: that */
   double age;               /* since the answer was asked for [s] */
   double period;            /* from one question to the next [s]; 0: from the answer before */
 } bc_patches;
@@ -150,7 +150,8 @@ BC_API bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, con
                                          const bc_motion* motion);
 
 /* Write what each pair carried in the last advance, by the lower and the higher box, and return how many
- * there are: none once patches were dropped since. Nothing is written if `capacity` is less. */
+ * there are: none if bodies or boxes were changed, or patches forgotten, since. Nothing is written if
+ * `capacity` is less. */
 BC_API int64_t bc_patch_forces_loads(const bc_patch_forces* forces, bc_load* loads, int64_t capacity);
 
 /* Write the state as bytes, for machines of the same byte order, and return how many there are;

@@ -34,7 +34,7 @@ struct Patches {
   Results results;                 // separation, normal, point, volume and covariance
   Span<const double> friction{};   // Coulomb's μ of each pair
   Span<const double> surface{};    // velocity of B's surface relative to A's, three numbers a row [m/s]
-  Span<const double> stiffness{};  // of each pair [N/m]; 0: as stiff as step and answers bear, the most
+  Span<const double> stiffness{};  // of each pair [N/m], up to what step and answers bear; 0: that
   double age = 0.0;                // since the answer was asked for [s]
   double period = 0.0;             // from one question to the next [s]; 0: by the last answers
 
@@ -130,8 +130,8 @@ class PatchForces {
     advance(dt, poses, velocities, outside, {sizeof(bc_motion), nullptr, nullptr, found.data()});
   }
 
-  // What each pair carried, by the lower and the higher box: the mean of the last advance. None, once
-  // patches were dropped since.
+  // What each pair carried, by the lower and the higher box: the mean of the last advance. None if
+  // bodies or boxes were changed, or patches forgotten, since.
   std::vector<Load> loads() const {
     std::vector<Load> found(std::size_t(bc_patch_forces_loads(forces_.get(), nullptr, 0)));
     bc_patch_forces_loads(forces_.get(), found.data(), std::int64_t(found.size()));

@@ -27,7 +27,7 @@ struct Patch {
   Rectangle shape;
   double depth;         // volume / area [m]
   double friction;      // μ [1]
-  double stiffness;     // [N/m]; 0: as stiff as step and answers bear
+  double stiffness;     // [N/m], up to what step and answers bear; 0: that
   Vec<double> surface;  // velocity of B's surface relative to A's, beside the bodies' own [m/s]
   double late;          // from the question to the answer [s]
   double age;           // since the answer was taken [s]
