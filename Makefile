@@ -71,7 +71,7 @@ test:
 check:
 	@.ci/setup test
 	$(LINT)
-	exec $(PYTEST) -m 'not slow' test/core test/solver test/networks test/scene \
+	exec $(PYTEST) -m 'not slow' test/core test/solver test/models test/forces test/stream test/scene \
 	    test/package/test_house.py test/package/test_ament.py $(ARGS)
 
 # The reports run one after the other, as most of them measure time; each runs though one before it
@@ -135,8 +135,8 @@ dist:
 coverage:
 	@.ci/setup test
 	$(PY) -m coverage erase
-	$(PY) -m coverage run -m pytest test/solver test/scene test/node \
-	    test/networks test/package/test_package.py $(ARGS)
+	$(PY) -m coverage run -m pytest test/solver test/models test/forces test/scene test/stream \
+	    test/node test/package/test_package.py $(ARGS)
 	$(PY) -m coverage combine -q
 	$(PY) -m coverage report --fail-under 95
 

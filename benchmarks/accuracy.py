@@ -26,7 +26,7 @@ import numpy as np
 
 from box_contact_ros.arguments import model_name, within
 from box_contact_ros.core import DEPTH_FLOOR
-from box_contact_ros.networks.weights_file import WeightsError
+from box_contact_ros.models.weights_file import WeightsError
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.pose import rotation_matrix
 

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from box_contact_ros.core import FORCE, native
-from box_contact_ros.models import make_model
-from box_contact_ros.networks.models import GROUP, INPUTS_TOGETHER, mlp_numbers
+from box_contact_ros.models.make_model import make_model
+from box_contact_ros.models.networks import GROUP, INPUTS_TOGETHER, mlp_numbers
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver

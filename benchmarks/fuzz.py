@@ -32,8 +32,8 @@ import numpy as np
 
 from box_contact_ros.arguments import within
 from box_contact_ros.core import DEPTH_FLOOR, FEATURES, OUTPUTS, UNITS_MAX, native
-from box_contact_ros.networks.models import core_numbers
-from box_contact_ros.networks.weights_file import Network
+from box_contact_ros.models.networks import core_numbers
+from box_contact_ros.models.weights_file import Network
 from box_contact_ros.solver.contact import FIELDS, Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix

@@ -28,7 +28,7 @@ from box_contact_ros.demo.landing import (
     Landing,
     LandingRecord,
 )
-from box_contact_ros.scene.forces import FRICTION
+from box_contact_ros.forces.patch_forces import FRICTION
 from box_contact_ros.scene.scene import CONTAINER
 from box_contact_ros.solver.contact_solver import ContactSolver
 

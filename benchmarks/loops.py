@@ -22,7 +22,7 @@ import mujoco
 import numpy as np
 
 from box_contact_ros import Body, ContactSolver, PatchForces
-from box_contact_ros.scene.forces import FRICTION, GRAVITY
+from box_contact_ros.forces.patch_forces import FRICTION, GRAVITY
 from box_contact_ros.solver.pose import rotation_matrix
 
 from .pose_sets import quaternion_multiply

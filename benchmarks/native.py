@@ -27,8 +27,8 @@ from typing import NamedTuple
 import numpy as np
 
 from box_contact_ros.core import FORCE, instruction_sets
-from box_contact_ros.networks.models import SHIPPED_PAPERS, PaperWeights, mlp_numbers
-from box_contact_ros.networks.weights_file import load_weights
+from box_contact_ros.models.networks import SHIPPED_PAPERS, PaperWeights, mlp_numbers
+from box_contact_ros.models.weights_file import load_weights
 from box_contact_ros.resources import resource_path
 
 from . import output, settled

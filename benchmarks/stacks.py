@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.scene.forces import GRAVITY
+from box_contact_ros.forces.patch_forces import GRAVITY
 from box_contact_ros.solver.pose import rotation_matrix
 
 from . import output, settled

@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The writer of weights files, whose format is that of `box_contact_ros.networks.weights_file`."""
+"""The writer of weights files, whose format is that of `box_contact_ros.models.weights_file`."""
 from __future__ import annotations
 
 import json
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from safetensors.numpy import save
 
-from box_contact_ros.networks.weights_file import Layers
+from box_contact_ros.models.weights_file import Layers
 
 CARD_FIELDS = ('name', 'model', 'architecture', 'inputs', 'outputs', 'sizes', 'data', 'seed',
                'commit', 'metrics')

@@ -13,15 +13,15 @@ from .solver.contact import Contact, Contacts, patch_area, patch_areas
 from .solver.contact_solver import ContactSolver
 
 if TYPE_CHECKING:
-    from .models import make_model
+    from .forces.patch_forces import Body, PatchForces
+    from .forces.support import support
+    from .models.make_model import make_model
     from .node.contact_node import ContactNode as ContactNode  # noqa: F401
-    from .scene.contacts_of import contacts_of
-    from .scene.forces import Body, PatchForces
-    from .scene.read_contacts import ReadContacts, read_contacts
     from .scene.scene import Box, Frame, Pair, Scene
     from .scene.scene_file import read_scene
     from .scene.scene_solver import SceneSolver
-    from .scene.support import support
+    from .solver.contacts_of import contacts_of
+    from .stream.read_contacts import ReadContacts, read_contacts
 
 __all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Frame', 'Pair', 'PatchForces',
            'ReadContacts', 'Scene', 'SceneSolver', 'contacts_of', 'make_model', 'patch_area',
@@ -29,15 +29,15 @@ __all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Frame', 'Pair
 # `ContactNode` needs ROS, and `import *` does without.
 
 _LOADED_WHEN_USED = {
-    'models': ('make_model',),
+    'forces.patch_forces': ('Body', 'PatchForces'),
+    'forces.support': ('support',),
+    'models.make_model': ('make_model',),
     'node.contact_node': ('ContactNode',),
-    'scene.contacts_of': ('contacts_of',),
-    'scene.forces': ('Body', 'PatchForces'),
-    'scene.read_contacts': ('ReadContacts', 'read_contacts'),
     'scene.scene_file': ('read_scene',),
     'scene.scene': ('Box', 'Frame', 'Pair', 'Scene'),
     'scene.scene_solver': ('SceneSolver',),
-    'scene.support': ('support',),
+    'solver.contacts_of': ('contacts_of',),
+    'stream.read_contacts': ('ReadContacts', 'read_contacts'),
 }
 
 

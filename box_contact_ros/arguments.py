@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
-from .models import check_model
+from .models.make_model import check_model
 
 Number = TypeVar('Number', int, float)
 

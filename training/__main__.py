@@ -27,7 +27,7 @@ from benchmarks.output import QUICK_RESULTS, make_folder, report_parser
 from benchmarks.paper import jobs
 from box_contact_ros.arguments import within
 from box_contact_ros.core import UNITS_MAX
-from box_contact_ros.networks.models import GROUP, MLP, PAPER, mlp_numbers
+from box_contact_ros.models.networks import GROUP, MLP, PAPER, mlp_numbers
 
 from . import paper, recipe
 

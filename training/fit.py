@@ -15,7 +15,7 @@ from torch import Tensor
 
 from benchmarks.paper.fit import as_layers
 from box_contact_ros.core import FEATURES, OUTPUTS
-from box_contact_ros.networks.weights_file import Layers
+from box_contact_ros.models.weights_file import Layers
 
 from .samples import MlpSamples
 

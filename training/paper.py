@@ -26,8 +26,8 @@ from benchmarks.paper.numpy_model import network_inputs, octant_signs, touching_
 from benchmarks.pose_sets import LOADS, Generator, Pairs, drawn
 from benchmarks.pose_sets import SETS as POSE_SETS
 from benchmarks.weights import save_weights
-from box_contact_ros.models import make_model
-from box_contact_ros.networks.models import is_cube
+from box_contact_ros.models.make_model import make_model
+from box_contact_ros.models.networks import is_cube
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix
 

@@ -29,8 +29,8 @@ from benchmarks.timing import usable_cores
 from benchmarks.weights import save_weights
 from benchmarks.worst_case import climb, worst_start
 from box_contact_ros.core import FEATURES, NETWORK_FORMAT, OUTPUTS
-from box_contact_ros.models import make_model
-from box_contact_ros.networks.models import KINDS, MLP
+from box_contact_ros.models.make_model import make_model
+from box_contact_ros.models.networks import KINDS, MLP
 from box_contact_ros.solver.contact_solver import ContactSolver
 
 from .fit import TAIL, UNITS, MlpErrors, PatchNetwork, errors_of, fit, tensors

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from box_contact_ros.networks.weights_file import Network
+from box_contact_ros.models.weights_file import Network
 
 from .numpy_model import forward
 

@@ -28,7 +28,7 @@ from torch import Tensor
 from torch.func import functional_call, stack_module_state, vmap
 from tqdm import tqdm
 
-from box_contact_ros.networks.weights_file import WEIGHT_LIMIT, Layers
+from box_contact_ros.models.weights_file import WEIGHT_LIMIT, Layers
 
 from .dataset import Patterns
 from .errors import difference

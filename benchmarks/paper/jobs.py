@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from box_contact_ros.networks.weights_file import Network, load_weights
+from box_contact_ros.models.weights_file import Network, load_weights
 
 from ..pose_sets import CUBE
 from ..weights import save_weights

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from box_contact_ros.networks.weights_file import load_weights
+from box_contact_ros.models.weights_file import load_weights
 from box_contact_ros.resources import resource_path
 
 from .numpy_model import (

@@ -14,13 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 from box_contact_ros.core import native
-from box_contact_ros.networks.models import in_words, is_cube
-from box_contact_ros.networks.weights_file import Network, Weights
+from box_contact_ros.models.networks import in_words, is_cube
+from box_contact_ros.models.weights_file import Network, Weights
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.pose import rotation_matrix
 
 INPUTS, OUTPUTS, PLACE = 6, 4, 3
-"""Of a network: see `networks.models.KINDS`."""
+"""Of a network: see `box_contact_ros.models.networks.KINDS`."""
 
 
 class TouchingPairs(NamedTuple):

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
+from box_contact_ros.models import soup
 from box_contact_ros.solver.pose import rotation_matrix
-from box_contact_ros.soup import soup
 
 from .. import output
 from ..pose_sets import CUBE, Pairs, on_cube, quaternion_multiply, turned

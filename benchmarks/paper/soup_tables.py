@@ -18,8 +18,8 @@ import fcl
 import numpy as np
 from tqdm import tqdm
 
+from box_contact_ros.models import soup
 from box_contact_ros.solver.contact import Contacts
-from box_contact_ros.soup import soup
 
 from .. import output
 from ..contestant import Contestant, ours

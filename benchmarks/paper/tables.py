@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from box_contact_ros.networks.weights_file import Weights, load_weights
+from box_contact_ros.models.weights_file import Weights, load_weights
 
 from .. import output
 from ..contestant import Contestant, ours

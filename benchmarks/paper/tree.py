@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from box_contact_ros.models import soup
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix
-from box_contact_ros.soup import soup
 
 from ..pose_sets import CUBE, Pairs, quaternion_multiply
 

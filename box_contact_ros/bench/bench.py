@@ -34,7 +34,7 @@ from pathlib import Path
 from ..arguments import model_name, outside_ros_args, program_parser, within
 from ..core import native
 from ..extras import require
-from ..models import MODELS
+from ..models.make_model import MODELS
 from ..node.runtime import exit_on_refusal, running_node
 from ..processes import asked_to_end, keep_to_this_host, program, running
 from .drive import NODES, BenchNode

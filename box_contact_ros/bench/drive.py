@@ -28,9 +28,9 @@ from box_contact_msgs.msg import Contacts as ContactsMessage
 from ..node.messages import make_header, pose_message
 from ..node.runtime import GuardedNode, spin_for
 from ..node.topics import DEEP_RELIABLE
-from ..scene.read_contacts import read_contacts
 from ..scene.scene import CONTAINER
 from ..solver.contact_solver import ContactSolver
+from ..stream.read_contacts import read_contacts
 from .echo_node import FRAME, raw_stamp, with_stamp
 from .report import AnswerLog
 
@@ -40,7 +40,7 @@ START_LIMIT = 60.0  # time [s] until a node answers
 DRAIN_SECONDS = 1.0  # time [s] without an answer, after which what is still out is lost
 
 NODES = {'echo': ('bench.echo_node', 'echo/'), 'contact': ('node.contact_node', ''),
-         'soup': ('soup.soup_node', 'soup/')}
+         'soup': ('node.soup_node', 'soup/')}
 """Module of each node, and what precedes the topics that it answers on. All topics of a node are
 in the namespace bench/NAME. Each node is compared with the one before it."""
 ANSWERS = {'point': (PointStamped, 'contact/point'), 'normal': (Vector3Stamped, 'contact/normal'),

@@ -27,7 +27,7 @@ from ..extras import require
 require('sim')  # a missing MuJoCo ends in one line
 import mujoco
 
-from ..scene.forces import GRAVITY, Body
+from ..forces.patch_forces import GRAVITY, Body
 from ..scene.scene import CONTAINER
 from ..solver.pose import cross, rotation_matrix
 

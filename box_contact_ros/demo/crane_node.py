@@ -39,7 +39,7 @@ from ..node.messages import make_header, pose_message
 from ..node.parameters import Setting, declare, flag, number, warn_of_unknown
 from ..node.runtime import REFUSALS, GuardedNode, running_node, spin_once
 from ..node.topics import DEEP_RELIABLE, contact_qos
-from ..scene.read_contacts import read_contacts
+from ..stream.read_contacts import read_contacts
 from . import CRANE_ROPES, CRANE_WRENCH
 from .crane import CraneScenario
 from .landing import CORNER_SPEED_LIMIT, ClosedLoop, Landing, LandingRecord, LoopState, with_patch

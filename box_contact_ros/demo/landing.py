@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..scene.forces import FRICTION, GRAVITY, Body, PatchForces
+from ..forces.patch_forces import FRICTION, GRAVITY, Body, PatchForces
 from ..solver.contact import Contact, Contacts
 from ..solver.contact_solver import ContactSolver
 from ..solver.pose import rotation_matrix

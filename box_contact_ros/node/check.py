@@ -14,11 +14,11 @@ from rclpy.clock_type import ClockType
 
 from box_contact_msgs.srv import Check
 
-from ..models import most_near
-from ..scene.pairing import frames_differ
+from ..models.make_model import most_near
 from ..scene.scene_check import Row, SceneCheck
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import name_fault
+from ..stream.pairing import frames_differ
 from .messages import KeptMessages
 from .rclpy_workarounds import Send, answer_later
 from .runtime import LONG, GuardedNode

@@ -35,13 +35,13 @@ from box_contact_msgs.srv import Check
 
 from ..arguments import parse_command_line
 from ..core import LENGTH_MAX
-from ..models import MODELS, check_model, make_model, most_near
-from ..scene.pairing import PAIRINGS, RESETS
+from ..models.make_model import MODELS, check_model, make_model, most_near
 from ..scene.scene import CONTAINER, Scene, two_boxes
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import short_repr
-from ..solver.models import NATIVE
+from ..solver.model import NATIVE
+from ..stream.pairing import PAIRINGS, RESETS
 from .check import Checker, CheckService
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
 from .parameters import (

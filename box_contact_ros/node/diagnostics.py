@@ -19,8 +19,8 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
-from ..scene.pairing import NO_PARTNER, OVERTAKEN, Pairing
 from ..scene.scene import Pair, Scene
+from ..stream.pairing import NO_PARTNER, OVERTAKEN, Pairing
 from .messages import make_header
 from .topics import SceneTopics
 

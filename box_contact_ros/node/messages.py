@@ -18,8 +18,8 @@ from std_msgs.msg import Header
 from box_contact_msgs.msg import Contact as ContactMessage
 
 from ..core import native
-from ..scene.message_bytes import NANOSECONDS
 from ..solver.contact import Contacts
+from ..stream.message_bytes import NANOSECONDS
 
 
 def make_header(stamp: int, frame_id: str) -> Header:

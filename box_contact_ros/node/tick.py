@@ -16,7 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from ..scene.message_bytes import (
+from ..scene.scene import ALL_BOXES
+from ..scene.scene_solver import SceneSolver
+from ..solver.checks import absent_poses, are_poses, pose_fault
+from ..stream.message_bytes import (
     NANOSECONDS,
     VECTOR_BYTES,
     ContactWriter,
@@ -25,10 +28,7 @@ from ..scene.message_bytes import (
     aligned,
     header_bytes,
 )
-from ..scene.pairing import OVERTAKEN, PAIRINGS, Pairing, StampedPose, Tick
-from ..scene.scene import ALL_BOXES
-from ..scene.scene_solver import SceneSolver
-from ..solver.checks import absent_poses, are_poses, pose_fault
+from ..stream.pairing import OVERTAKEN, PAIRINGS, Pairing, StampedPose, Tick
 from .diagnostics import TickMonitor
 from .parameters import reason_of
 from .topics import PoseCallback, SceneTopics

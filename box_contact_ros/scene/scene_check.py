@@ -19,7 +19,7 @@ from ..core import LENGTH_MAX, native
 from ..solver.checks import name_fault, nearest_name, pose_fault, short_repr, size_fault
 from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver
-from .contacts_of import in_contact
+from ..solver.contacts_of import in_contact
 from .scene_solver import SceneSolver
 
 MOST_BOXES = 256

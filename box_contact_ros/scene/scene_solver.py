@@ -21,8 +21,8 @@ from ..core import LENGTH_MAX, native
 from ..solver.checks import as_floats, as_number, as_whole, short_repr
 from ..solver.contact import Contact, Contacts
 from ..solver.contact_solver import ContactSolver
-from ..solver.models import Model
-from .contacts_of import find_contacts, in_contact
+from ..solver.contacts_of import find_contacts, in_contact
+from ..solver.model import Model
 from .scene import NOWHERE, Pair, Scene
 
 

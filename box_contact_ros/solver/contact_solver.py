@@ -24,7 +24,7 @@ from .checks import (
     size_fault,
 )
 from .contact import Contact, Contacts, without_patch
-from .models import NATIVE_TYPES, Model, as_model
+from .model import NATIVE_TYPES, Model, as_model
 
 Names = tuple[str, str, str, str]  # of poses and sizes of A and B, in a refusal
 _SINGLE: Names = ('pose_a', 'pose_b', 'size_a', 'size_b')

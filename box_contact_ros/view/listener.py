@@ -28,12 +28,12 @@ from ..node.contact_node import scene_of
 from ..node.parameters import Setting, declare, warn_of_unknown
 from ..node.runtime import GuardedNode
 from ..node.topics import pose_qos
-from ..scene.message_bytes import MessageError, PoseReader
-from ..scene.pairing import StampedPose
-from ..scene.read_contacts import ReadContacts, read_contacts
 from ..scene.scene import ALL_BOXES, ALONE, Scene
 from ..scene.scene_solver import Answer
 from ..solver.checks import are_poses, short_repr
+from ..stream.message_bytes import MessageError, PoseReader
+from ..stream.pairing import StampedPose
+from ..stream.read_contacts import ReadContacts, read_contacts
 
 KEPT = 1000  # poses kept per topic: a second at 1 kHz
 UNANSWERED = 0.5

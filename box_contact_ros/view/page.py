@@ -27,9 +27,9 @@ import viser
 import websockets.asyncio.server
 from websockets import Headers
 
-from ..scene.message_bytes import NANOSECONDS
 from ..scene.scene_solver import Answer
 from ..solver.pose import rotation_matrix
+from ..stream.message_bytes import NANOSECONDS
 from . import style
 from .listener import DrawnTick, SceneRows
 

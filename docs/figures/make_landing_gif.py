@@ -28,7 +28,7 @@ from PIL import Image
 from box_contact_ros import Contact, ContactSolver
 from box_contact_ros.demo.crane import CraneScenario
 from box_contact_ros.demo.landing import LandingRecord
-from box_contact_ros.scene.forces import GRAVITY
+from box_contact_ros.forces.patch_forces import GRAVITY
 from box_contact_ros.solver.pose import rotation_matrix
 from box_contact_ros.view.style import BOX_A, BOX_B, CONTACT
 

@@ -14,7 +14,7 @@ from benchmarks.paper.models import Committee, committee, weights_path
 from benchmarks.paper.numpy_model import NumpyPaper
 from benchmarks.weights import save_weights
 from box_contact_ros import ContactSolver
-from box_contact_ros.networks.weights_file import WeightsError, load_weights
+from box_contact_ros.models.weights_file import WeightsError, load_weights
 from box_contact_ros.resources import resource_path
 
 EXACT = ContactSolver(poses.CUBE, poses.CUBE, model='exact')

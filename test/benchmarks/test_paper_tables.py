@@ -19,9 +19,9 @@ from benchmarks.paper import __main__ as program
 from benchmarks.paper import dataset, rotation, soup_tables, tables, tree
 from benchmarks.paper.models import weights_path
 from benchmarks.pose_sets import at_depth, on_cube
-from box_contact_ros.networks.weights_file import load_weights
+from box_contact_ros.models import soup
+from box_contact_ros.models.weights_file import load_weights
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.soup import soup
 
 KEPT = {'table-1-as-written': 1.0, 'table-1-mixture': (0.32, 0.32, 0.7), 'table-1-dropped': 0.0}
 """Share of the placements as written, of all sets of patterns or of each."""

@@ -17,7 +17,7 @@ pytest.importorskip('mujoco')
 from benchmarks import settled, stacks
 from benchmarks.loops import MUJOCO, TIMINGS, Boxes, Scene, Timing, corner_speeds, steps
 from benchmarks.stacks import ORDERS, off_centre, ratio, run, sideways, slope, stays, turntable
-from box_contact_ros.scene.forces import GRAVITY
+from box_contact_ros.forces.patch_forces import GRAVITY
 
 
 @pytest.mark.parametrize('timing', [None, TIMINGS[0]])

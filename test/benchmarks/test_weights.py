@@ -11,7 +11,7 @@ import pytest
 from test_weights_file import WIDTHS, layers
 
 from benchmarks.weights import CARD_FIELDS, save_weights
-from box_contact_ros.networks.weights_file import load_weights
+from box_contact_ros.models.weights_file import load_weights
 
 CARD = {**dict.fromkeys(CARD_FIELDS, 'x'), 'architecture': list(WIDTHS)}
 

@@ -18,7 +18,7 @@ import pytest
 from test_library import EACH_FUNCTION_ONCE
 
 from box_contact_ros import Body, ContactSolver, PatchForces
-from box_contact_ros.scene.forces import GRAVITY
+from box_contact_ros.forces.patch_forces import GRAVITY
 
 CORE = Path(__file__).resolve().parents[2] / 'box_contact_ros' / 'core'
 FLAGS = ('-std=c++17', '-O2', '-ffp-contract=off', '-Wno-psabi', '-DBOX_CONTACT_VERSION=""',

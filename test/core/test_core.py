@@ -30,8 +30,8 @@ from test_extremes import random_network
 import box_contact_ros
 from box_contact_ros import Contact, ContactSolver, make_model
 from box_contact_ros.core import FORCE, instruction_sets, native
-from box_contact_ros.networks.models import core_numbers, mlp_numbers, read_mlp
-from box_contact_ros.networks.weights_file import Network
+from box_contact_ros.models.networks import core_numbers, mlp_numbers, read_mlp
+from box_contact_ros.models.weights_file import Network
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.contact import FIELDS, Contacts
 

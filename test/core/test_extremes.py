@@ -15,8 +15,8 @@ import pytest
 from poses import Pairs
 
 from box_contact_ros.core import LENGTH_MAX, LENGTH_MIN, native
-from box_contact_ros.networks.models import core_numbers
-from box_contact_ros.networks.weights_file import Network
+from box_contact_ros.models.networks import core_numbers
+from box_contact_ros.models.weights_file import Network
 from box_contact_ros.solver.contact import Contacts
 
 UNIT = (1.0, 1.0, 1.0)

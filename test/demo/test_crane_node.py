@@ -24,8 +24,8 @@ from box_contact_msgs.msg import Contact, Contacts
 from box_contact_ros.demo import crane_node, landing
 from box_contact_ros.demo.crane import CraneScenario
 from box_contact_ros.demo.landing import Landing
+from box_contact_ros.forces.patch_forces import GRAVITY
 from box_contact_ros.node.messages import make_header
-from box_contact_ros.scene.forces import GRAVITY
 
 
 @pytest.fixture

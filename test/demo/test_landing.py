@@ -21,7 +21,7 @@ from box_contact_ros.demo.landing import (
     LoadForces,
     with_patch,
 )
-from box_contact_ros.scene.forces import GRAVITY
+from box_contact_ros.forces.patch_forces import GRAVITY
 
 HARD = CraneScenario(rope_angle=3.0, rope_heading=100.0, pitch=2.0, roll=-2.0, yaw=1.0,
                      offset=(0.2, 0.4))

@@ -24,12 +24,12 @@ from std_msgs.msg import Header
 from box_contact_msgs.msg import Box, BoxPair, Contacts
 from box_contact_msgs.msg import Contact as ContactMessage
 from box_contact_ros.node.messages import make_header
-from box_contact_ros.scene.message_bytes import NANOSECONDS, MessageError
-from box_contact_ros.scene.pairing import StampedPose
-from box_contact_ros.scene.read_contacts import UPPER, ReadContacts, read_contacts
 from box_contact_ros.scene.scene import Pair
 from box_contact_ros.solver.checks import pose_fault
 from box_contact_ros.solver.contact import FIELDS, Contact, patch_area
+from box_contact_ros.stream.message_bytes import NANOSECONDS, MessageError
+from box_contact_ros.stream.pairing import StampedPose
+from box_contact_ros.stream.read_contacts import UPPER, ReadContacts, read_contacts
 
 TOLD = FIELDS[:-1]
 """What a message says of a contact: all but its axis."""

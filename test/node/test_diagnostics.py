@@ -15,8 +15,8 @@ from box_contact_ros import SceneSolver
 from box_contact_ros.node import diagnostics
 from box_contact_ros.node.diagnostics import ACTIVE, Diagnostics, TickMonitor
 from box_contact_ros.node.tick import PoseQueue
-from box_contact_ros.scene.pairing import OVERTAKEN, StampedPose, StampPairing
 from box_contact_ros.scene.scene import two_boxes
+from box_contact_ros.stream.pairing import OVERTAKEN, StampedPose, StampPairing
 
 MAX_AGE = 10**9  # ns
 SOLVER = SceneSolver(two_boxes((1, 1, 1), (1, 1, 1)))

@@ -31,7 +31,7 @@ from std_srvs.srv import Trigger
 from box_contact_ros.node import contact_node, runtime
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.rclpy_workarounds import RCLError, shut_down, with_info
-from box_contact_ros.scene.pairing import RESETS
+from box_contact_ros.stream.pairing import RESETS
 
 
 @pytest.fixture

@@ -38,16 +38,17 @@ from box_contact_msgs.msg import Box
 from box_contact_msgs.srv import Check
 from box_contact_ros import PatchForces
 from box_contact_ros.core import DEPTH_FLOOR
-from box_contact_ros.models import most_near
-from box_contact_ros.networks.weights_file import load_weights
+from box_contact_ros.models.make_model import most_near
+from box_contact_ros.models.weights_file import load_weights
 from box_contact_ros.node import check, diagnostics, topics
 from box_contact_ros.node.check import Checker
 from box_contact_ros.node.contact_node import PARAMETERS
 from box_contact_ros.resources import resource_path
-from box_contact_ros.scene import pairing, scene_check, scene_file
+from box_contact_ros.scene import scene_check, scene_file
 from box_contact_ros.scene.scene import two_boxes
 from box_contact_ros.scene.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import SceneSolver
+from box_contact_ros.stream import pairing
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [*sorted(ROOT.glob('*.md'), key=lambda page: page.name != 'README.md'),

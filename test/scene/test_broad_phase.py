@@ -15,9 +15,9 @@ import pytest
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import native
-from box_contact_ros.scene.contacts_of import TooManyNear
 from box_contact_ros.scene.scene import ALONE, EVERY_PAIR, Box, Pair, Scene
 from box_contact_ros.scene.scene_solver import SceneSolver
+from box_contact_ros.solver.contacts_of import TooManyNear
 
 ALL = np.ones((1, 1), np.uint8)
 NONE = np.zeros((0, 2), np.int64)
@@ -338,7 +338,7 @@ CROWD = """
 import resource
 import numpy as np
 from box_contact_ros.core import native
-from box_contact_ros.scene.contacts_of import TooManyNear
+from box_contact_ros.solver.contacts_of import TooManyNear
 from box_contact_ros.scene.scene import EVERY_PAIR, Box, Scene
 from box_contact_ros.scene.scene_solver import SceneSolver
 

@@ -20,8 +20,8 @@ import box_contact_ros
 from box_contact_ros import ContactSolver
 from box_contact_ros.arguments import model_name
 from box_contact_ros.core import native
-from box_contact_ros.models import MODELS, check_model, make_model, most_near
-from box_contact_ros.solver.models import NATIVE
+from box_contact_ros.models.make_model import MODELS, check_model, make_model, most_near
+from box_contact_ros.solver.model import NATIVE
 
 ROOT = Path(__file__).resolve().parents[2]
 HIGHER = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
@@ -157,6 +157,6 @@ def test_the_default_reads_no_file_and_imports_no_other_model():
             'from box_contact_ros import ContactSolver\n'
             'pathlib.Path.open = builtins.open = None\n'
             'ContactSolver(model="mlp")\n'
-            'print({"fcl", "safetensors", "box_contact_ros.networks.models"} & {*sys.modules})')
+            'print({"fcl", "safetensors", "box_contact_ros.models.networks"} & {*sys.modules})')
     done = python(code)
     assert done.stdout == 'set()\n', done.stderr

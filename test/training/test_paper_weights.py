@@ -22,7 +22,7 @@ from benchmarks.paper.errors import (
 from benchmarks.paper.models import weights_path
 from benchmarks.pose_sets import SETS
 from box_contact_ros import ContactSolver, make_model
-from box_contact_ros.networks.weights_file import load_weights
+from box_contact_ros.models.weights_file import load_weights
 
 
 @pytest.fixture

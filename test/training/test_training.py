@@ -22,7 +22,7 @@ from benchmarks.paper.errors import (
 )
 from benchmarks.paper.fit import Ensemble, PaperSettings, Scaling, fit, tensors
 from benchmarks.paper.jobs import JOBS, SHIPPED, PaperJob
-from box_contact_ros.networks.weights_file import load_weights
+from box_contact_ros.models.weights_file import load_weights
 from training import __main__ as train
 from training import paper
 

@@ -16,8 +16,8 @@ from benchmarks.pose_sets import LOADS, SETS, Pairs
 from benchmarks.weights import save_weights
 from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.core import FEATURES, OUTPUTS
-from box_contact_ros.networks.models import network_of
-from box_contact_ros.networks.weights_file import load_weights
+from box_contact_ros.models.networks import network_of
+from box_contact_ros.models.weights_file import load_weights
 from box_contact_ros.resources import resource_path
 from training import __main__ as train
 from training import recipe, samples

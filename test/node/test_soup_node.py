@@ -22,8 +22,8 @@ pytest.importorskip('fcl')
 from box_contact_msgs.msg import Contacts
 from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.node.contact_node import ContactNode
+from box_contact_ros.node.soup_node import SoupNode
 from box_contact_ros.resources import resource_path
-from box_contact_ros.soup.soup_node import SoupNode
 
 ORIGIN = poses.IDENTITY
 TOUCHING = np.array([0.5, 0.25, 1.875, 0.1, 0.2, 0, 1])

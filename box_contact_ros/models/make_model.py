@@ -7,8 +7,9 @@ from __future__ import annotations
 import os
 import re
 
-from .solver.checks import nearest_name, short_repr
-from .solver.models import NATIVE, Model, as_model
+from ..extras import require
+from ..solver.checks import nearest_name, short_repr
+from ..solver.model import NATIVE, Model, as_model
 
 MODELS = (*NATIVE, 'paper', 'soup-N')
 """Names as help texts show them: N is 1 to `MOST_SOUP_DIVISIONS`."""
@@ -57,12 +58,13 @@ def make_model(name: str, *, weights: str | os.PathLike[str] | None = None) -> M
     if weights is not None and name not in ('mlp', 'paper'):
         raise ValueError(f'weights have no effect on model {short_repr(name)}: leave them out')
     if name == 'mlp' and weights is not None:
-        from .networks.models import read_mlp
+        from .networks import read_mlp
         return read_mlp(weights)
     if name == 'paper':
-        from .networks.models import read_paper
+        from .networks import read_paper
         return read_paper(weights)
     if name in NATIVE:
         return as_model(name)
-    from .soup.soup import Soup
+    require('soup')
+    from .soup import Soup
     return Soup(soup_divisions(name))

@@ -9,7 +9,8 @@ import random
 import numpy as np
 import pytest
 
-from box_contact_ros.scene.pairing import (
+from box_contact_ros.scene.scene import ALL_BOXES, Box, Pair, Scene, two_boxes
+from box_contact_ros.stream.pairing import (
     NEVER,
     NO_PARTNER,
     OLD,
@@ -28,7 +29,6 @@ from box_contact_ros.scene.pairing import (
     StampPairing,
     Tick,
 )
-from box_contact_ros.scene.scene import ALL_BOXES, Box, Pair, Scene, two_boxes
 
 TWO = two_boxes((2, 2, 2), (2, 2, 2))
 MS = 1_000_000  # ns

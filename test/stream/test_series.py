@@ -5,7 +5,7 @@
 
 What a simulator feels is not the error of a point but its steps. The series are runs of the crane
 at 1 kHz and family I of the hard cases: approaches at 100 Hz. Tests print what they measured:
-`python -m pytest test/scene/test_series.py -rP`.
+`python -m pytest test/stream/test_series.py -rP`.
 """
 from __future__ import annotations
 

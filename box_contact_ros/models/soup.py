@@ -29,8 +29,8 @@ from typing import NamedTuple
 import fcl
 import numpy as np
 
-from box_contact_ros.core import native
-from box_contact_ros.solver.contact import Contacts, without_patch
+from ..core import native
+from ..solver.contact import Contacts, without_patch
 
 Size = tuple[float, ...]  # three full extents [m], as a key of what is kept
 

@@ -13,11 +13,13 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..models import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
-from ..node.contact_node import PARAMETERS as CONTACT_PARAMETERS
-from ..node.contact_node import ContactNode, run
-from ..node.parameters import Setting, whole_number
+from ..extras import require
+from ..models.make_model import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
+from .contact_node import PARAMETERS as CONTACT_PARAMETERS
+from .contact_node import ContactNode, run
+from .parameters import Setting, whole_number
 
+require('soup')
 PARAMETERS = {
     'divisions': Setting(
         SOUP_DIVISIONS, f'squares along each edge of a face, 1 to {MOST_SOUP_DIVISIONS}; '

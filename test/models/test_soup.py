@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip('fcl')
 
 from box_contact_ros import ContactSolver, make_model
-from box_contact_ros.soup import soup
+from box_contact_ros.models import soup
 
 IDENTITY = poses.IDENTITY
 EXACT = ContactSolver(poses.CUBE, poses.CUBE, model='exact')

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import native
-from ..solver.checks import as_boxes, as_places, pose_fault, short_repr
-from ..solver.contact import Contacts
-from ..solver.contact_solver import ContactSolver
+from .checks import as_boxes, as_places, pose_fault, short_repr
+from .contact import Contacts
+from .contact_solver import ContactSolver
 
 
 class TooManyNear(ValueError):

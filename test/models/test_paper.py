@@ -10,8 +10,8 @@ import pytest
 
 from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.core import native
-from box_contact_ros.networks.models import PaperWeights, mlp_numbers
-from box_contact_ros.networks.weights_file import WeightsError, load_weights
+from box_contact_ros.models.networks import PaperWeights, mlp_numbers
+from box_contact_ros.models.weights_file import WeightsError, load_weights
 from box_contact_ros.resources import resource_path
 
 numpy_model = pytest.importorskip('benchmarks.paper.numpy_model')

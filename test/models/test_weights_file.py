@@ -14,7 +14,7 @@ import pytest
 from safetensors.numpy import load, load_file, save_file
 
 from box_contact_ros import make_model
-from box_contact_ros.networks.weights_file import WeightsError, load_weights
+from box_contact_ros.models.weights_file import WeightsError, load_weights
 from box_contact_ros.resources import resource_path
 
 WIDTHS = (6, 5, 3, 4)

@@ -65,8 +65,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..scene.scene import ALL_BOXES, Scene
 from ..solver.checks import short_repr
-from .scene import ALL_BOXES, Scene
 
 PATIENCE = 5
 """How many whole ticks a tick waits: a few periods, whatever the rate. Executor and transport let

@@ -14,8 +14,8 @@ import pytest
 from poses import multiply
 
 from box_contact_ros import Body, Contacts, ContactSolver, PatchForces
-from box_contact_ros.scene import forces
-from box_contact_ros.scene.forces import GRAVITY
+from box_contact_ros.forces import patch_forces as forces
+from box_contact_ros.forces.patch_forces import GRAVITY
 from box_contact_ros.solver import contact_solver
 from box_contact_ros.solver.pose import rotation_matrix
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from box_contact_ros import Body, ContactSolver, PatchForces
-from box_contact_ros.scene.forces import FRICTION, GRAVITY
+from box_contact_ros.forces.patch_forces import FRICTION, GRAVITY
 from box_contact_ros.solver.pose import rotation_matrix
 
 STEP = 0.001  # [s]

@@ -15,10 +15,10 @@ from functools import lru_cache
 import numpy as np
 
 from ..core import native
+from ..scene.scene import Pair, Scene
+from ..scene.scene_solver import Answer
 from ..solver.checks import MOST_NAME_BYTES, pose_fault
 from .pairing import StampedPose
-from .scene import Pair, Scene
-from .scene_solver import Answer
 
 NANOSECONDS = 1_000_000_000
 ENCAPSULATION = 4

@@ -32,8 +32,8 @@ from box_contact_ros.core import (
     UNITS_MAX,
     native,
 )
-from box_contact_ros.networks.models import core_numbers, mlp_numbers, read_mlp
-from box_contact_ros.networks.weights_file import Network, WeightsError
+from box_contact_ros.models.networks import core_numbers, mlp_numbers, read_mlp
+from box_contact_ros.models.weights_file import Network, WeightsError
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.pose import rotation_matrix
