@@ -24,7 +24,7 @@ from rclpy.serialization import serialize_message
 from ..node.messages import make_header
 from ..node.runtime import GuardedNode, run_node
 from ..node.topics import contact_qos, pose_qos
-from ..stream.message_bytes import ENCAPSULATION, NANOSECONDS
+from ..stream.cdr import ENCAPSULATION, NANOSECONDS
 
 FRAME = 'world'  # of all poses of the bench
 _STAMP = struct.Struct('=iI')  # behind the encapsulation; sender and receiver are one machine

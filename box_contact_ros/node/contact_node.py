@@ -42,6 +42,7 @@ from ..scene.scene_solver import SceneSolver
 from ..solver.checks import short_repr
 from ..solver.model import NATIVE
 from ..stream.pairing import PAIRINGS, RESETS
+from ..stream.streams import watched_of
 from .check import Checker, CheckService
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
 from .parameters import (
@@ -187,7 +188,7 @@ class ContactNode(GuardedNode, LifecycleNode):
             # What start-up made stays for good. No full collection (10 ms) has to look at it.
             gc.collect()
             gc.freeze()
-        self._monitor.restart(self._tick.solver.scene.watched)
+        self._monitor.restart(watched_of(self._tick.solver.scene))
         self._tick.active = True
         self._say_ready()
         return super().on_activate(state)

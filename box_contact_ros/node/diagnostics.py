@@ -21,6 +21,7 @@ from rclpy.node import Node
 
 from ..scene.scene import Pair, Scene
 from ..stream.pairing import NO_PARTNER, OVERTAKEN, Pairing
+from ..stream.streams import streams_of, watched_of
 from .messages import make_header
 from .topics import SceneTopics
 
@@ -202,7 +203,7 @@ class Diagnostics:
         findings = [] if state != ACTIVE else list(_findings(
             summary, [name.partition(': ')[2] for name in new if name.startswith('refused')],
             unseen, stale, scene, pairing, topics, mostly_alone=new[NO_PARTNER] > new['poses'] / 2))
-        sent = (new['poses'] + load.lost) / len(scene.streams)
+        sent = (new['poses'] + load.lost) / len(streams_of(scene))
         if state == ACTIVE:
             findings += _lateness(load, sent, new[OVERTAKEN])
             findings += _rivals(self._monitor.shared, topics)
@@ -308,7 +309,7 @@ def _findings(summary: Summary, refused: Sequence[str], unseen: Sequence[str],
     if summary.has_heard and 0 < max_age <= summary.quiet:
         yield Finding('stopped', f'poses have stopped: none for {summary.quiet:.0f} s')
     elif (summary.unmatched or mostly_alone) and not (refused or unseen or stale):
-        yield from _without_partner(summary.unmatched, scene.watched, pairing)
+        yield from _without_partner(summary.unmatched, watched_of(scene), pairing)
 
 
 def _why_stale(box: str, pairing: Pairing, topics: SceneTopics) -> str:

@@ -3,7 +3,7 @@
 
 """box_contact_msgs as the contacts and answers that Python has, and back.
 
-What the node sends on topics it writes as bytes: `message_bytes`.
+What the node sends on topics it writes as bytes: `stream.write_contacts`.
 """
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from box_contact_msgs.msg import Contact as ContactMessage
 
 from ..core import native
 from ..solver.contact import Contacts
-from ..stream.message_bytes import NANOSECONDS
+from ..stream.cdr import NANOSECONDS
 
 
 def make_header(stamp: int, frame_id: str) -> Header:

@@ -16,19 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from ..scene.scene import ALL_BOXES
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import absent_poses, are_poses, pose_fault
-from ..stream.message_bytes import (
-    NANOSECONDS,
-    VECTOR_BYTES,
-    ContactWriter,
-    MessageError,
-    PoseReader,
-    aligned,
-    header_bytes,
-)
+from ..stream.cdr import NANOSECONDS, MessageError
 from ..stream.pairing import OVERTAKEN, PAIRINGS, Pairing, StampedPose, Tick
+from ..stream.read_poses import PoseReader
+from ..stream.streams import ALL_BOXES, streams_of
+from ..stream.write_contacts import VECTOR_BYTES, ContactWriter, aligned, header_bytes
 from .diagnostics import TickMonitor
 from .parameters import reason_of
 from .topics import PoseCallback, SceneTopics
@@ -110,7 +104,7 @@ class TickAnswerer:
         self._queues: dict[str, PoseQueue] = {}  # by box
         scene = solver.scene
         self._reader, self._writer = PoseReader(), ContactWriter(scene)
-        place = {name: number for number, name in enumerate(scene.streams)}
+        place = {name: number for number, name in enumerate(streams_of(scene))}
         movers = [scene.mover(box) for box in scene.names]
         self._sides = {pair: [place[movers[box]] for box in pair if movers[box] in place]
                        for pair in topics.of_pair}

@@ -18,8 +18,9 @@ from rclpy.subscription import Subscription
 
 from box_contact_msgs.msg import Contacts
 
-from ..scene.scene import ALL_BOXES, Pair, Scene
+from ..scene.scene import Pair, Scene
 from ..solver.checks import short_repr
+from ..stream.streams import ALL_BOXES, topics_of
 from .rclpy_workarounds import RCLError, qos_refusals, with_info
 
 MOST_PAIRS_WITH_TOPICS = 1000
@@ -73,7 +74,7 @@ class SceneTopics:
             raise ValueError(f'scene: {labels.most_common(1)[0][0]} is the name of two pairs: list '
                              'one of them with a name of its own')
         topics = [topic for pair in pairs for topic in self._topics_of(pair)]
-        for topic in (f'{prefix}contacts', *topics, *scene.sources.values()):
+        for topic in (f'{prefix}contacts', *topics, *topics_of(scene).values()):
             try:
                 node.resolve_topic_name(topic)
             except RCLError as error:
@@ -90,7 +91,7 @@ class SceneTopics:
 
     def subscribe(self, scene: Scene, callback_of: Callable[[str, str], PoseCallback]) -> None:
         """Subscribe to all poses, with the callback for the bytes of a name and its topic."""
-        for box, topic in scene.sources.items():
+        for box, topic in topics_of(scene).items():
             with qos_refusals(self._node, topic):
                 self._subscriptions[box] = self._node.create_subscription(
                     PoseArray if box == ALL_BOXES else PoseStamped, topic,

@@ -28,10 +28,6 @@ from ..solver.checks import (
     size_fault,
 )
 
-POSE_ARRAY = 'poses'
-"""Topic of the poses of all boxes and bodies that move, where they come as one message."""
-ALL_BOXES = 'all boxes'
-"""Source of these poses: no box of a scene file can have this name."""
 EVERY_PAIR = (('*', '*'),)
 """Patterns of a scene in which each two boxes are a pair, if one of them moves."""
 MOVES = (': leave `pose` out of a box that moves, and give its pose in the call; or, in Python, '
@@ -302,18 +298,12 @@ class Scene:
             allowed[group[min(a, b)], group[max(a, b)]] == (1 if a < b else 2)))
 
     @cached_property
-    def _is_asked(self) -> np.ndarray:
-        """Which boxes (n,) patterns pair with others."""
+    def is_asked(self) -> np.ndarray:
+        """Return which boxes (n,) patterns pair with others."""
         group, allowed = self.groups
         return allowed.max(axis=1)[group] > 0 if self.patterns else np.zeros(len(group), bool)
 
-    @cached_property
-    def watched(self) -> tuple[Pair, ...]:
-        """Return what may be stale: listed pairs, then each moving box that patterns ask for."""
-        boxes = np.flatnonzero(self._is_asked & ~self.is_fixed).tolist()
-        return (*self.pairs, *(self.pair_of(box, ALONE) for box in boxes))
-
-    def _partners(self, index: int) -> np.ndarray:
+    def partners(self, index: int) -> np.ndarray:
         """Return which boxes (n,) patterns pair a box with, without those of listed pairs."""
         group, allowed = self.groups
         if not self.patterns:
@@ -325,7 +315,7 @@ class Scene:
 
     def _later_partners(self, index: int) -> np.ndarray:
         """Return the boxes (n,) behind a box that patterns pair it with."""
-        return index + 1 + np.flatnonzero(self._partners(index)[index + 1:])
+        return index + 1 + np.flatnonzero(self.partners(index)[index + 1:])
 
     def every_pair(self) -> Iterator[Pair]:
         """Yield the listed pairs, then those that patterns ask for, by index."""
@@ -341,39 +331,14 @@ class Scene:
         indices = range(len(self.boxes) if self.patterns else 0)
         return len(self.pairs) + sum(len(self._later_partners(index)) for index in indices)
 
-    def partners(self, mover: str) -> set[str]:
-        """Return what of `moving` one of them has a pair with; itself if a partner is fixed."""
-        met = np.zeros(len(self.boxes), bool)
-        boxes = [self.row_of[mover]]
-        if mover in self.bodies:
-            boxes = np.flatnonzero(self.body_of == boxes[0] - len(self.boxes)).tolist()
-        for index in boxes:
-            met |= self._partners(index)
-            met[self.rows[(self.rows == index).any(axis=1)]] = True
-        met[boxes] = False
-        if met[self.is_fixed].any():
-            return {mover}
-        return {self.mover(self.names[other]) for other in np.flatnonzero(met)}
-
     @cached_property
     def moving(self) -> tuple[str, ...]:
         """Names of boxes, then of bodies that move; without an array, only of those in a pair."""
-        asked = self._is_asked | self.pose_array
+        asked = self.is_asked | self.pose_array
         asked[self.rows.ravel()] = True
         movers = {self.mover(self.names[box]) for box in np.flatnonzero(asked & ~self.is_fixed)}
         return tuple(name for name in self._parts if name in movers)
 
-    @cached_property
-    def streams(self) -> tuple[str, ...]:
-        """Names of the streams of poses: each of `moving`, or ALL_BOXES in their place."""
-        return (ALL_BOXES,) if self.pose_array else self.moving
-
-    @cached_property
-    def sources(self) -> Mapping[str, str]:
-        """Topics of poses, by stream."""
-        if self.pose_array:
-            return {ALL_BOXES: POSE_ARRAY}
-        return {name: self._parts[name].pose_topic or f'{name}/pose' for name in self.moving}
 
 
 def two_boxes(size_a: Sequence[float], size_b: Sequence[float]) -> Scene:

@@ -180,8 +180,8 @@ def _scene_of(data: Any) -> Scene:
         if part in ('pairs', 'patterns') and path:
             path[0] = list(listed if part == 'pairs' else patterns)[int(path[0])]
         raise SceneError(('pairs' if part == 'patterns' else part, *path), fault.reason) from None
-    if len(scene.sources) > MOST_STREAMS:
-        raise SceneError(('boxes',), f'{len(scene.sources)} boxes and bodies have a topic of their '
+    if not scene.pose_array and len(scene.moving) > MOST_STREAMS:
+        raise SceneError(('boxes',), f'{len(scene.moving)} boxes and bodies have a topic of their '
                                      f'own, and at most {MOST_STREAMS} may: set poses: array')
     return scene
 

@@ -65,8 +65,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..scene.scene import ALL_BOXES, Scene
+from ..scene.scene import Scene
 from ..solver.checks import short_repr
+from .streams import partners_of, streams_of
 
 PATIENCE = 5
 """How many whole ticks a tick waits: a few periods, whatever the rate. Executor and transport let
@@ -125,7 +126,7 @@ class RejectedPose(NamedTuple):
 
 
 TickPoses = list['StampedPose | None']
-"""A pose of each of `scene.streams`, None for a box that has none recent enough."""
+"""A pose of each stream, None for a box that has none recent enough."""
 
 
 class Tick(NamedTuple):
@@ -136,7 +137,7 @@ class Tick(NamedTuple):
     poses: Any
     """Seven floats of each of `scene.moving`, None for a box that has none recent enough; of a
     message of all poses an array (n, 7), NaN instead of None."""
-    stamps: list[int]  # of each of `scene.streams` [ns], NEVER for a box that has no pose
+    stamps: list[int]  # of each stream [ns], NEVER for a box that has no pose
 
     @classmethod
     def of(cls, scene: Scene, poses: TickPoses) -> Tick:
@@ -161,7 +162,7 @@ class FramesDiffer(ValueError):
     reason = 'frame_id differs'
 
     def __init__(self, scene: Scene, poses: TickPoses, odd: StampedPose) -> None:
-        known = [(box, pose) for box, pose in zip(scene.streams, poses) if pose is not None]
+        known = [(box, pose) for box, pose in zip(streams_of(scene), poses) if pose is not None]
         first, frame = ('the scene', scene.frame_id) if scene.frame_id else (
             known[0][0], known[0][1].frame_id)
         box = next(box for box, pose in known if pose is odd)
@@ -221,10 +222,9 @@ class Pairing(ABC):
         self.counts: Counter[str] = Counter() if counts is None else counts
         self.rejections: dict[str, RejectedPose] = {}
         """The last pose of each kind that is counted. Whoever logs them clears them."""
-        self._scene = scene
-        self._boxes = {box: BoxState() for box in scene.streams}
-        self._partners = {box: {box} if box == ALL_BOXES else scene.partners(box)
-                          for box in self._boxes}
+        self._scene, self._streams = scene, streams_of(scene)
+        self._boxes = {box: BoxState() for box in self._streams}
+        self._partners = {box: partners_of(scene, box) for box in self._boxes}
         self._behind: set[str] = set()  # boxes that have begun anew behind the others
 
     @abstractmethod
@@ -412,7 +412,7 @@ class StampPairing(Pairing):
 
     def _is_awaiting(self, key: int, tick: WaitingTick) -> bool:
         """Return whether a box that is missing from a tick may still give its pose."""
-        names = self._scene.streams
+        names = self._streams
         while tick.settled < len(names):
             box = names[tick.settled]
             if box not in tick.poses and self._may_come(self._boxes[box], key, tick):

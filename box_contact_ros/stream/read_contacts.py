@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..solver.contact import Contacts
-from .message_bytes import (
+from .cdr import (
     CONTACT_BYTES,
     ENCAPSULATION,
     FRAME_AT,

@@ -28,12 +28,14 @@ from ..node.contact_node import scene_of
 from ..node.parameters import Setting, declare, warn_of_unknown
 from ..node.runtime import GuardedNode
 from ..node.topics import pose_qos
-from ..scene.scene import ALL_BOXES, ALONE, Scene
+from ..scene.scene import ALONE, Scene
 from ..scene.scene_solver import Answer
 from ..solver.checks import are_poses, short_repr
-from ..stream.message_bytes import MessageError, PoseReader
+from ..stream.cdr import MessageError
 from ..stream.pairing import StampedPose
 from ..stream.read_contacts import ReadContacts, read_contacts
+from ..stream.read_poses import PoseReader
+from ..stream.streams import ALL_BOXES, topics_of
 
 KEPT = 1000  # poses kept per topic: a second at 1 kHz
 UNANSWERED = 0.5
@@ -115,7 +117,7 @@ class PoseTopic(NamedTuple):
 def pose_topics(scene: Scene) -> list[PoseTopic]:
     """Return how the poses of all that moves come, in the scene's order."""
     topics = []
-    for source, topic in scene.sources.items():
+    for source, topic in topics_of(scene).items():
         is_array = source == ALL_BOXES
         names, read = (scene.moving, _read_array) if is_array else ((source,), _read_one)
         # Each topic has a reader of its own, which knows the topic's frame.

@@ -29,7 +29,7 @@ from websockets import Headers
 
 from ..scene.scene_solver import Answer
 from ..solver.pose import rotation_matrix
-from ..stream.message_bytes import NANOSECONDS
+from ..stream.cdr import NANOSECONDS
 from . import style
 from .listener import DrawnTick, SceneRows
 

@@ -31,8 +31,9 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.serialization import deserialize_message
 from typed_messages import read_pose, read_poses
 
-from box_contact_ros.stream.message_bytes import MessageError, PoseReader
+from box_contact_ros.stream.cdr import MessageError
 from box_contact_ros.stream.pairing import StampedPose
+from box_contact_ros.stream.read_poses import PoseReader
 
 MESSAGES = 100_000
 SHOWN = 5  # differences of a type that are printed

@@ -14,7 +14,7 @@ from patience import PATIENCE
 from ros_client import Client
 from typed_messages import contacts_by_pair
 
-from box_contact_ros.stream.message_bytes import NANOSECONDS
+from box_contact_ros.stream.cdr import NANOSECONDS
 
 ORIGIN = poses.IDENTITY
 TOUCHING = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])  # 0.125 m deep

@@ -27,7 +27,7 @@ from typed_messages import contacts_by_pair, pose_stamped
 
 from box_contact_msgs.msg import Contacts
 from box_contact_ros.solver.contact import Contact
-from box_contact_ros.stream.message_bytes import NANOSECONDS
+from box_contact_ros.stream.cdr import NANOSECONDS
 
 CUBES = {'size_a': [2.0, 2.0, 2.0], 'size_b': [2.0, 2.0, 2.0]}
 """Parameters of a node of two cubes."""

@@ -27,7 +27,7 @@ from box_contact_ros.node.messages import make_header
 from box_contact_ros.scene.scene import Pair
 from box_contact_ros.solver.checks import pose_fault
 from box_contact_ros.solver.contact import FIELDS, Contact, patch_area
-from box_contact_ros.stream.message_bytes import NANOSECONDS, MessageError
+from box_contact_ros.stream.cdr import NANOSECONDS, MessageError
 from box_contact_ros.stream.pairing import StampedPose
 from box_contact_ros.stream.read_contacts import UPPER, ReadContacts, read_contacts
 

@@ -32,8 +32,8 @@ from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
 from box_contact_ros.node.topics import pose_qos
 from box_contact_ros.resources import resource_path
-from box_contact_ros.scene.scene import ALL_BOXES
 from box_contact_ros.solver.checks import MOST_NAME_BYTES
+from box_contact_ros.stream.streams import ALL_BOXES
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = resource_path('msg_schemas')

@@ -18,6 +18,7 @@ from box_contact_ros.core import native
 from box_contact_ros.scene.scene import ALONE, EVERY_PAIR, Box, Pair, Scene
 from box_contact_ros.scene.scene_solver import SceneSolver
 from box_contact_ros.solver.contacts_of import TooManyNear
+from box_contact_ros.stream.streams import partners_of
 
 ALL = np.ones((1, 1), np.uint8)
 NONE = np.zeros((0, 2), np.int64)
@@ -317,7 +318,7 @@ def test_the_pairs_of_a_scene(patterns, listed):
         Pair(gone, gone, gone)] * asks
     for name in scene.moving:
         others = {pair.a if pair.b == name else pair.b for pair in wanted if name in pair[1:]}
-        met = scene.partners(name)
+        met = partners_of(scene, name)
         assert met == ({name} if any(boxes[other].pose for other in others) else others)
 
 

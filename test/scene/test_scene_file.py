@@ -17,6 +17,7 @@ from box_contact_ros.scene import scene_file
 from box_contact_ros.scene.scene import Pair, SceneError
 from box_contact_ros.scene.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import SceneSolver
+from box_contact_ros.stream.streams import partners_of, topics_of
 
 ROOT = Path(__file__).resolve().parents[2]
 GOOD = """\
@@ -71,7 +72,7 @@ def test_a_good_file(scene_of):
     scene = scene_of(GOOD)
     assert scene == scene_of(json.dumps(yaml.safe_load(GOOD)))
     assert scene.moving == ('load', 'spreader') and scene.frame_id == 'map'
-    assert scene.sources == {'load': 'load/pose', 'spreader': '/crane/spreader'}
+    assert topics_of(scene) == {'load': 'load/pose', 'spreader': '/crane/spreader'}
     assert scene.boxes['s1'].pose == (0, 0, 1.2955, 0, 0, 0, 1)
     assert scene.pairs[1] == Pair('grip', 'spreader', 'load')
 
@@ -100,17 +101,17 @@ def test_a_file_with_bodies(scene_of):
     assert scene.names == ('load', 'stack', 'spreader_frame', 'spreader_twistlock_1', 'goods_left',
                            'goods_right', 'truck_bed')
     assert scene.moving == ('load', 'spreader', 'truck')
-    assert scene.sources == {'load': 'load/pose', 'spreader': '/crane/spreader',
+    assert topics_of(scene) == {'load': 'load/pose', 'spreader': '/crane/spreader',
                              'truck': 'truck/pose'}
     assert [pair.name for pair in scene.every_pair()] == [
         'landing', 'load_spreader_frame', 'load_spreader_twistlock_1', 'goods_left_load',
         'goods_right_load']
     assert scene.is_fixed.tolist() == [False, True, False, False, True, True, False]
-    assert scene.partners('spreader') == {'load'}
-    assert scene.partners('load') == {'load'}  # the goods are there already
+    assert partners_of(scene, 'spreader') == {'load'}
+    assert partners_of(scene, 'load') == {'load'}  # the goods are there already
     landing = '  - {name: landing, a: load, b: truck_bed}\n'
     array = scene_of('poses: array\n' + BODIES.replace(landing, ''))
-    assert array.moving == ('load', 'spreader', 'truck') and array.sources == {
+    assert array.moving == ('load', 'spreader', 'truck') and topics_of(array) == {
         'all boxes': 'poses'}
 
 

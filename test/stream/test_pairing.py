@@ -9,7 +9,7 @@ import random
 import numpy as np
 import pytest
 
-from box_contact_ros.scene.scene import ALL_BOXES, Box, Pair, Scene, two_boxes
+from box_contact_ros.scene.scene import Box, Pair, Scene, two_boxes
 from box_contact_ros.stream.pairing import (
     NEVER,
     NO_PARTNER,
@@ -29,6 +29,7 @@ from box_contact_ros.stream.pairing import (
     StampPairing,
     Tick,
 )
+from box_contact_ros.stream.streams import ALL_BOXES
 
 TWO = two_boxes((2, 2, 2), (2, 2, 2))
 MS = 1_000_000  # ns

@@ -42,7 +42,7 @@ from box_contact_ros.node.messages import make_header
 from box_contact_ros.node.topics import contact_qos
 from box_contact_ros.scene.scene import Box, Pair, Scene, two_boxes
 from box_contact_ros.solver.pose import rotation_matrix
-from box_contact_ros.stream.message_bytes import NANOSECONDS, MessageError
+from box_contact_ros.stream.cdr import NANOSECONDS, MessageError
 from box_contact_ros.view import listener
 from box_contact_ros.view.listener import (
     SCENE_PARAMETERS,

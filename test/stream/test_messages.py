@@ -34,14 +34,10 @@ from box_contact_ros.node.messages import make_header
 from box_contact_ros.scene.scene import Pair, two_boxes
 from box_contact_ros.scene.scene_solver import Answer
 from box_contact_ros.solver.contact import Contact, Contacts
-from box_contact_ros.stream.message_bytes import (
-    ContactWriter,
-    MessageError,
-    PoseReader,
-    aligned,
-    header_bytes,
-)
+from box_contact_ros.stream.cdr import MessageError
 from box_contact_ros.stream.read_contacts import read_contacts
+from box_contact_ros.stream.read_poses import PoseReader
+from box_contact_ros.stream.write_contacts import ContactWriter, aligned, header_bytes
 from box_contact_ros.view.listener import read_answer
 
 STAMPS = st.integers(-2**31 * 10**9, 2**31 * 10**9 - 1)
