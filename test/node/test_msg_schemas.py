@@ -258,6 +258,14 @@ def set_in(path: str, value: Any):
     return change
 
 
+def test_a_node_that_answers_requests_alone_says_so(live):
+    """No pose has come, but ~/check was called: a state that few listeners see first."""
+    message = plain(next(message for message in live['/diagnostics']
+                         if message.status[0].message == 'no poses'))
+    message['status'][0]['message'] = 'answering requests'
+    assert validator_at('/diagnostics').is_valid(message)
+
+
 WRONG_MESSAGES = {
     'NaN in the normal': ('contact/normal', set_in('vector.x', math.nan)),
     'normal of length 2': ('contact/normal', set_in('vector.z', 2.0)),
