@@ -15,8 +15,15 @@ from itertools import product
 
 import numpy as np
 
-from ..core import LENGTH_MAX, native
-from ..solver.checks import name_fault, nearest_name, pose_fault, short_repr, size_fault
+from ..core import native
+from ..solver.checks import (
+    as_margin,
+    name_fault,
+    nearest_name,
+    pose_fault,
+    short_repr,
+    size_fault,
+)
 from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver
 from ..solver.contacts_of import in_contact
@@ -88,8 +95,7 @@ class SceneCheck:
         all boxes of the question and all fixed ones. `names_of` tells the names of the answer.
         Raises ValueError, with field and value, for what is refused.
         """
-        if not 0.0 <= margin <= LENGTH_MAX:
-            raise ValueError(f'margin must lie within 0 and {LENGTH_MAX:g} m, not {margin:g}')
+        margin = as_margin(margin)
         broad_phase, solver = self._made_for(margin)
         rows, moving = self._take(names, poses, sizes)
         try:

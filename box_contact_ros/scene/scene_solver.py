@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core import LENGTH_MAX, native
-from ..solver.checks import as_floats, as_number, as_whole, short_repr
+from ..core import native
+from ..solver.checks import as_floats, as_margin, as_whole, short_repr
 from ..solver.contact import Contact, Contacts
 from ..solver.contact_solver import ContactSolver
 from ..solver.contacts_of import find_contacts, in_contact
@@ -71,9 +71,7 @@ class SceneSolver:
         """
         if not isinstance(scene, Scene):
             raise ValueError(f'scene must be a Scene, not {short_repr(scene)}')
-        margin = as_number(margin, 'margin')
-        if not 0.0 <= margin <= LENGTH_MAX:
-            raise ValueError(f'margin must lie within 0 and {LENGTH_MAX:g} m, not {margin:g}')
+        margin = as_margin(margin)
         most_near = as_whole(most_near, 'most_near', 0, sys.maxsize)
         self.scene = scene
         self.model = model

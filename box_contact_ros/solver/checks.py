@@ -110,6 +110,14 @@ def as_number(value: Any, name: str) -> float:
     raise ValueError(f'{name} must be a number, not {short_repr(value)}')
 
 
+def as_margin(value: Any) -> float:
+    """Return the separation up to which pairs apart are listed [m]; ValueError for no length."""
+    margin = as_number(value, 'margin')
+    if not 0.0 <= margin <= LENGTH_MAX:
+        raise ValueError(f'margin must lie within 0 and {LENGTH_MAX:g} m, not {margin:g}')
+    return margin
+
+
 def as_whole(value: Any, name: str, low: int, high: int) -> int:
     """Return a whole number from `low` to `high`; ValueError for anything else."""
     if isinstance(value, int | np.integer) and not isinstance(value, bool) and low <= value <= high:

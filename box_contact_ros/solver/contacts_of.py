@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import native
-from .checks import as_boxes, as_places, pose_fault, short_repr
+from .checks import as_boxes, as_margin, as_places, pose_fault, short_repr
 from .contact import Contacts
 from .contact_solver import ContactSolver
 
@@ -27,28 +27,32 @@ class TooManyNear(ValueError):
 
 
 def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = None, *,
-                fixed: ArrayLike | None = None, threads: int = 1) -> tuple[np.ndarray, Contacts]:
+                fixed: ArrayLike | None = None, margin: float = 0.0, threads: int = 1,
+                ) -> tuple[np.ndarray, Contacts]:
     """Return which boxes touch, as rows (k, 2) of their indices a and b, and the k contacts.
 
     sizes: full extents (n, 3), or (3,) of all boxes [m].
     poses: (n, 7) in a common frame; seven NaN leave a box out.
     pairs: (m, 2), the pairs that are asked for, in their order; None: each two boxes, a < b.
     fixed: (n,) bool, boxes that never move. Without `pairs`, two of them are no pair.
+    margin: pairs apart are listed too, behind those in contact, up to this separation [m].
 
-    Raises ValueError, with the field and the value, for what is not a size, a pose or a pair.
+    Raises ValueError, with the field and the value, for what is not a size, a pose, a
+    pair or a margin.
     """
     sizes, poses = as_boxes(sizes, poses)
+    margin = as_margin(margin)
     count = len(poses)
     listed = as_places([] if pairs is None else pairs, 'pairs', count)
     if (alone := np.flatnonzero(listed[:, 0] == listed[:, 1])).size:
         raise ValueError(f'pairs[{alone[0]}] is box {listed[alone[0], 0]} with itself')
     groups_meet = np.ones((1, 1) if pairs is None and count else (0, 0), np.uint8)
-    broad_phase = native.BroadPhase(sizes, _as_flags(fixed, 'fixed', count), 0.0, listed,
+    broad_phase = native.BroadPhase(sizes, _as_flags(fixed, 'fixed', count), margin, listed,
                                     np.zeros(count, np.int32), groups_meet,
                                     np.full(count, -1, np.int32))
-    near, contacts, _ = find_contacts(broad_phase, ContactSolver(), sizes, poses,
+    near, contacts, _ = find_contacts(broad_phase, ContactSolver(margin=margin), sizes, poses,
                                       'poses[{}]'.format, threads=threads)
-    return in_contact(near, contacts)
+    return in_contact(near, contacts, margin)
 
 
 def _as_flags(value: ArrayLike | None, name: str, count: int) -> np.ndarray:

@@ -54,3 +54,16 @@ def test_a_scene_finds_the_same():
     pairs, contacts = contacts_of(size, pose)
     assert np.array_equal(answer.pairs, pairs) and len(pairs) > 50
     poses.assert_same_bits(answer.contacts, contacts)
+
+
+def test_a_margin_lists_pairs_apart_behind_those_in_contact():
+    """What `hold` of forces wants: each pair within a way, without a scene."""
+    rng = np.random.default_rng(3)
+    size, pose = heap(rng, 40)
+    every = np.argwhere(np.triu(np.ones((40, 40), bool), 1))
+    wanted = ContactSolver(margin=0.3).batch(pose, sizes=size, pairs=every)
+    hit, near = np.flatnonzero(wanted.colliding), np.flatnonzero(
+        ~wanted.colliding & (wanted.separation <= 0.3))
+    pairs, contacts = contacts_of(size, pose, margin=0.3)
+    assert np.array_equal(pairs, every[[*hit, *near]]) and len(near) > 20
+    poses.assert_same_bits(contacts, wanted[[*hit, *near]])
