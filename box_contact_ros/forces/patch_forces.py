@@ -274,22 +274,15 @@ class PatchForces:
         """Forget all patches."""
         self._native.reset()
 
-    def __bytes__(self) -> bytes:
-        """Return the state: bodies, patches and impulses."""
-        return self._native.save()
+    def __copy__(self) -> Self:
+        """Return forces with the same bodies, patches and impulses."""
+        twin = object.__new__(type(self))
+        twin._native = self._native.copy()
+        return twin
 
-    @classmethod
-    def from_bytes(cls, state: bytes) -> Self:
-        """Return the forces of a state; ValueError: other bytes."""
-        if not isinstance(state, bytes):
-            raise ValueError(f'state must be bytes, not {short_repr(state)}')
-        forces = object.__new__(cls)
-        forces._native = native.PatchForces.load(state)
-        return forces
-
-    def __reduce__(self) -> tuple[object, ...]:
-        """Copy and pickle by the state."""
-        return type(self).from_bytes, (bytes(self),)
+    def __deepcopy__(self, memo: dict[int, object]) -> Self:
+        """Return the same as a copy: nothing is shared."""
+        return self.__copy__()
 
 
 def _columns(bodies: Sequence[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -48,17 +48,16 @@ int main() {
   for (double x : wrenches[0].torque) std::printf("%a ", x);
   failures += allocations == 0;
 
-  PatchForces copy = forces, loaded = PatchForces::load(forces.save());
+  PatchForces copy = forces;
   forces.reset();
-  Velocity after[3][2];
+  Velocity after[2][2];
   int k = 0;
-  for (PatchForces* each : {&forces, &copy, &loaded}) {
+  for (PatchForces* each : {&forces, &copy}) {
     Pose moved[] = {poses[0], poses[1]};
     after[k][0] = velocities[0], after[k][1] = velocities[1];
     each->advance(0.001, moved, after[k++], outside);
   }
   failures += !(after[0][0].linear[2] < -0.009 && after[1][0].linear[2] > -1e-4);
-  failures += after[1][0].linear[2] != after[2][0].linear[2];
   failures += copy.loads().size() != 1;
   try {
     copy.advance(0.001, {poses, 1}, velocities, outside);

@@ -308,8 +308,7 @@ def random_calls(seed: int, rounds: int) -> None:
         (native.patch_areas, [np.ones((4, 3)), np.ones((4, 3, 3))], {}),
         (native.PatchForces, [np.ones(2), np.ones((2, 3)), np.zeros((2, 3)), 2, 5, 2, 1, 0.5],
          {}),
-        (law.hold, held(), {}), (native.PatchForces.load, [law.save()], {}),
-        (law.forget, [[1]], {}),
+        (law.hold, held(), {}), (law.forget, [[1]], {}),
         (law.advance, [0.001, rows(2), np.zeros((2, 6)), None], {})]
     answered = 0
     for _ in range(rounds):

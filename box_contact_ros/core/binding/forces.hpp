@@ -195,20 +195,10 @@ inline PyObject* forces_reset(PyObject* self, PyObject*) {
   Py_RETURN_NONE;
 }
 
-inline PyObject* forces_save(PyObject* self, PyObject*) {
-  int64_t size = bc_patch_forces_save(forces_of(self), nullptr, 0);
-  PyObject* bytes = made(PyBytes_FromStringAndSize(nullptr, Py_ssize_t(size)));
-  bc_patch_forces_save(forces_of(self), PyBytes_AS_STRING(bytes), size);
-  return bytes;
-}
-
-inline PyObject* forces_load(PyObject* type, PyObject* bytes) {
-  char* data;
-  Py_ssize_t size;
-  if (PyBytes_AsStringAndSize(bytes, &data, &size) < 0) return nullptr;
-  bc_patch_forces* forces;
-  check(bc_patch_forces_load(data, int64_t(size), &forces));
-  return Holder<Forces>::make(reinterpret_cast<PyTypeObject*>(type), Forces(forces));
+inline PyObject* forces_copy(PyObject* self, PyObject*) {
+  bc_patch_forces* copy;
+  check(bc_patch_forces_copy(forces_of(self), &copy));
+  return Holder<Forces>::make(Py_TYPE(self), Forces(copy));
 }
 
 inline PyMethodDef forces_methods[] = {
@@ -232,9 +222,8 @@ inline PyMethodDef forces_methods[] = {
     {"forget", method<forces_forget>(), METH_O,
      "forget(bodies)\n--\n\nForget the patches of bodies (k,)."},
     {"reset", method<forces_reset>(), METH_NOARGS, "reset()\n--\n\nForget all patches."},
-    {"save", method<forces_save>(), METH_NOARGS, "save()\n--\n\nReturn the state as bytes."},
-    {"load", method<forces_load>(), METH_O | METH_CLASS,
-     "load(bytes)\n--\n\nReturn forces of saved bytes."},
+    {"copy", method<forces_copy>(), METH_NOARGS,
+     "copy()\n--\n\nReturn forces with the same bodies, patches and impulses."},
     {nullptr, nullptr, 0, nullptr}};
 inline PyType_Slot forces_slots[] = {
     {Py_tp_doc, const_cast<char*>("PatchForces(mass, inertia, centre, substeps, iterations, "

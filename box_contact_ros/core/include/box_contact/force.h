@@ -154,12 +154,6 @@ BC_API bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, con
  * `capacity` is less. */
 BC_API int64_t bc_patch_forces_loads(const bc_patch_forces* forces, bc_load* loads, int64_t capacity);
 
-/* Write the state as bytes, for machines of the same byte order, and return how many there are;
- * nothing is written if `capacity` is less. Make forces of such bytes: BC_BAD_ARGUMENT for other bytes,
- * and for numbers beyond the limits above. */
-BC_API int64_t bc_patch_forces_save(const bc_patch_forces* forces, void* bytes, int64_t capacity);
-BC_API bc_status bc_patch_forces_load(const void* bytes, int64_t count, bc_patch_forces** forces);
-
 #ifdef __cplusplus
 }
 #endif

@@ -138,23 +138,10 @@ class PatchForces {
     return found;
   }
 
-  // The state as bytes, and forces of such bytes.
-  std::vector<char> save() const {
-    std::vector<char> bytes(std::size_t(bc_patch_forces_save(forces_.get(), nullptr, 0)));
-    bc_patch_forces_save(forces_.get(), bytes.data(), std::int64_t(bytes.size()));
-    return bytes;
-  }
-  static PatchForces load(Span<const char> bytes) {
-    bc_patch_forces* made;
-    detail::check(bc_patch_forces_load(bytes.data(), std::int64_t(bytes.size()), &made));
-    return PatchForces(made);
-  }
-
  private:
   struct Destroy {
     void operator()(bc_patch_forces* forces) const { bc_patch_forces_destroy(forces); }
   };
-  explicit PatchForces(bc_patch_forces* forces) : forces_(forces) {}
   static const bc_body* plain_of(Span<const Body> bodies) {
     static_assert(sizeof(Body) == sizeof(bc_body), "Body is a bc_body with defaults");
     return reinterpret_cast<const bc_body*>(bodies.data());

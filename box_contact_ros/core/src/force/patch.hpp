@@ -40,17 +40,6 @@ struct Patch {
 
   // Whether area and depth are numbers: what no limit of an answer alone makes sure of.
   bool has_area() const { return shape.has_area() && depth >= 0.0 && depth <= place_max; }
-
-  // Whether all of it is within what is accepted.
-  bool is_sound() const {
-    bool is_asked = asked_a.is_sound() && asked_b.is_sound() && is_unit(normal) &&
-                    is_within(point, length_max) && shape.is_sound() && has_area() &&
-                    is_amount(friction) && is_amount(stiffness) && is_within(surface, speed_max) &&
-                    is_amount(late) && is_amount(age);
-    return is_asked && press >= 0.0 && press <= wrench_max && std::fabs(spin) <= wrench_max &&
-           is_within(slip, wrench_max) && is_within(rock, wrench_max) &&
-           is_within(given_arm, place_max);
-  }
 };
 
 // What a patch carried in the last advance: the sums of its impulses after relaxation.
@@ -59,12 +48,6 @@ struct Load {
   Vec<double> press, rub;  // N, τ1, τ2 and f1, f2, m / r [N s], [N m s]
   Vec<double> normal, point;
   Rectangle shape;
-
-  bool is_sound() const {
-    return 0 <= box_a && box_a < box_b && is_within(press, wrench_max) &&
-           is_within(rub, wrench_max) && is_unit(normal) && is_within(point, place_max) &&
-           shape.is_sound();
-  }
 
   // Mean forces over a time [s]. Pressure is bilinear, so that no corner pulls.
   bc_load over(double time) const {

@@ -21,7 +21,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -51,11 +50,6 @@ class PatchForces {
   struct Options {
     int substeps, iterations, relaxations, threads;
     double friction;
-
-    bool is_sound() const {
-      return substeps >= 1 && iterations >= 1 && relaxations >= 0 && threads >= 1 &&
-             threads <= detail::threads_max && is_amount(friction);
-    }
   };
   enum class Held { all, pair_twice, no_patch };
   // The boxes of pairs that are solved at the start of each advance.
@@ -220,69 +214,6 @@ class PatchForces {
     clock_.advance = dt;
   }
 
-  // Visit all of the state: single structs, and rows of structs.
-  template <class Self, class Visit>
-  static void visit_state(Self& self, Visit visit) {
-    visit(&self.options_, 1);
-    visit(&self.clock_, 1);
-    visit(self.bodies_.data(), self.bodies_.size());
-    visit(self.before_.data(), self.before_.size());
-    visit(self.patches_.data(), self.patches_.size());
-    visit(self.loads_.data(), self.loads_.size());
-    visit(self.boxes_.data(), self.boxes_.size());
-    visit(self.own_.pairs.data(), self.own_.pairs.size());
-    for (auto column : {&Own::friction, &Own::surface, &Own::stiffness})
-      visit((self.own_.*column).data(), (self.own_.*column).size());
-  }
-  // How many rows there are: bodies, patches, loads, boxes, pairs.
-  using RowCounts = std::array<int64_t, 5>;
-  RowCounts row_counts() const {
-    auto count = [](const auto& rows) { return int64_t(rows.size()); };
-    return {count(bodies_), count(patches_), count(loads_), count(boxes_), int64_t(own_.count())};
-  }
-  void make_rows(const RowCounts& counts) {
-    bodies_.resize(size_t(counts[0]));
-    before_.resize(size_t(counts[0]));
-    patches_.resize(size_t(counts[1]));
-    loads_.resize(size_t(counts[2]));
-    boxes_.resize(size_t(counts[3]));
-    own_.resize(size_t(counts[4]));
-  }
-  // Whether the state is one that calls may have made. Then it can go on.
-  bool restore() {
-    auto of_boxes = [this](const Patch& patch) {
-      return is_of_boxes(patch) && patch.a != patch.b && moves(patch.a, patch.b);
-    };
-    auto is_box = [this](const bc_body_box& box) {
-      const double *p = box.box.pose.position, *q = box.box.pose.quaternion,
-                   *size = box.box.size.extent;
-      double norm = (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]);
-      return 0 <= box.body && box.body < int64_t(bodies_.size()) &&
-             pose_valid<double>(triple(vector_at(p)), norm) &&
-             size_valid<double>(triple(vector_at(size)));
-    };
-    auto out_of_order = [](const Patch& p, const Patch& q) { return p.pair() >= q.pair(); };
-    auto is_sound = [](const auto& each) { return each.is_sound(); };
-    auto all = [](const auto& rows, auto holds) {
-      return std::all_of(rows.begin(), rows.end(), holds);
-    };
-    if (!(options_.is_sound() && clock_.is_sound() && all(bodies_, is_sound) &&
-          all(before_, is_sound) && all(boxes_, is_box) && all(patches_, of_boxes) &&
-          all(patches_, is_sound) && all(loads_, is_sound) &&
-          std::adjacent_find(patches_.begin(), patches_.end(), out_of_order) == patches_.end()))
-      return false;
-    auto is_place = [this](int64_t box) { return 0 <= box && box < int64_t(boxes_.size()); };
-    auto is_speed = [](double speed) { return std::fabs(speed) <= speed_max; };
-    if (!(all(own_.pairs, is_place) && all(own_.friction, is_amount) &&
-          all(own_.surface, is_speed) && all(own_.stiffness, is_amount)))
-      return false;
-    for (size_t k = 0; k < own_.count(); ++k)
-      if (body_of(own_.pairs[2 * k]) == body_of(own_.pairs[2 * k + 1])) return false;
-    read_sizes();
-    make_room(patches_.size());
-    return true;
-  }
-
  private:
   struct Clock {
     double since = -1.0;                    // the last answer [s]; below 0: there was none
@@ -300,19 +231,10 @@ class PatchForces {
         if (interval > 0.0 && (least == 0.0 || interval < least)) least = interval;
       return least;
     }
-    bool is_sound() const {
-      return (since == -1.0 || is_amount(since)) && is_amount(period) && is_amount(late) &&
-             is_amount(window) && window < step_limit && is_amount(step) && step < step_limit &&
-             is_amount(advance) && advance < step_limit && is_amount(advance_before) &&
-             advance_before < step_limit &&
-             std::all_of(intervals, intervals + intervals_kept, is_amount);
-    }
   };
   // The velocities with which a body ended the last advance: before relaxation, and after it.
   struct Ended {
     Motion pushed, relaxed;
-
-    bool is_sound() const { return pushed.is_sound() && relaxed.is_sound(); }
   };
   struct Advance {
     double dt, h;

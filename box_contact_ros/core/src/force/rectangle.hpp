@@ -29,9 +29,10 @@ constexpr double normal_slack = 1e-6;
 // By how much of its trace an eigenvalue of a covariance may be below zero [1]: rounding.
 constexpr double covariance_slack = 1e-9;
 
-inline bool is_unit(const Vec<double>& a, double slack = normal_slack) {
+inline bool is_unit(const Vec<double>& a) {
   double squared = dot(a, a);
-  return squared >= (1.0 - slack) * (1.0 - slack) && squared <= (1.0 + slack) * (1.0 + slack);
+  return squared >= (1.0 - normal_slack) * (1.0 - normal_slack) &&
+         squared <= (1.0 + normal_slack) * (1.0 + normal_slack);
 }
 
 // Whether numbers (3, 3) are symmetric, and have no eigenvalue below zero: by the pivots of Cholesky's
@@ -55,11 +56,6 @@ struct Rectangle {
 
   bool has_area() const {
     return half_1 > 0.0 && half_2 > 0.0 && half_1 <= place_max && half_2 <= place_max;
-  }
-  bool is_sound() const {
-    double slack = 4.0 * normal_slack;  // both axes are products with the normal
-    return has_area() && is_unit(axis_1, slack) && is_unit(axis_2, slack) && radius >= 0.0 &&
-           radius <= place_max;
   }
 };
 

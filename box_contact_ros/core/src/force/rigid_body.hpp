@@ -46,35 +46,16 @@ struct Body {
   Vec<double> centre;           // of mass, in the box's frame [m]
 
   bool is_free() const { return inverse_mass > 0.0; }
-
-  // Whether it is one that is accepted.
-  bool is_sound() const {
-    if (!is_within(centre, length_max)) return false;
-    const Vec<double>& inverse = inverse_inertia;
-    if (inverse_mass == 0.0) return is_within(inverse, 0.0);
-    auto is_inverse = [](double x) { return x >= 1.0 / mass_max && x <= 1.0 / mass_min; };
-    return is_inverse(inverse_mass) && std::all_of(inverse.v, inverse.v + 3, is_inverse) &&
-           is_inertia(Vec<double>{1.0, 1.0, 1.0} / inverse);
-  }
 };
-
-// By how much an axis of a rotation may exceed 1 [1]: rounding.
-constexpr double rotation_slack = 1e-9;
 
 // Where a body is: its centre of mass, and its axes as columns; common frame.
 struct Placed {
   Vec<double> position;
   Mat<double> axes;
-
-  bool is_sound() const {
-    return is_within(position, place_max) && are_within(axes[0], 9, 1.0 + rotation_slack);
-  }
 };
 
 struct Motion {
   Vec<double> linear, angular;  // of the centre of mass [m/s], [rad/s]
-
-  bool is_sound() const { return is_within(linear, speed_max) && is_within(angular, speed_max); }
 };
 
 inline Vec<double> cross(const Vec<double>& a, const Vec<double>& b) {

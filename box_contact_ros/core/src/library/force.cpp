@@ -4,7 +4,6 @@
 // The C interface of forces.
 #include <algorithm>
 #include <cstring>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -69,15 +68,6 @@ bc_status read_bodies(const bc_body* given, int64_t count, std::vector<Body>& bo
   for (size_t k = 0; k < bodies.size(); ++k)
     if (bc_status status = read_body(given[k], k, bodies[k])) return status;
   return BC_OK;
-}
-
-constexpr int64_t state_format = 0x3446504342;  // "BCPF4"
-
-int64_t state_size(const PatchForces& forces) {
-  size_t size = 0;
-  PatchForces::visit_state(
-      forces, [&size](const auto* values, size_t count) { size += count * sizeof *values; });
-  return int64_t(size);
 }
 
 bc_status check_poses(size_t count, const bc_pose* poses) {
@@ -360,57 +350,6 @@ int64_t bc_patch_forces_loads(const bc_patch_forces* forces, bc_load* loads, int
   if (!loads || capacity < count) return count;
   for (const Load& load : self.loads()) *loads++ = load.over(self.load_time());
   return count;
-}
-
-int64_t bc_patch_forces_save(const bc_patch_forces* forces, void* bytes, int64_t capacity) {
-  if (!forces) return 0;
-  const PatchForces& self = forces_of(forces);
-  PatchForces::RowCounts counts = self.row_counts();
-  auto size = int64_t(sizeof state_format + sizeof counts) + state_size(self);
-  if (!bytes || capacity < size) return size;
-  auto* at = static_cast<char*>(bytes);
-  auto write = [&at](const auto* values, size_t count) {
-    static_assert(std::is_trivially_copyable_v<std::remove_pointer_t<decltype(values)>>);
-    if (count > 0) std::memcpy(at, values, count * sizeof *values);
-    at += count * sizeof *values;
-  };
-  write(&state_format, 1);
-  write(&counts, 1);
-  PatchForces::visit_state(self, write);
-  return size;
-}
-
-bc_status bc_patch_forces_load(const void* bytes, int64_t count, bc_patch_forces** forces) {
-  return guarded([&] {
-    if (!forces) return refuse_null("forces");
-    *forces = nullptr;
-    if (!bytes) return refuse_null("bytes");
-    auto* at = static_cast<const char*>(bytes);
-    auto read = [&at](auto* values, size_t rows) {
-      if (rows > 0) std::memcpy(static_cast<void*>(values), at, rows * sizeof *values);
-      at += rows * sizeof *values;
-    };
-    int64_t format = 0;
-    PatchForces::RowCounts counts{};
-    auto head = int64_t(sizeof format + sizeof counts);
-    if (count >= head) {
-      read(&format, 1);
-      read(&counts, 1);
-    }
-    // Each row takes bytes, so no more rows than bytes are made room for.
-    bool fits = format == state_format &&
-                std::all_of(counts.begin(), counts.end(),
-                            [count](int64_t rows) { return 0 <= rows && rows <= count; });
-    PatchForces loaded({}, {1, 1, 0, 1, 0.0});
-    if (fits) loaded.make_rows(counts);
-    if (!fits || head + state_size(loaded) != count)
-      return fail(BC_BAD_ARGUMENT, "state: %lld bytes are not a state of this version",
-                  (long long)count);
-    PatchForces::visit_state(loaded, read);
-    if (!loaded.restore()) return fail(BC_BAD_ARGUMENT, "state: the bytes are damaged");
-    *forces = handle(new PatchForces(std::move(loaded)));
-    return BC_OK;
-  });
 }
 
 }  // extern "C"
