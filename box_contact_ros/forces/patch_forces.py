@@ -223,7 +223,7 @@ class PatchForces:
         twice; nothing changes then.
         """
         if contacts is None:
-            self._native.hold_own(as_pairs(pairs, 'pairs'), *_columns_of_pairs(
+            self._native.hold_pairs(as_pairs(pairs, 'pairs'), *_columns_of_pairs(
                 friction, surface_velocity, stiffness))
             return
         if not isinstance(contacts, Contacts):

@@ -412,9 +412,9 @@ HARD = [len(cases.pairs.pose_a) for cases in hard_poses.load().values()]
 LAYERS = [weights.shape for weights, _ in load_weights(
     ROOT / 'weights' / 'mlp.safetensors').networks['patch'].layers]
 STEPS = inspect.signature(PatchForces).parameters
-FORCES, AXIS = 'force/block.hpp', 'separating_axis.hpp'
+FORCES, CLOCK, AXIS = 'force/block.hpp', 'force/clock.hpp', 'separating_axis.hpp'
 SOFT, LATE, PARALLEL = (constant(file, name) for file, name in (
-    (FORCES, 'soft_frequency'), (FORCES, 'late_frequency'), (AXIS, 'parallel')))
+    (CLOCK, 'soft_frequency'), (CLOCK, 'late_frequency'), (AXIS, 'parallel')))
 LENGTHS, QUATERNIONS = (
     ' to '.join(constant('poses.hpp', f'{what}_{end}') for end in ('min', 'max'))
     for what in ('length', 'quaternion'))
@@ -428,16 +428,16 @@ LIMITS = {
     'contributing/testing.md': (f'{sum(HARD):,} cases in {len(HARD)} families',),
     'explanation/force.md': (
         f'has {STEPS["substeps"].default} sub-steps',
-        f'{1e3 * float(constant("force/patch_forces.hpp", "sub_step_limit")):g} ms at most',
+        f'{1e3 * float(constant(CLOCK, "sub_step_limit")):g} ms at most',
         f'up to {STEPS["iterations"].default} times',
         f'{STEPS["relaxations"].default} more iterations ',
         f'{constant("force/rectangle.hpp", "torsion_share")} times the mean',
-        f'last {constant("force/patch_forces.hpp", "intervals_kept")} intervals',
-        f'{1 / float(constant(FORCES, "window_shrinkage"))} of the window before',
+        f'last {constant(CLOCK, "intervals_kept")} intervals',
+        f'{1 / float(constant(CLOCK, "window_shrinkage"))} of the window before',
         f'the frequency {SOFT}/window', f'{float(SOFT) ** -2:.1f}·g·h² deep',
         f'the frequency is {LATE}/T', f'g·T²/{float(LATE) ** 2}',
         f'faster than {constant(FORCES, "push_out_limit")} m/s',
-        f'overdue by {constant(FORCES, "overdue_periods")} periods'),
+        f'overdue by {constant(CLOCK, "overdue_periods")} periods'),
     'explanation/mlp.md': (
         f'reads {LAYERS[0][1]} features',
         f'two hidden layers of {LAYERS[1][0]} rectified units and {LAYERS[-1][0]} outputs'),

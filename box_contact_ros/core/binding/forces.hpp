@@ -99,8 +99,8 @@ inline PyObject* forces_hold(PyObject* self, PyObject* const* args, Py_ssize_t c
   Py_RETURN_TRUE;
 }
 
-inline PyObject* forces_hold_own(PyObject* self, PyObject* const* args, Py_ssize_t count) {
-  if (count != 4) fail(PyExc_TypeError, "hold_own(pairs, friction, surface, stiffness)");
+inline PyObject* forces_hold_pairs(PyObject* self, PyObject* const* args, Py_ssize_t count) {
+  if (count != 4) fail(PyExc_TypeError, "hold_pairs(pairs, friction, surface, stiffness)");
   auto pairs = read<int64_t>(args[0], "pairs", {any_length, 2});
   npy_intp n = pairs.length(0);
   auto friction = read_given<double>(args[1], "friction", {n});
@@ -208,8 +208,8 @@ inline PyMethodDef forces_methods[] = {
      "hold(pairs, separation, normal, point, volume, covariance, poses, friction, surface, "
      "stiffness, age, period)\n--\n\nTake the arrays of an answer; None for the last three.\n\n"
      "Return False, and change nothing, where one is no plain array."},
-    {"hold_own", method<forces_hold_own>(), METH_FASTCALL,
-     "hold_own(pairs, friction, surface, stiffness)\n--\n\nTake pairs whose contacts are solved at "
+    {"hold_pairs", method<forces_hold_pairs>(), METH_FASTCALL,
+     "hold_pairs(pairs, friction, surface, stiffness)\n--\n\nTake pairs whose contacts are solved at "
      "each advance; None for the last three."},
     {"set_boxes", method<forces_set_boxes>(), METH_FASTCALL,
      "set_boxes(sizes, body, poses)\n--\n\nChange the boxes: (m, 3), (m,), (m, 7); None for the last "

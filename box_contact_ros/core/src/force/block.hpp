@@ -7,22 +7,11 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "clock.hpp"
 #include "patch.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// A window shrinks by the first where three steps are shorter by more: a frame may end with two shorter
-// ones, and a step that is measured varies. A step begins with at most the second times the impulses of
-// a window [1]. What iterations leave is as large in a step of 1 ns as in one of 5 ms: divided by the
-// step it would be any force. A window that is halved by each tiny step loses a tower's impulses in
-// three of them.
-constexpr double window_shrinkage = 1.25, most_again = 2.0;
-// Angular frequency of a soft constraint times the window [1]: a quarter turn. A box that rests on a
-// whole face is 0.4·g·step² deep.
-constexpr double soft_frequency = 1.57;
-// The same times half a period and the latency of an answer [1]. With 2 a container at 50 Hz and 5 ms
-// tilts by 0.06°; from 4 on late loads vibrate.
-constexpr double late_frequency = 2.5;
 // Of pushing out [1]: an overlap shrinks by a ninth a step. With 1, impacts are half as deep again.
 constexpr double soft_damping_ratio = 5.0;
 // The same where answers are late, or a patch has a stiffness of its own.
@@ -33,9 +22,6 @@ constexpr double slow_damping_ratio = 2.0;
 constexpr double push_out_limit = 0.1;
 // The same where answers are late, which bear nothing that is as hard.
 constexpr double late_push_out_limit = 1.0;
-// An answer that is overdue by so many periods [1] pushes nothing out.
-constexpr double overdue_periods = 3.0;
-
 // A body in a step.
 struct Moving {
   Vec<double> linear, angular;
@@ -56,19 +42,8 @@ struct Moving {
   }
 };
 
-// What all patches of a sub-step share.
-struct SubStep {
-  double length;   // [s]
-  double window;   // the time in which the impulses that patches keep were given [s]
-  double again;    // share of the impulses of the window before that is given at first [1]
-  double kept;     // share of them that stays in the window [1]
-  double share;    // of the advance [1]; answers are late in comparison with all of it
-  double period;   // from one answer to the next [s]
-  double overdue;  // age of an answer that is overdue [s]
-};
-
 // How pressing and rocking are solved: the impulses change by −mass·(v + bias + softness·impulses).
-struct PressRows {
+struct NormalRows {
   Vec<double> softness, bias;
   Mat<double> mass;
 };
@@ -80,18 +55,18 @@ struct Block {
   Vec<double> arm_a, arm_b, normal, surface;
   Rectangle shape;
   double friction;
-  double closing;         // how much an impulse N alone changes the closing speed [1/kg]
-  double least_rub_mass;  // of any row of friction and torsion
-  PressRows pushing, relaxed;
-  Mat<double> rub_mass;
-  Vec<double> press, rub;
-  Vec<double> press_sum, rub_sum;  // of the sub-steps
+  double normal_compliance;    // how much an impulse N alone changes the closing speed [1/kg]
+  double least_friction_mass;  // of any row of friction and torsion
+  NormalRows pushing, relaxed;
+  Mat<double> friction_mass;
+  Vec<double> normal_impulses, friction_impulses;
+  Vec<double> normal_sum, friction_sum;  // of the sub-steps
 };
 
 inline double clamp(double x, double limit) { return std::max(-limit, std::min(limit, x)); }
-inline void bound(Vec<double>& rub, double limit) {
-  double squared = dot(rub, rub);
-  if (squared > limit * limit) rub = (limit / std::sqrt(squared)) * rub;
+inline void bound(Vec<double>& impulses, double limit) {
+  double squared = dot(impulses, impulses);
+  if (squared > limit * limit) impulses = (limit / std::sqrt(squared)) * impulses;
 }
 
 // How the velocities along three rows change by impulses along them. A row turns the bodies about an
@@ -114,50 +89,45 @@ Mat<double> compliance(const Moving& a, const Moving& b, const Vec<double> (&tur
   return m;
 }
 
-inline Mat<double> softened(Mat<double> pressed, const Vec<double>& softness) {
-  for (int i = 0; i < 3; ++i) pressed[i][i] += softness[i];
-  return inverse(pressed);
-}
-
-// The frequency of a patch whose answers are late [1/s].
-inline double frequency_of(double late, double period) {
-  return late_frequency / (late + 0.5 * period);
+inline Mat<double> softened(Mat<double> compliance, const Vec<double>& softness) {
+  for (int i = 0; i < 3; ++i) compliance[i][i] += softness[i];
+  return inverse(compliance);
 }
 
 // Catto's soft step: a spring and a damper, implicit in time. Relaxation is without them, but for a
 // stiffness of the patch's own. Rocking is soft where answers are late: the wedge of the overlap,
 // which levels a body, is late then.
 inline void soften(const Patch& patch, const SubStep& step, double depth, const Moving& a,
-                   const Moving& b, const Mat<double>& pressed, Block& block) {
+                   const Moving& b, const Mat<double>& compliance, Block& block) {
   bool is_apart = depth < 0.0;
   double h = step.length;
-  block.relaxed = {{0.0, 0.0, 0.0}, {is_apart ? -depth / h : 0.0, 0.0, 0.0}, inverse(pressed)};
+  block.relaxed = {{0.0, 0.0, 0.0}, {is_apart ? -depth / h : 0.0, 0.0, 0.0}, inverse(compliance)};
   block.pushing = block.relaxed;
   if (is_apart || patch.age > step.overdue) return;
   double frequency = soft_frequency / step.window;
   double bearable = frequency_of(patch.late, step.period);
   bool is_late = bearable < frequency * step.share;
   if (is_late) frequency = bearable;
-  double own = std::sqrt(patch.stiffness * pressed[0][0]);
+  double own = std::sqrt(patch.stiffness * compliance[0][0]);
   bool is_spring = 0.0 < own && own < frequency;
   if (is_spring) frequency = own;
   double damping = is_late || is_spring ? slow_damping_ratio : soft_damping_ratio;
   double rate = frequency / (2.0 * damping + h * frequency);
   double softness = rate / (h * frequency * frequency);
-  PressRows& rows = block.pushing;
+  NormalRows& rows = block.pushing;
   if (is_late) {
     Vec<double> turned = turn(patch.asked_b, b.placed) - turn(patch.asked_a, a.placed);
-    rows.softness = softness * Vec<double>{0.0, pressed[1][1], pressed[2][2]};
+    rows.softness = softness * Vec<double>{0.0, compliance[1][1], compliance[2][2]};
     rows.bias =
         rate * Vec<double>{0.0, dot(turned, block.shape.axis_1), dot(turned, block.shape.axis_2)};
-    rows.mass = softened(pressed, rows.softness);
+    rows.mass = softened(compliance, rows.softness);
     block.relaxed = rows;
   }
   double limit = is_late ? late_push_out_limit : push_out_limit;
   double slowed = is_spring ? 1.0 : std::min(1.0, limit / (rate * depth));
-  rows.softness[0] = slowed * softness * pressed[0][0];
+  rows.softness[0] = slowed * softness * compliance[0][0];
   rows.bias[0] = -slowed * rate * depth;
-  rows.mass = softened(pressed, rows.softness);
+  rows.mass = softened(compliance, rows.softness);
   if (is_spring) block.relaxed = rows;
 }
 
@@ -185,23 +155,24 @@ inline void prepare(const Patch& patch, const Moving& a, const Moving& b, const 
   block.friction = patch.friction;
 
   const Vec<double>&arm_a = block.arm_a, &arm_b = block.arm_b;
-  Vec<double> spin = shape.radius * patch.normal;
-  Mat<double> rubbed = compliance<2>(
-      a, b, {cross(arm_a, shape.axis_1), cross(arm_a, shape.axis_2), spin},
-      {cross(arm_b, shape.axis_1), cross(arm_b, shape.axis_2), spin}, {shape.axis_1, shape.axis_2});
-  block.rub_mass = inverse(rubbed);
-  block.least_rub_mass = 1.0 / std::max(std::max(rubbed[0][0], rubbed[1][1]), rubbed[2][2]);
-  Mat<double> pressed =
+  Vec<double> about = shape.radius * patch.normal;
+  Mat<double> along =
+      compliance<2>(a, b, {cross(arm_a, shape.axis_1), cross(arm_a, shape.axis_2), about},
+                    {cross(arm_b, shape.axis_1), cross(arm_b, shape.axis_2), about},
+                    {shape.axis_1, shape.axis_2});
+  block.friction_mass = inverse(along);
+  block.least_friction_mass = 1.0 / std::max(std::max(along[0][0], along[1][1]), along[2][2]);
+  Mat<double> across =
       compliance<1>(a, b, {cross(arm_a, patch.normal), shape.axis_1, shape.axis_2},
                     {cross(arm_b, patch.normal), shape.axis_1, shape.axis_2}, {patch.normal});
-  block.closing = pressed[0][0];
+  block.normal_compliance = across[0][0];
   double depth = patch.depth + dot(way_a - way_b, patch.normal);
-  soften(patch, step, depth, a, b, pressed, block);
+  soften(patch, step, depth, a, b, across, block);
 }
 
 // Give B an impulse at the point and an angular impulse, and A the opposite.
-inline void give(const Block& block, const Vec<double>& impulse, const Vec<double>& turn, Moving& a,
-                 Moving& b) {
+inline void apply(const Block& block, const Vec<double>& impulse, const Vec<double>& turn,
+                  Moving& a, Moving& b) {
   if (a.inverse_mass > 0.0) {
     a.linear = a.linear - a.inverse_mass * impulse;
     a.angular = a.angular - a.inverse_inertia * (cross(block.arm_a, impulse) + turn);
@@ -211,21 +182,22 @@ inline void give(const Block& block, const Vec<double>& impulse, const Vec<doubl
     b.angular = b.angular + b.inverse_inertia * (cross(block.arm_b, impulse) + turn);
   }
 }
-inline void give_press(const Block& block, const Vec<double>& x, Moving& a, Moving& b) {
-  give(block, x[0] * block.normal, x[1] * block.shape.axis_1 + x[2] * block.shape.axis_2, a, b);
+inline void apply_normal(const Block& block, const Vec<double>& x, Moving& a, Moving& b) {
+  apply(block, x[0] * block.normal, x[1] * block.shape.axis_1 + x[2] * block.shape.axis_2, a, b);
 }
-inline void give_rub(const Block& block, const Vec<double>& x, Moving& a, Moving& b) {
-  give(block, x[0] * block.shape.axis_1 + x[1] * block.shape.axis_2,
-       (block.shape.radius * x[2]) * block.normal, a, b);
+inline void apply_friction(const Block& block, const Vec<double>& x, Moving& a, Moving& b) {
+  apply(block, x[0] * block.shape.axis_1 + x[1] * block.shape.axis_2,
+        (block.shape.radius * x[2]) * block.normal, a, b);
 }
 
 // Add up the impulses that its bodies get.
 inline void count(const Block& block, Moving& a, Moving& b) {
   const Rectangle& shape = block.shape;
-  const Vec<double>&press = block.press, &rub = block.rub;
-  Vec<double> impulse = press[0] * block.normal + (rub[0] * shape.axis_1 + rub[1] * shape.axis_2);
-  Vec<double> turn =
-      (press[1] * shape.axis_1 + press[2] * shape.axis_2) + (shape.radius * rub[2]) * block.normal;
+  const Vec<double>&normal = block.normal_impulses, &friction = block.friction_impulses;
+  Vec<double> impulse =
+      normal[0] * block.normal + (friction[0] * shape.axis_1 + friction[1] * shape.axis_2);
+  Vec<double> turn = (normal[1] * shape.axis_1 + normal[2] * shape.axis_2) +
+                     (shape.radius * friction[2]) * block.normal;
   a.impulse = a.impulse - impulse;
   a.angular_impulse = a.angular_impulse - (cross(block.arm_a, impulse) + turn);
   b.impulse += impulse;
@@ -233,43 +205,47 @@ inline void count(const Block& block, Moving& a, Moving& b) {
 }
 
 // The impulses of the last window, about the point of this step.
-inline void remember(const Patch& patch, const Block& block, Vec<double>& press, Vec<double>& rub) {
+inline void remember(const Patch& patch, const Block& block, Vec<double>& normal,
+                     Vec<double>& friction) {
   const Rectangle& shape = block.shape;
-  Vec<double> moved = patch.given_arm - block.arm_a;
-  Vec<double> rock = patch.rock + cross(moved, patch.press * patch.normal);
-  double spin = patch.spin + dot(patch.normal, cross(moved, patch.slip));
-  press = {patch.press, clamp(dot(rock, shape.axis_1), patch.press * shape.half_2),
-           clamp(dot(rock, shape.axis_2), patch.press * shape.half_1)};
-  rub = {dot(patch.slip, shape.axis_1), dot(patch.slip, shape.axis_2),
-         shape.radius > 0.0 ? spin / shape.radius : 0.0};
-  bound(rub, block.friction * press[0]);
+  Vec<double> moved = patch.impulse_arm - block.arm_a;
+  Vec<double> rocking = patch.rocking_impulse + cross(moved, patch.normal_impulse * patch.normal);
+  double torsion = patch.torsion_impulse + dot(patch.normal, cross(moved, patch.friction_impulse));
+  normal = {patch.normal_impulse,
+            clamp(dot(rocking, shape.axis_1), patch.normal_impulse * shape.half_2),
+            clamp(dot(rocking, shape.axis_2), patch.normal_impulse * shape.half_1)};
+  friction = {dot(patch.friction_impulse, shape.axis_1), dot(patch.friction_impulse, shape.axis_2),
+              shape.radius > 0.0 ? torsion / shape.radius : 0.0};
+  bound(friction, block.friction * normal[0]);
 }
 
 // Give a share of them again.
 inline void warm_start(const Patch& patch, double share, Block& block, Moving& a, Moving& b) {
-  remember(patch, block, block.press, block.rub);
-  block.press = share * block.press;
-  block.rub = share * block.rub;
-  give_press(block, block.press, a, b);
-  give_rub(block, block.rub, a, b);
+  remember(patch, block, block.normal_impulses, block.friction_impulses);
+  block.normal_impulses = share * block.normal_impulses;
+  block.friction_impulses = share * block.friction_impulses;
+  apply_normal(block, block.normal_impulses, a, b);
+  apply_friction(block, block.friction_impulses, a, b);
 }
 
 // Keep the impulses of this step, and a share of those before.
 inline void store(Block& block, double kept, Patch& patch) {
-  block.press_sum += block.press;
-  block.rub_sum += block.rub;
+  block.normal_sum += block.normal_impulses;
+  block.friction_sum += block.friction_impulses;
   if (kept > 0.0) {
-    Vec<double> press, rub;
-    remember(patch, block, press, rub);
-    block.press += kept * press;
-    block.rub += kept * rub;
+    Vec<double> normal, friction;
+    remember(patch, block, normal, friction);
+    block.normal_impulses += kept * normal;
+    block.friction_impulses += kept * friction;
   }
   const Rectangle& shape = block.shape;
-  patch.press = block.press[0];
-  patch.rock = block.press[1] * shape.axis_1 + block.press[2] * shape.axis_2;
-  patch.slip = block.rub[0] * shape.axis_1 + block.rub[1] * shape.axis_2;
-  patch.spin = shape.radius * block.rub[2];
-  patch.given_arm = block.arm_a;
+  patch.normal_impulse = block.normal_impulses[0];
+  patch.rocking_impulse =
+      block.normal_impulses[1] * shape.axis_1 + block.normal_impulses[2] * shape.axis_2;
+  patch.friction_impulse =
+      block.friction_impulses[0] * shape.axis_1 + block.friction_impulses[1] * shape.axis_2;
+  patch.torsion_impulse = shape.radius * block.friction_impulses[2];
+  patch.impulse_arm = block.arm_a;
 }
 
 // Velocities of B relative to A: at the point, and angular.
@@ -279,49 +255,50 @@ inline Vec<double> speed(const Block& block, const Moving& a, const Moving& b) {
 inline Vec<double> turning(const Moving& a, const Moving& b) { return b.angular - a.angular; }
 
 // Solve friction and torsion. Returns by how much a speed changed.
-inline double solve_rub(Block& block, Moving& a, Moving& b) {
+inline double solve_friction(Block& block, Moving& a, Moving& b) {
   const Rectangle& shape = block.shape;
   Vec<double> slip = speed(block, a, b) + block.surface;
   Vec<double> v{dot(slip, shape.axis_1), dot(slip, shape.axis_2),
                 shape.radius * dot(turning(a, b), block.normal)};
-  double limit = block.friction * block.press[0];
-  Vec<double> next = block.rub - block.rub_mass * v;
+  double limit = block.friction * block.normal_impulses[0];
+  Vec<double> next = block.friction_impulses - block.friction_mass * v;
   if (dot(next, next) > limit * limit) {
     // It slides: one factor for all rows turns friction against the motion.
-    next = block.rub - block.least_rub_mass * v;
+    next = block.friction_impulses - block.least_friction_mass * v;
     bound(next, limit);
   }
-  Vec<double> change = next - block.rub;
-  block.rub = next;
-  give_rub(block, change, a, b);
-  return largest(abs(change)) / block.least_rub_mass;
+  Vec<double> change = next - block.friction_impulses;
+  block.friction_impulses = next;
+  apply_friction(block, change, a, b);
+  return largest(abs(change)) / block.least_friction_mass;
 }
 
 // Solve pressing and rocking. Returns by how much the closing speed changed.
-inline double solve_press(Block& block, const PressRows& rows, Moving& a, Moving& b) {
-  Vec<double> before = block.press;
+inline double solve_normal(Block& block, const NormalRows& rows, Moving& a, Moving& b) {
+  Vec<double> before = block.normal_impulses;
   const Mat<double>& mass = rows.mass;
   auto error = [&] {
     Vec<double> turns = turning(a, b);
     return Vec<double>{dot(speed(block, a, b), block.normal), dot(turns, block.shape.axis_1),
                        dot(turns, block.shape.axis_2)} +
-           rows.bias + rows.softness * block.press;
+           rows.bias + rows.softness * block.normal_impulses;
   };
-  Vec<double> v = error(), next = block.press - mass * v;
+  Vec<double> v = error(), next = block.normal_impulses - mass * v;
   double limit_1 = next[0] * block.shape.half_2, limit_2 = next[0] * block.shape.half_1;
   if (!(std::fabs(next[1]) <= limit_1 && std::fabs(next[2]) <= limit_2)) {
     // The pressure would be negative at the rim: row by row, within the limits.
-    double alone = 1.0 / (block.closing + rows.softness[0]);
-    next = {std::max(0.0, block.press[0] - alone * v[0]), block.press[1], block.press[2]};
-    give_press(block, next - block.press, a, b);
-    block.press = next;
+    double alone = 1.0 / (block.normal_compliance + rows.softness[0]);
+    next = {std::max(0.0, block.normal_impulses[0] - alone * v[0]), block.normal_impulses[1],
+            block.normal_impulses[2]};
+    apply_normal(block, next - block.normal_impulses, a, b);
+    block.normal_impulses = next;
     v = error();
     next[1] = clamp(next[1] - mass[1][1] * v[1], next[0] * block.shape.half_2);
     next[2] = clamp(next[2] - mass[2][2] * v[2], next[0] * block.shape.half_1);
   }
-  give_press(block, next - block.press, a, b);
-  block.press = next;
-  return std::fabs(next[0] - before[0]) * block.closing;
+  apply_normal(block, next - block.normal_impulses, a, b);
+  block.normal_impulses = next;
+  return std::fabs(next[0] - before[0]) * block.normal_compliance;
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET::force

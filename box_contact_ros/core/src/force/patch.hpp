@@ -32,9 +32,9 @@ struct Patch {
   double late;          // from the question to the answer [s]
   double age;           // since the answer was taken [s]
 
-  double press, spin;      // N [N s], m [N m s]
-  Vec<double> slip, rock;  // f [N s], τ [N m s]
-  Vec<double> given_arm;   // from A's centre of mass to where they acted [m]
+  double normal_impulse, torsion_impulse;         // N [N s], m [N m s]
+  Vec<double> friction_impulse, rocking_impulse;  // f [N s], τ [N m s]
+  Vec<double> impulse_arm;                        // from A's centre of mass to where they acted [m]
 
   BoxPair pair() const { return {box_a, box_b}; }
 
@@ -45,7 +45,7 @@ struct Patch {
 // What a patch carried in the last advance: the sums of its impulses after relaxation.
 struct Load {
   int32_t box_a, box_b;
-  Vec<double> press, rub;  // N, τ1, τ2 and f1, f2, m / r [N s], [N m s]
+  Vec<double> normal_impulses, friction_impulses;  // N, τ1, τ2 and f1, f2, m / r [N s], [N m s]
   Vec<double> normal, point;
   Rectangle shape;
 
@@ -54,14 +54,15 @@ struct Load {
     bc_load load{};
     load.box_a = box_a;
     load.box_b = box_b;
-    double pressing = press[0];
+    double pressing = normal_impulses[0];
     if (!(pressing > 0.0)) return load;
-    Vec<double> friction = (1.0 / time) * (rub[0] * shape.axis_1 + rub[1] * shape.axis_2);
+    Vec<double> friction =
+        (1.0 / time) * (friction_impulses[0] * shape.axis_1 + friction_impulses[1] * shape.axis_2);
     // A force N·n at x·e1 + y·e2 has the moment N·(y·e1 − x·e2).
-    double x = -press[2] / pressing, y = press[1] / pressing;
+    double x = -normal_impulses[2] / pressing, y = normal_impulses[1] / pressing;
     Vec<double> centre = point + (x * shape.axis_1 + y * shape.axis_2);
     load.pressing = pressing / time;
-    load.torsion = shape.radius * rub[2] / time;
+    load.torsion = shape.radius * friction_impulses[2] / time;
     for (int i = 0; i < 3; ++i) load.friction[i] = friction[i], load.centre[i] = centre[i];
     constexpr double sides[4][2] = {{1.0, 1.0}, {1.0, -1.0}, {-1.0, -1.0}, {-1.0, 1.0}};
     for (int k = 0; k < 4; ++k) {

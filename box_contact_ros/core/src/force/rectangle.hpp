@@ -87,8 +87,8 @@ Rectangle rectangle_of(const Vec<double>& normal, const double* covariance,
   double larger = spread > 0.0 ? std::sqrt(0.5 * (1.0 + std::fabs(off) / spread)) : 1.0;
   double lesser = spread > 0.0 ? 0.5 * std::fabs(uv) / (spread * larger) : 0.0;
   double along_v = uv < 0.0 ? -1.0 : 1.0;
-  Vec<double> axis_1 = off < 0.0 ? lesser * u + (along_v * larger) * v
-                                 : larger * u + (along_v * lesser) * v;
+  Vec<double> axis_1 =
+      off < 0.0 ? lesser * u + (along_v * larger) * v : larger * u + (along_v * lesser) * v;
   if (spread < square_slack * mean) {
     axis_1 = edge_in_plane(normal, box_axes());
     spread = moment(axis_1, axis_1) - mean;

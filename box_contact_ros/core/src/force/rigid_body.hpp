@@ -62,9 +62,7 @@ inline Vec<double> cross(const Vec<double>& a, const Vec<double>& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 inline double length(const Vec<double>& a) { return std::sqrt(dot(a, a)); }
-inline Vec<double> vector_at(const double* numbers) {
-  return {numbers[0], numbers[1], numbers[2]};
-}
+inline Vec<double> vector_at(const double* numbers) { return {numbers[0], numbers[1], numbers[2]}; }
 inline Vec<double> vector(const double (&numbers)[3]) { return vector_at(numbers); }
 
 // The inverse of a matrix, by its cofactors. One whose determinant is not positive gives zero.
@@ -104,7 +102,7 @@ inline void spin(double (&q)[4], const Vec<double>& angular, double h) {
 // The pose of a box in the common frame, of a pose in the frame of a body at `body`.
 inline bc_pose in_common_frame(const bc_pose& body, const bc_pose& box) {
   auto read = [](const bc_pose& pose) -> Pose<double> {
-    const double(&q)[4] = pose.quaternion;
+    const double (&q)[4] = pose.quaternion;
     return {vector(pose.position), {q[0], q[1], q[2], q[3]}};
   };
   auto [at, turned] = pose_in_common_frame(read(body), read(box));
@@ -144,8 +142,9 @@ inline Vec<double> gyroscopic_change(const Body& body, const Vec<double>& angula
   const Vec<double>& inverse_inertia = body.inverse_inertia;
   Vec<double> ones{1.0, 1.0, 1.0}, inertia = ones / inverse_inertia;
   // Euler's equations: the rate of ω0 is share[0]·ω1·ω2, and so on.
-  Vec<double> share = Vec<double>{inertia[1] - inertia[2], inertia[2] - inertia[0],
-                                  inertia[0] - inertia[1]} * inverse_inertia;
+  Vec<double> share =
+      Vec<double>{inertia[1] - inertia[2], inertia[2] - inertia[0], inertia[0] - inertia[1]} *
+      inverse_inertia;
   Vec<double> change{0.0, 0.0, 0.0};
   for (int newton = 0; newton < 2; ++newton) {
     Vec<double> mean = angular + 0.5 * change, x = (0.5 * h) * share;

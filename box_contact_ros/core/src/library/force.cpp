@@ -174,18 +174,15 @@ bc_status explain(PatchForces::Held held) {
 bc_status solve_own(PatchForces& self, const bc_pose* poses) {
   const Kernel* kernel = chosen_kernel();
   if (!kernel) return fail(BC_BAD_ENVIRONMENT, "BOX_CONTACT_INSTRUCTION_SET is unknown");
-  auto* numbers = reinterpret_cast<const double*>(self.place_boxes(poses));
-  auto* sizes = reinterpret_cast<const double*>(self.sizes().data());
-  PatchForces::Own& own = self.own();
-  Rows rows{numbers, numbers, sizes, sizes, 3, 3, own.pairs.data(), long(self.box_count())};
-  Results results{nullptr,           own.separation.data(), own.normal.data(), own.point.data(),
-                  own.volume.data(), own.covariance.data(), nullptr,           0.0};
-  Counts counts{};
-  long refused = solve_rows({kernel, Model::exact, nullptr}, rows, long(own.count()), results,
-                            self.threads(), counts);
-  if (refused >= 0)
-    return fail(BC_BAD_POSE, "pairs[%ld]: a box is beyond 1e50 m", refused);
-  return explain(self.take_own(poses));
+  auto solve = [&](const Rows& rows, long count, const Results& results) {
+    Counts counts{};
+    return solve_rows({kernel, Model::exact, nullptr}, rows, count, results, self.threads(),
+                      counts);
+  };
+  PatchForces::Held held;
+  long refused = self.solve_own(poses, solve, held);
+  if (refused >= 0) return fail(BC_BAD_POSE, "pairs[%ld]: a box is beyond 1e50 m", refused);
+  return explain(held);
 }
 
 bc_status read_boxes(const bc_body_box* given, int64_t count, size_t bodies,
@@ -243,9 +240,9 @@ bc_status bc_patch_forces_create(const bc_body* bodies, int64_t count,
     if (bc_status status = check_options(all)) return status;
     std::vector<Body> read;
     if (bc_status status = read_bodies(bodies, count, read)) return status;
-    *forces = handle(new PatchForces(std::move(read), {all.substeps, all.iterations,
-                                                       all.relaxations, all.threads,
-                                                       all.friction}));
+    *forces =
+        handle(new PatchForces(std::move(read), {all.substeps, all.iterations, all.relaxations,
+                                                 all.threads, all.friction}));
     return BC_OK;
   });
 }
@@ -276,7 +273,8 @@ bc_status bc_patch_forces_set_bodies(bc_patch_forces* forces, const bc_body* bod
     if (bc_status status = read_bodies(bodies, count, read)) return status;
     for (const bc_body_box& box : forces_of(forces).boxes())
       if (box.body >= count)
-        return fail(BC_BAD_ARGUMENT, "bodies: a box is of body %lld, so there must be more than %lld",
+        return fail(BC_BAD_ARGUMENT,
+                    "bodies: a box is of body %lld, so there must be more than %lld",
                     (long long)box.body, (long long)count);
     forces_of(forces).set_bodies(std::move(read));
     return BC_OK;
@@ -321,7 +319,7 @@ bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches* answer
     PatchForces& self = forces_of(forces);
     if (all.separation && !poses && !self.bodies().empty()) return refuse_null("poses");
     if (bc_status status = check_answer(all, self, poses)) return status;
-    return explain(all.separation ? self.hold(all, poses) : self.hold_own(all));
+    return explain(all.separation ? self.hold(all, poses) : self.hold(all));
   });
 }
 
@@ -336,9 +334,10 @@ bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, const bc_p
     if (!read(motion, all)) return fail(BC_BAD_ABI, "motion.size is unknown");
     if (bc_status status = check_step(dt, bodies, poses, velocities, outside)) return status;
     PatchForces& self = forces_of(forces);
-    if (self.own().count() > 0)
-      if (bc_status status = solve_own(self, poses)) return status;
-    self.advance(dt, poses, velocities, outside, all);
+    if (bc_status status = solve_own(self, poses)) return status;
+    self.advance(
+        dt, poses, velocities, outside, all,
+        [](long threads, long chunks, const auto& work) { in_threads(threads, chunks, work); });
     return BC_OK;
   });
 }

@@ -1,0 +1,230 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// One island, from the start of an advance to its end. Islands share nothing that changes, so each thread
+// takes some.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "clock.hpp"
+#include "islands.hpp"
+
+namespace box_contact::BOX_CONTACT_SET::force {
+
+// A smaller change of a patch's speeds [m/s] does not make its neighbours be solved again. With 1e-6 a
+// jittered tower of 20 sways for 8 s.
+constexpr double least_change = 1e-8;
+
+struct Options {
+  int substeps, iterations, relaxations, threads;
+  double friction;
+};
+
+// The velocities with which a body ended the last advance: before relaxation, and after it.
+struct Ended {
+  Motion pushed, relaxed;
+};
+
+// What an advance begins with, and where its end goes.
+struct Advance {
+  SubSteps steps;
+  const bc_pose* poses;
+  const bc_velocity* velocities;
+  const bc_wrench* outside;
+  const bc_motion& motion;
+};
+
+class IslandStep {
+ public:
+  IslandStep(const Options& options, const std::vector<Body>& bodies, const Advance& step,
+             std::vector<Ended>& ended, std::vector<Patch>& patches, std::vector<Load>& loads,
+             Islands& islands)
+      : options_(options),
+        bodies_(bodies),
+        step_(step),
+        ended_(ended),
+        patches_(patches),
+        loads_(loads),
+        moving_(islands.moving),
+        blocks_(islands.blocks) {}
+
+  void advance(const Island& island) const {
+    for (size_t k = island.body; k < island.body_end; ++k) begin(moving_[k]);
+    for (size_t k = island.block; k < island.block_end; ++k)
+      blocks_[k].normal_sum = blocks_[k].friction_sum = {};
+    const SubSteps& steps = step_.steps;
+    for (int number = 1; number <= steps.count; ++number) {
+      const SubStep& now = number == 1 ? steps.first : steps.later;
+      for (size_t k = island.body; k < island.body_end; ++k) drive(moving_[k]);
+      for (size_t k = island.block; k < island.block_end; ++k) {
+        Block& block = blocks_[k];
+        const Patch& patch = patches_[size_t(block.patch)];
+        Moving &a = moving_[size_t(block.a)], &b = moving_[size_t(block.b)];
+        prepare(patch, a, b, now, block);
+        warm_start(patch, now.again, block, a, b);
+      }
+      bool is_last = number == steps.count;
+      solve(island, steps.rounds * options_.iterations, &Block::pushing);
+      if (is_last) end_pushing(island);
+      for (size_t k = island.body; k < island.body_end; ++k) moving_[k].move(steps.length);
+      solve(island, steps.rounds * options_.relaxations, &Block::relaxed);
+      if (!is_last && step_.motion.wrenches) count_impulses(island);
+      for (size_t k = island.block; k < island.block_end; ++k)
+        store(blocks_[k], now.kept, patches_[size_t(blocks_[k].patch)]);
+    }
+    for (size_t k = island.body; k < island.body_end; ++k) write_end(moving_[k]);
+    for (size_t k = island.block; k < island.block_end; ++k) end(blocks_[k]);
+  }
+
+  // A body that no force moves goes on by its velocity. One that rests keeps its pose to the bit.
+  void move_alone(size_t k) const {
+    const bc_velocity velocity = step_.velocities[k];
+    const bc_motion& motion = step_.motion;
+    if (motion.velocities) motion.velocities[k] = velocity;
+    if (motion.wrenches) motion.wrenches[k] = {};
+    if (!motion.poses) return;
+    const double* numbers = velocity.linear;
+    if (are_within(numbers, 3, 0.0) && are_within(velocity.angular, 3, 0.0)) {
+      motion.poses[k] = step_.poses[k];
+      return;
+    }
+    Moving moving{};
+    moving.body = int32_t(k);
+    begin(moving);
+    for (int number = 0; number < step_.steps.count; ++number) moving.move(step_.steps.length);
+    write_pose(moving);
+  }
+
+ private:
+  void begin(Moving& moving) const {
+    auto k = size_t(moving.body);
+    moving.placed = placed_at(step_.poses[k], bodies_[k].centre);
+    moving.linear = vector(step_.velocities[k].linear);
+    moving.angular = vector(step_.velocities[k].angular);
+    double scale = 1.0 / std::sqrt(squared_norm(step_.poses[k].quaternion));
+    for (int i = 0; i < 4; ++i) moving.quaternion[i] = scale * step_.poses[k].quaternion[i];
+    moving.impulse = moving.angular_impulse = {};
+    if (!bodies_[k].is_free()) return;
+    // A caller who moves by the wrenches comes back with the speed of pushing out.
+    const auto& [pushed, relaxed] = ended_[k];
+    Vec<double> linear_p = moving.linear - pushed.linear, linear_r = moving.linear - relaxed.linear;
+    Vec<double> angular_p = moving.angular - pushed.angular;
+    Vec<double> angular_r = moving.angular - relaxed.angular;
+    if (energy(k, moving.placed, linear_p, angular_p) >=
+        energy(k, moving.placed, linear_r, angular_r))
+      return;
+    Vec<double> slower = relaxed.linear - pushed.linear, calmer = relaxed.angular - pushed.angular;
+    moving.linear += slower;
+    moving.angular += calmer;
+    moving.impulse = (1.0 / bodies_[k].inverse_mass) * slower;
+    moving.angular_impulse = moving.placed.axes * (transposed_times(moving.placed.axes, calmer) /
+                                                   bodies_[k].inverse_inertia);
+  }
+  // Twice the kinetic energy of a body at such velocities.
+  double energy(size_t k, const Placed& placed, const Vec<double>& linear,
+                const Vec<double>& angular) const {
+    Vec<double> own = transposed_times(placed.axes, angular);
+    return dot(linear, linear) / bodies_[k].inverse_mass +
+           dot(own, own / bodies_[k].inverse_inertia);
+  }
+
+  // Change velocities by all but contacts.
+  void drive(Moving& moving) const {
+    auto k = size_t(moving.body);
+    double h = step_.steps.length;
+    if (!bodies_[k].is_free()) return;
+    moving.inverse_inertia = inverse_inertia_of(bodies_[k], moving.placed);
+    const Mat<double>& axes = moving.placed.axes;
+    moving.angular +=
+        axes * gyroscopic_change(bodies_[k], transposed_times(axes, moving.angular), h);
+    if (!step_.outside) return;
+    moving.linear += (h * bodies_[k].inverse_mass) * vector(step_.outside[k].force);
+    moving.angular += h * (moving.inverse_inertia * vector(step_.outside[k].torque));
+  }
+
+  // Solve the blocks of an island in turn, so many times. A block whose bodies have not changed since
+  // its last turn is left out.
+  void solve(const Island& island, int iterations, NormalRows Block::* rows) const {
+    for (size_t k = island.body; k < island.body_end; ++k) moving_[k].changed = 0;
+    bool is_solved = false;
+    for (int iteration = 1; iteration <= iterations && !is_solved; ++iteration) {
+      is_solved = true;
+      for (size_t k = island.block; k < island.block_end; ++k) {
+        Block& block = blocks_[k];
+        Moving &a = moving_[size_t(block.a)], &b = moving_[size_t(block.b)];
+        if (std::max(a.changed, b.changed) < iteration - 1) continue;
+        double closing = solve_normal(block, block.*rows, a, b);
+        double slipping = solve_friction(block, a, b);  // bounded by what presses now
+        if (std::max(closing, slipping) <= least_change) continue;
+        is_solved = false;
+        if (a.inverse_mass > 0.0) a.changed = iteration;
+        if (b.inverse_mass > 0.0) b.changed = iteration;
+      }
+    }
+  }
+
+  void count_impulses(const Island& island) const {
+    for (size_t k = island.block; k < island.block_end; ++k) {
+      const Block& block = blocks_[k];
+      count(block, moving_[size_t(block.a)], moving_[size_t(block.b)]);
+    }
+  }
+  // Write what pushing out leads to: the wrenches that do so if they are constant over the advance.
+  void end_pushing(const Island& island) const {
+    if (step_.motion.wrenches) count_impulses(island);
+    double rate = 1.0 / step_.steps.dt;
+    for (size_t k = island.body; k < island.body_end; ++k) {
+      const Moving& moving = moving_[k];
+      auto body = size_t(moving.body);
+      if (!bodies_[body].is_free()) continue;
+      ended_[body].pushed = {moving.linear, moving.angular};
+      if (step_.motion.wrenches)
+        write(rate * moving.impulse, rate * moving.angular_impulse,
+              step_.motion.wrenches[body].force, step_.motion.wrenches[body].torque);
+    }
+  }
+  void write_end(const Moving& moving) const {
+    auto k = size_t(moving.body);
+    if (!bodies_[k].is_free()) return;
+    ended_[k].relaxed = {moving.linear, moving.angular};
+    write_pose(moving);
+    if (step_.motion.velocities)
+      write(moving.linear, moving.angular, step_.motion.velocities[k].linear,
+            step_.motion.velocities[k].angular);
+  }
+  void write_pose(const Moving& moving) const {
+    if (!step_.motion.poses) return;
+    auto k = size_t(moving.body);
+    bc_pose& pose = step_.motion.poses[k];
+    const Vec<double> position = moving.placed.position - moving.placed.axes * bodies_[k].centre;
+    std::copy_n(position.v, 3, pose.position);
+    double scale = 1.0 / std::sqrt(squared_norm(moving.quaternion));
+    for (int i = 0; i < 4; ++i) pose.quaternion[i] = scale * moving.quaternion[i];
+  }
+  void end(const Block& block) const {
+    Patch& patch = patches_[size_t(block.patch)];
+    const Moving& a = moving_[size_t(block.a)];
+    patch.age += step_.steps.dt;
+    loads_[size_t(block.patch)] = {patch.box_a,      patch.box_b,
+                                   block.normal_sum, block.friction_sum,
+                                   block.normal,     a.placed.position + block.arm_a,
+                                   block.shape};
+  }
+  static void write(const Vec<double>& v, const Vec<double>& w, double* linear, double* angular) {
+    std::copy_n(v.v, 3, linear);
+    std::copy_n(w.v, 3, angular);
+  }
+
+  const Options& options_;
+  const std::vector<Body>& bodies_;
+  const Advance& step_;
+  std::vector<Ended>& ended_;  // of the bodies
+  std::vector<Patch>& patches_;
+  std::vector<Load>& loads_;
+  std::vector<Moving>& moving_;
+  std::vector<Block>& blocks_;
+};
+
+}  // namespace box_contact::BOX_CONTACT_SET::force
