@@ -100,6 +100,9 @@ class PatchForces:
     def advance(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
                 outside: ArrayLike | None, /,
                 ) -> Any: ...  # a tuple of arrays, or None
+    def wrenches(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
+                 outside: ArrayLike | None, /,
+                 ) -> Any: ...  # an array, or None
     def loads(self) -> tuple[np.ndarray, ...]: ...
     def forget(self, bodies: np.ndarray, /) -> None: ...
     def reset(self) -> None: ...

@@ -100,9 +100,8 @@ class LoadForces:
     def wrench(self, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return force and torque (6,) at `pose` (7,) and `velocity` (6,), a physics step each."""
         still, weight = np.zeros(6), np.array([0, 0, -GRAVITY * self._load.mass, 0, 0, 0])
-        motion = self._forces.advance(self._step, self._rows(pose, NO_TURN),
-                                      self._rows(velocity, still), self._rows(weight, still))
-        return motion.wrenches[0]
+        return self._forces.wrenches(self._step, self._rows(pose, NO_TURN),
+                                     self._rows(velocity, still), self._rows(weight, still))[0]
 
 
 def with_patch(touch: Contact, pose: np.ndarray, size: Sequence[float]) -> Contact:

@@ -17,9 +17,9 @@ force [N], then a torque [N m] about the centre of mass. All in the common frame
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -128,8 +128,8 @@ class Motion(NamedTuple):
     velocities: np.ndarray
     """(n, 6) at the end of the step."""
     wrenches: np.ndarray
-    """(n, 6) of contacts, their mean over the step, with what pushes overlaps out. They are for a
-    simulator that moves the bodies by itself."""
+    """(n, 6) of contacts, their mean over the step, with what pushes overlaps out. A simulator that
+    moves the bodies by itself calls `PatchForces.wrenches`."""
 
 
 class Loads(NamedTuple):
@@ -251,13 +251,17 @@ class PatchForces:
         Call `advance` once a step. Steps of less than 1 s may differ in length.
         ValueError: names field and value; nothing changes then.
         """
-        dt = as_number(dt, 'dt')
-        found = self._native.advance(dt, poses, velocities, wrenches)
-        if found is None:  # they are not all plain arrays
-            found = self._native.advance(
-                dt, _as_rows(poses, 'poses', 7), _as_rows(velocities, 'velocities', 6),
-                None if wrenches is None else _as_rows(wrenches, 'wrenches', 6))
-        return Motion._make(found)
+        return Motion._make(_step(self._native.advance, dt, poses, velocities, wrenches))
+
+    def wrenches(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
+                 wrenches: ArrayLike | None = None) -> np.ndarray:
+        """Return the mean wrenches (n, 6) of contacts over a step, for who moves the bodies by them.
+
+        Call it instead of `advance`, with the same arguments. The next call takes velocities to which
+        these wrenches led, and removes the speed of pushing out from them.
+        ValueError: names field and value; nothing changes then.
+        """
+        return _step(self._native.wrenches, dt, poses, velocities, wrenches)
 
     def loads(self) -> Loads:
         """Return what each pair carried in the last step.
@@ -283,6 +287,17 @@ class PatchForces:
     def __deepcopy__(self, memo: dict[int, object]) -> Self:
         """Return the same as a copy: nothing is shared."""
         return self.__copy__()
+
+
+def _step(step: Callable[..., Any], dt: float, poses: ArrayLike, velocities: ArrayLike,
+          wrenches: ArrayLike | None) -> Any:
+    """Return what a step of C++ gives; it converts nothing, and gives None for other arrays."""
+    dt = as_number(dt, 'dt')
+    found = step(dt, poses, velocities, wrenches)
+    if found is not None:
+        return found
+    return step(dt, _as_rows(poses, 'poses', 7), _as_rows(velocities, 'velocities', 6),
+                None if wrenches is None else _as_rows(wrenches, 'wrenches', 6))
 
 
 def _columns(bodies: Sequence[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

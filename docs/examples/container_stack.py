@@ -66,8 +66,7 @@ def main() -> None:
             asked, contacts = poses, solver.batch(poses, sizes=SIZES, pairs=PAIRS)
         if step % ticks == late:
             forces.hold(PAIRS, contacts, asked, age=LATENCY)
-        motion = forces.advance(STEP, poses, velocities_of(data), weights)
-        data.xfrc_applied[1:] = motion.wrenches[1:]
+        data.xfrc_applied[1:] = forces.wrenches(STEP, poses, velocities_of(data), weights)[1:]
         mujoco.mj_step(model, data)
         if step % 2000 == 1999:
             fastest = np.abs(data.qvel.reshape(COUNT, 6)[:, :3]).max()

@@ -72,8 +72,7 @@ def main() -> None:
         if step % STEPS == LATE:
             forces.hold(answer.pairs)
         velocities[0] = velocity_of(data)
-        motion = forces.advance(STEP, np.array([pose, STACK]), velocities, weights)
-        data.xfrc_applied[1] = motion.wrenches[0]
+        data.xfrc_applied[1] = forces.wrenches(STEP, np.array([pose, STACK]), velocities, weights)[0]
         mujoco.mj_step(model, data)
         if step + 1 in (60, 130, 260, 510, 1010):
             depth = max(0.0, -answer.contacts.separation.min(initial=0.0))

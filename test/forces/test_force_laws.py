@@ -543,8 +543,8 @@ def test_late_answers_level_a_load(foreign: bool) -> None:
         if not foreign:
             world.step()
             continue
-        wrenches = world.outside + world.forces.advance(
-            STEP, world.poses, world.velocities, world.outside).wrenches
+        wrenches = world.outside + world.forces.wrenches(
+            STEP, world.poses, world.velocities, world.outside)
         world.velocities = world.velocities + STEP / MASS * wrenches * [1, 1, 1, 6, 6, 6]
         move(world)
     up = rotation_matrix(world.poses[1:, 3:])[0, :, 2]

@@ -156,6 +156,8 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: hold(period=-0.1), 'period', '-0.1'),
     (lambda: FORCES.advance(1.0, POSES, STILL), 'dt', '1'),
     (lambda: FORCES.advance(0.0, POSES, STILL), 'dt', '0'),
+    (lambda: FORCES.wrenches(0.0, POSES, STILL), 'dt', '0'),
+    (lambda: FORCES.wrenches(0.1, POSES[:1], STILL), 'poses', '(1, 7)'),
     (lambda: FORCES.advance('1', POSES, STILL), 'dt', "'1'"),
     (lambda: FORCES.advance(0.1, POSES[:1], STILL), 'poses', '(1, 7)'),
     (lambda: FORCES.advance(0.1, POSES, STILL + INF), 'velocities[0]', 'inf'),

@@ -140,8 +140,10 @@ Struct* rows_of(const Array<double>& array) {
   return reinterpret_cast<Struct*>(array.numbers);
 }
 
+// `advance` and, for callers who move the bodies by themselves, `wrenches`.
+template <bool by_wrenches>
 inline PyObject* forces_advance(PyObject* self, PyObject* const* args, Py_ssize_t count) {
-  if (count != 4) fail(PyExc_TypeError, "advance(dt, poses, velocities, outside)");
+  if (count != 4) fail(PyExc_TypeError, "(dt, poses, velocities, outside)");
   double dt = PyFloat_AsDouble(args[0]);
   if (PyErr_Occurred()) return nullptr;
   Array<double> poses, velocities, outside;
@@ -152,13 +154,15 @@ inline PyObject* forces_advance(PyObject* self, PyObject* const* args, Py_ssize_
   check_rows(poses, "poses", {bodies, 7});
   check_rows(velocities, "velocities", {bodies, 6});
   check_rows(outside, "wrenches", {bodies, 6});
-  auto moved = make<double>({bodies, 7}), after = make<double>({bodies, 6});
+  Array<double> moved, after;
+  if (!by_wrenches) moved = make<double>({bodies, 7}), after = make<double>({bodies, 6});
   auto wrenches = make<double>({bodies, 6});
   bc_motion motion{sizeof(bc_motion), rows_of<bc_pose>(moved), rows_of<bc_velocity>(after),
                    rows_of<bc_wrench>(wrenches)};
   check(bc_patch_forces_advance(forces_of(self), dt, rows_of<bc_pose>(poses),
                                 rows_of<bc_velocity>(velocities), rows_of<bc_wrench>(outside),
                                 &motion));
+  if (by_wrenches) return wrenches.object.release();
   return pack(&PyTuple_Type, moved, after, wrenches);
 }
 
@@ -214,7 +218,10 @@ inline PyMethodDef forces_methods[] = {
     {"set_boxes", method<forces_set_boxes>(), METH_FASTCALL,
      "set_boxes(sizes, body, poses)\n--\n\nChange the boxes: (m, 3), (m,), (m, 7); None for the last "
      "two."},
-    {"advance", method<forces_advance>(), METH_FASTCALL,
+    {"wrenches", method<forces_advance<true>>(), METH_FASTCALL,
+     "wrenches(dt, poses, velocities, outside)\n--\n\nReturn wrenches (n, 6), which move the bodies "
+     "until the next call.\n\nReturn None, and change nothing, where one is no plain array."},
+    {"advance", method<forces_advance<false>>(), METH_FASTCALL,
      "advance(dt, poses, velocities, outside)\n--\n\nReturn poses (n, 7), velocities and wrenches "
      "(n, 6).\n\nReturn None, and change nothing, where one is no plain array."},
     {"loads", method<forces_loads>(), METH_NOARGS,

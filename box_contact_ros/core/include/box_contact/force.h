@@ -94,8 +94,8 @@ typedef struct bc_motion {
   size_t size; /* sizeof(bc_motion) */
   bc_pose* poses;
   bc_velocity* velocities; /* after relaxation */
-  bc_wrench* wrenches;     /* of contacts, for a simulator that moves the bodies by itself: constant
-                              over the step, and with what pushes overlaps out */
+  bc_wrench* wrenches;     /* of contacts, the mean over the step, with what pushes overlaps out; alone:
+                              the caller moves the bodies by them */
 } bc_motion;
 
 /* What the contact of two boxes carried: the mean over the last advance, after relaxation. All forces
@@ -143,8 +143,8 @@ BC_API bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches*
 
 /* Advance by `dt` seconds: 1e-50 or more, and less than 1. Steps may differ in length. `outside` are
  * the wrenches beside those of contacts, gravity among them, constant over the step; NULL: none.
- * Bodies whose velocities come back as they were returned go on. Those that come back with the
- * velocities to which the wrenches led first lose the speed of pushing out: the nearer counts. */
+ * Without poses and velocities in `motion`, the wrenches are taken to move the bodies until the next
+ * advance, which then removes the speed of pushing out. */
 BC_API bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, const bc_pose* poses,
                                          const bc_velocity* velocities, const bc_wrench* outside,
                                          const bc_motion* motion);

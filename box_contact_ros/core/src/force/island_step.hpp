@@ -34,6 +34,7 @@ struct Advance {
   const bc_velocity* velocities;
   const bc_wrench* outside;
   const bc_motion& motion;
+  bool came_by_wrenches;  // whether those of the last advance moved the bodies
 };
 
 class IslandStep {
@@ -108,13 +109,8 @@ class IslandStep {
     moving.impulse = moving.angular_impulse = {};
     if (!bodies_[k].is_free()) return;
     // A caller who moves by the wrenches comes back with the speed of pushing out.
+    if (!step_.came_by_wrenches) return;
     const auto& [pushed, relaxed] = ended_[k];
-    Vec<double> linear_p = moving.linear - pushed.linear, linear_r = moving.linear - relaxed.linear;
-    Vec<double> angular_p = moving.angular - pushed.angular;
-    Vec<double> angular_r = moving.angular - relaxed.angular;
-    if (energy(k, moving.placed, linear_p, angular_p) >=
-        energy(k, moving.placed, linear_r, angular_r))
-      return;
     Vec<double> slower = relaxed.linear - pushed.linear, calmer = relaxed.angular - pushed.angular;
     moving.linear += slower;
     moving.angular += calmer;
@@ -122,14 +118,6 @@ class IslandStep {
     moving.angular_impulse = moving.placed.axes * (transposed_times(moving.placed.axes, calmer) /
                                                    bodies_[k].inverse_inertia);
   }
-  // Twice the kinetic energy of a body at such velocities.
-  double energy(size_t k, const Placed& placed, const Vec<double>& linear,
-                const Vec<double>& angular) const {
-    Vec<double> own = transposed_times(placed.axes, angular);
-    return dot(linear, linear) / bodies_[k].inverse_mass +
-           dot(own, own / bodies_[k].inverse_inertia);
-  }
-
   // Change velocities by all but contacts.
   void drive(Moving& moving) const {
     auto k = size_t(moving.body);

@@ -81,6 +81,7 @@ class PatchForces {
     patches_.clear();
     loads_.clear();
     ended_.assign(bodies_.size(), {});
+    moves_by_wrenches_ = false;
     clock_ = {};
     is_grouped_ = false;
   }
@@ -118,7 +119,8 @@ class PatchForces {
   template <class InThreads>
   void advance(double dt, const bc_pose* poses, const bc_velocity* velocities,
                const bc_wrench* outside, const bc_motion& motion, const InThreads& in_threads) {
-    Advance step{clock_.begin(dt, options_.substeps), poses, velocities, outside, motion};
+    Advance step{clock_.begin(dt, options_.substeps), poses, velocities, outside, motion,
+                 moves_by_wrenches_};
     if (!is_grouped_) islands_.group(bodies_, patches_);
     is_grouped_ = true;
     loads_.resize(patches_.size());
@@ -127,6 +129,7 @@ class PatchForces {
     for (size_t k = 0; k < bodies_.size(); ++k)
       if (!bodies_[k].is_free()) islands.move_alone(k);
     clock_.end(dt);
+    moves_by_wrenches_ = motion.wrenches && !motion.poses && !motion.velocities;
   }
 
  private:
@@ -254,6 +257,7 @@ class PatchForces {
   Clock clock_;
   OwnContacts own_;
   std::vector<Ended> ended_;           // of the bodies
+  bool moves_by_wrenches_ = false;     // whether the caller does so since the last advance
   std::vector<Patch> patches_, next_;  // by pair
   std::vector<Load> loads_;            // of the last advance, by pair
   // Memory that calls use again.
