@@ -3,6 +3,11 @@
 
 // Time: a step of the caller's as sub-steps, by the steps and the answers before it. Nothing but numbers
 // goes in and comes out.
+//
+// Springs are as hard as the longest step lately allows, and impulses are kept for a window of that
+// step's sub-steps. Both would pump if they followed each step: a spring's rest depth goes with the
+// square of the window. So the longest step of the last while counts, and sub-steps are equal in time: a
+// short remainder of a frame is one of them.
 #pragma once
 
 #include <algorithm>
@@ -18,12 +23,18 @@ constexpr double step_min = 1e-50, step_limit = 1.0;
 // Sub-steps are no longer [s], unless answers are late: a step of 0.1 s in four would sink a stack of
 // eight by 42 mm.
 constexpr double sub_step_limit = 0.005;
-// A window shrinks by the first where three steps are shorter by more: a frame may end with two shorter
-// ones, and a step that is measured varies. A step begins with at most the second times the impulses of
-// a window [1]. What iterations leave is as large in a step of 1 ns as in one of 5 ms: divided by the
-// step it would be any force. A window that is halved by each tiny step loses a tower's impulses in
-// three of them.
-constexpr double window_shrinkage = 1.25, most_again = 2.0;
+// A step of so many sub-steps and this share of one has no sub-step more [1]: the share is rounding.
+constexpr double sub_step_slack = 1e-9;
+// Steps are remembered for at least this time [s], and at least so many of them. Frames of several steps
+// repeat within it.
+constexpr double steps_time = 0.5;
+constexpr int steps_count = 32;
+// The longest step lately is forgotten where those since are shorter by more than this factor [1], as a
+// step that is measured varies. It then shrinks by it a step: at once, a tower of ten jumps 1 mm up.
+constexpr double step_shrinkage = 1.25;
+// A step begins with at most this many times the impulses of a window [1]. What iterations leave is as
+// large in a step of 1 ns as in one of 5 ms: divided by the step it would be any force.
+constexpr double most_again = 2.0;
 // Angular frequency of a soft constraint times the window [1]: a quarter turn. A box that rests on a
 // whole face is 0.4·g·step² deep.
 constexpr double soft_frequency = 1.57;
@@ -42,12 +53,12 @@ inline double frequency_of(double late, double period) {
 
 // What all patches of a sub-step share.
 struct SubStep {
-  double length;   // [s]
-  double window;   // the time in which the impulses that patches keep were given [s]
-  double again;    // share of the impulses of the window before that is given at first [1]
-  double kept;     // share of them that stays in the window [1]
-  double share;    // of the advance [1]; answers are late in comparison with all of it
-  double period;   // from one answer to the next [s]
+  double length;  // [s]
+  double window;  // the time in which the impulses that patches keep were given [s]
+  double again;   // share of the impulses of the window before that is given at first [1]
+  double kept;    // share of them that stays in the window [1]
+  double share;   // of the window in the longest step [1]: answers are late in comparison with that
+  double period;  // from one answer to the next [s]
   double overdue;  // age of an answer that is overdue [s]
 };
 
@@ -56,6 +67,31 @@ struct SubSteps {
   double dt, length;  // of all, and of each [s]
   int count, rounds;  // how many, and how many times all iterations are in each
   SubStep first, later;
+};
+
+// The longest step of the last while, in two halves of it.
+class LongestStep {
+ public:
+  // Returns the length that counts [s] with a step of `dt` more.
+  double with(double dt) {
+    longest_ = std::max(longest_, dt);
+    time_ += dt;
+    ++count_;
+    double lately = std::max(longest_, longest_before_);
+    if (lately > goal_ || lately * step_shrinkage < goal_) goal_ = lately;
+    length_ = std::max(goal_, length_ / step_shrinkage);
+    if (time_ >= steps_time && count_ >= steps_count) {
+      longest_before_ = longest_;
+      longest_ = time_ = 0.0;
+      count_ = 0;
+    }
+    return length_;
+  }
+
+ private:
+  double longest_ = 0.0, longest_before_ = 0.0, time_ = 0.0;  // [s]
+  int count_ = 0;
+  double goal_ = 0.0, length_ = 0.0;  // [s]
 };
 
 class Clock {
@@ -78,21 +114,19 @@ class Clock {
   }
 
   SubSteps begin(double dt, int substeps) {
+    double longest = longest_.with(dt);
     // A late answer bears no stiffer patches in shorter sub-steps: all iterations are in one.
-    double longest = std::max({dt, advance_, advance_before_});
-    double shrunk = step_ / window_shrinkage;
-    if (longest > step_ || longest < shrunk) step_ = std::max(longest, shrunk);
-    bool is_late = frequency_of(late_, period_) < soft_frequency / step_;
-    int count = is_late ? 1 : std::max(substeps, int(std::ceil(dt / sub_step_limit)));
-    double window = is_late ? step_ : std::min(step_ / substeps, sub_step_limit);
+    bool is_late = frequency_of(late_, period_) < soft_frequency / longest;
+    double window = is_late ? longest : std::min(longest / substeps, sub_step_limit);
+    int count = std::max(1, int(std::ceil(dt / window - sub_step_slack)));
     SubSteps steps{dt, dt / count, count, is_late ? substeps : 1, {}, {}};
-    steps.first = sub_step(steps, window);
-    steps.later = sub_step(steps, window);
+    double share = window / longest;
+    steps.first = sub_step(steps, window, share);
+    steps.later = sub_step(steps, window, share);
     return steps;
   }
   void end(double dt) {
     if (since_ >= 0.0) since_ += dt;
-    advance_before_ = advance_;
     advance_ = dt;
   }
   // Length of the last advance [s].
@@ -106,25 +140,24 @@ class Clock {
     return least;
   }
   // A sub-step of an advance. Its window begins the next one.
-  SubStep sub_step(const SubSteps& steps, double window) {
+  SubStep sub_step(const SubSteps& steps, double window, double share) {
     double before = window_, h = steps.length;
     window_ = window;
     return {h,
             window,
             before > 0.0 ? std::min(h / before, most_again) : 1.0,
-            before > 0.0 ? (window - h) / before : 0.0,
-            1.0 / steps.count,
+            before > 0.0 ? std::max(0.0, window - h) / before : 0.0,
+            share,
             period_,
             overdue_periods * std::max(period_, steps.dt)};
   }
 
+  LongestStep longest_;
   double since_ = -1.0;                    // the last answer [s]; below 0: there was none
   double period_ = 0.0;                    // between answers [s]
   double late_ = 0.0;                      // age of the last answer when it came [s]
-  double step_ = 0.0;                      // the longest one lately, or a little more [s]
   double window_ = 0.0;                    // in which the patches' impulses were given [s]
   double advance_ = 0.0;                   // length of the last one [s]
-  double advance_before_ = 0.0;            // and of the one before [s]
   double intervals_[intervals_kept] = {};  // between answers, the last one first; 0: none [s]
 };
 
