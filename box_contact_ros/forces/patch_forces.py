@@ -255,10 +255,10 @@ class PatchForces:
 
     def wrenches(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
                  wrenches: ArrayLike | None = None) -> np.ndarray:
-        """Return the mean wrenches (n, 6) of contacts over a step, for who moves the bodies by them.
+        """Return the mean wrenches (n, 6) of contacts over a step, which then move the bodies.
 
-        Call it instead of `advance`, with the same arguments. The next call takes velocities to which
-        these wrenches led, and removes the speed of pushing out from them.
+        Call it instead of `advance`, with the same arguments. The next call takes the velocities to
+        which these wrenches led, and removes the speed of pushing out from them.
         ValueError: names field and value; nothing changes then.
         """
         return _step(self._native.wrenches, dt, poses, velocities, wrenches)

@@ -72,7 +72,8 @@ def main() -> None:
         if step % STEPS == LATE:
             forces.hold(answer.pairs)
         velocities[0] = velocity_of(data)
-        data.xfrc_applied[1] = forces.wrenches(STEP, np.array([pose, STACK]), velocities, weights)[0]
+        poses = np.array([pose, STACK])
+        data.xfrc_applied[1] = forces.wrenches(STEP, poses, velocities, weights)[0]
         mujoco.mj_step(model, data)
         if step + 1 in (60, 130, 260, 510, 1010):
             depth = max(0.0, -answer.contacts.separation.min(initial=0.0))

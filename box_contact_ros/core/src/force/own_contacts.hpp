@@ -53,28 +53,29 @@ class OwnContacts {
   }
 
   // Solve all pairs with the bodies at `poses`. `solve(rows, count, results)` answers rows, and returns
-  // the first that is refused, or −1; so does this.
-  template <class Solve>
-  long solve(const bc_pose* poses, const Solve& solve) {
+  // the first that is refused, or −1; so does this. A pair apart by no more than `reach(a, b, normal)`
+  // [m], and by no more than `farthest`, gets the patch that it has once it touches, and keeps its
+  // separation above zero.
+  template <class Solve, class Reach>
+  long solve(const bc_pose* poses, double farthest, const Solve& solve, const Reach& reach) {
     for (size_t k = 0; k < boxes_.size(); ++k)
       poses_[k] = in_common_frame(poses[boxes_[k].body], boxes_[k].box.pose);
     auto* numbers = reinterpret_cast<const double*>(poses_.data());
     auto* sizes = reinterpret_cast<const double*>(sizes_.data());
     detail::Rows rows{numbers, numbers, sizes, sizes, 3, 3, pairs_.data(), long(boxes_.size())};
-    detail::Results results{nullptr,        separation_.data(), normal_.data(), point_.data(),
-                            volume_.data(), covariance_.data(), nullptr,        0.0};
-    return solve(rows, long(count()), results);
+    long refused = solve(rows, long(count()), found_.results(farthest));
+    return refused >= 0 ? refused : solve_near(solve, reach);
   }
   // What was solved last.
   bc_patches answer() const {
     return {sizeof(bc_patches),
             int64_t(count()),
             pairs_.data(),
-            separation_.data(),
-            normal_.data(),
-            point_.data(),
-            volume_.data(),
-            covariance_.data(),
+            found_.separation.data(),
+            found_.normal.data(),
+            found_.point.data(),
+            found_.volume.data(),
+            found_.covariance.data(),
             friction_.data(),
             surface_.data(),
             stiffness_.data(),
@@ -83,11 +84,91 @@ class OwnContacts {
   }
 
  private:
+  // Answers to rows.
+  struct Columns {
+    std::vector<double> separation, normal, point, volume, covariance;
+
+    void resize(size_t n) {
+      separation.resize(n);
+      volume.resize(n);
+      for (auto* column : {&normal, &point}) column->resize(3 * n);
+      covariance.resize(9 * n);
+    }
+    detail::Results results(double margin) {
+      return {nullptr,       separation.data(), normal.data(), point.data(),
+              volume.data(), covariance.data(), nullptr,       margin};
+    }
+    // Take the patch of another row; the separation stays.
+    void take_patch(size_t row, const Columns& other, size_t from) {
+      volume[row] = other.volume[from];
+      std::copy_n(&other.normal[3 * from], 3, &normal[3 * row]);
+      std::copy_n(&other.point[3 * from], 3, &point[3 * row]);
+      std::copy_n(&other.covariance[9 * from], 9, &covariance[9 * row]);
+    }
+  };
+  // Pairs that are a little apart, moved together along the normal.
+  struct Near {
+    std::vector<size_t> row;
+    std::vector<bc_pose> pose_a, pose_b;
+    std::vector<bc_size> size_a, size_b;
+    Columns found;
+
+    void reserve(size_t n) {
+      row.reserve(n);
+      for (auto* poses : {&pose_a, &pose_b}) poses->reserve(n);
+      for (auto* sizes : {&size_a, &size_b}) sizes->reserve(n);
+      found.resize(n);
+    }
+    void clear() {
+      row.clear();
+      for (auto* poses : {&pose_a, &pose_b}) poses->clear();
+      for (auto* sizes : {&size_a, &size_b}) sizes->clear();
+    }
+    void add(size_t k, const bc_pose& a, bc_pose b, const bc_size& of_a, const bc_size& of_b,
+             const Vec<double>& way) {
+      for (int i = 0; i < 3; ++i) b.position[i] += way[i];
+      row.push_back(k);
+      pose_a.push_back(a);
+      pose_b.push_back(b);
+      size_a.push_back(of_a);
+      size_b.push_back(of_b);
+    }
+  };
+
   void resize(size_t n) {
     pairs_.resize(2 * n);
-    for (auto* column : {&friction_, &stiffness_, &separation_, &volume_}) column->resize(n);
-    for (auto* column : {&surface_, &normal_, &point_}) column->resize(3 * n);
-    covariance_.resize(9 * n);
+    for (auto* column : {&friction_, &stiffness_}) column->resize(n);
+    surface_.resize(3 * n);
+    found_.resize(n);
+    near_.reserve(n);
+  }
+  template <class Solve, class Reach>
+  long solve_near(const Solve& solve, const Reach& reach) {
+    near_.clear();
+    for (size_t k = 0; k < count(); ++k) {
+      double apart = found_.separation[k];
+      Vec<double> normal = vector_at(&found_.normal[3 * k]);
+      if (!(apart > 0.0) || normal[0] != normal[0]) continue;  // in contact, or beyond the farthest
+      auto a = size_t(pairs_[2 * k]), b = size_t(pairs_[2 * k + 1]);
+      if (apart <= reach(int32_t(a), int32_t(b), normal))
+        near_.add(k, poses_[a], poses_[b], sizes_[a], sizes_[b], -apart * normal);
+    }
+    if (near_.row.empty()) return -1;
+    auto numbers = [](const auto& rows) { return reinterpret_cast<const double*>(rows.data()); };
+    auto n = long(near_.row.size());
+    detail::Rows rows{numbers(near_.pose_a),
+                      numbers(near_.pose_b),
+                      numbers(near_.size_a),
+                      numbers(near_.size_b),
+                      3,
+                      3,
+                      nullptr,
+                      n};
+    long refused = solve(rows, n, near_.found.results(0.0));
+    if (refused >= 0) return long(near_.row[size_t(refused)]);
+    for (size_t i = 0; i < near_.row.size(); ++i)
+      if (near_.found.volume[i] > 0.0) found_.take_patch(near_.row[i], near_.found, i);
+    return -1;
   }
 
   std::vector<bc_body_box> boxes_;
@@ -95,7 +176,8 @@ class OwnContacts {
   std::vector<bc_pose> poses_;  // of the boxes, in the common frame
   std::vector<int64_t> pairs_;  // (n, 2)
   std::vector<double> friction_, surface_, stiffness_;
-  std::vector<double> separation_, normal_, point_, volume_, covariance_;
+  Columns found_;
+  Near near_;
   std::vector<BoxPair> keys_;
 };
 

@@ -25,7 +25,7 @@ struct Patch {
   Placed asked_a, asked_b;
   Vec<double> normal, point;
   Rectangle shape;
-  double depth;         // volume / area [m]
+  double depth;         // the lesser of volume / area and −separation; below 0: apart [m]
   double friction;      // μ [1]
   double stiffness;     // [N/m], up to what step and answers bear; 0: that
   Vec<double> surface;  // velocity of B's surface relative to A's, beside the bodies' own [m/s]
@@ -39,7 +39,7 @@ struct Patch {
   BoxPair pair() const { return {box_a, box_b}; }
 
   // Whether area and depth are numbers: what no limit of an answer alone makes sure of.
-  bool has_area() const { return shape.has_area() && depth >= 0.0 && depth <= place_max; }
+  bool has_area() const { return shape.has_area() && std::fabs(depth) <= place_max; }
 };
 
 // What a patch carried in the last advance: the sums of its impulses after relaxation.

@@ -31,6 +31,12 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
+// A pair is a constraint of a step while it is apart by no more than so many times what it would fall
+// in it [1]: g·dt² in the first step, as much again in the next.
+constexpr double gap_share = 2.0;
+// A patch that pressed stays while its pair is apart by no more than this [m]: flush sides of goods come
+// and go by nanometres, and with them the friction that bore weight.
+constexpr double pressed_gap = 1e-5;
 // Patches that a thread takes at a time: some 60 µs of work.
 constexpr size_t patches_per_chunk = 64;
 
@@ -103,12 +109,16 @@ class PatchForces {
     if (own_.count() == 0) drop([](const Patch&) { return true; });
     return Held::all;
   }
-  // Solve the contacts of one's own with the bodies at `poses`, and take them: see OwnContacts::solve.
+  // Solve the contacts of one's own at the start of a step `dt`, and take them: see OwnContacts::solve.
   template <class Solve>
-  long solve_own(const bc_pose* poses, const Solve& solve, Held& held) {
+  long solve_own(double dt, const bc_pose* poses, const bc_wrench* outside, const Solve& solve,
+                 Held& held) {
     held = Held::all;
     if (own_.count() == 0) return -1;
-    long refused = own_.solve(poses, solve);
+    long refused = own_.solve(poses, farthest(dt, outside), solve,
+                              [&](int32_t a, int32_t b, const Vec<double>& normal) {
+                                return reach(a, b, normal, dt, outside);
+                              });
     if (refused < 0) held = take(own_.answer(), poses);
     return refused;
   }
@@ -119,7 +129,11 @@ class PatchForces {
   template <class InThreads>
   void advance(double dt, const bc_pose* poses, const bc_velocity* velocities,
                const bc_wrench* outside, const bc_motion& motion, const InThreads& in_threads) {
-    Advance step{clock_.begin(dt, options_.substeps), poses, velocities, outside, motion,
+    Advance step{clock_.begin(dt, options_.substeps),
+                 poses,
+                 velocities,
+                 outside,
+                 motion,
                  moves_by_wrenches_};
     if (!is_grouped_) islands_.group(bodies_, patches_);
     is_grouped_ = true;
@@ -133,6 +147,32 @@ class PatchForces {
   }
 
  private:
+  // How far apart the boxes of a pair may be at the start of a step and be a constraint in it [m]: what
+  // the outside wrenches would fall. A gap would else cost each box of a stack a step of free fall.
+  double reach(int32_t box_a, int32_t box_b, const Vec<double>& normal, double dt,
+               const bc_wrench* outside) const {
+    auto pull = [&](int64_t box) {
+      auto body = size_t(body_of(box));
+      return outside
+                 ? std::fabs(dot(vector(outside[body].force), normal)) * bodies_[body].inverse_mass
+                 : 0.0;
+    };
+    return std::max(gap_share * dt * dt * std::max(pull(box_a), pull(box_b)),
+                    has_pressed(box_a, box_b) ? pressed_gap : 0.0);
+  }
+  double farthest(double dt, const bc_wrench* outside) const {
+    double pull = 0.0;
+    for (size_t k = 0; outside && k < bodies_.size(); ++k)
+      pull = std::max(pull, length(vector(outside[k].force)) * bodies_[k].inverse_mass);
+    return std::min(std::max(gap_share * dt * dt * pull, pressed_gap), length_max);
+  }
+  bool has_pressed(int32_t box_a, int32_t box_b) const {
+    BoxPair pair = std::minmax(box_a, box_b);
+    auto before = [](const Patch& patch, const BoxPair& pair) { return patch.pair() < pair; };
+    auto found = std::lower_bound(patches_.begin(), patches_.end(), pair, before);
+    return found != patches_.end() && found->pair() == pair && found->normal_impulse > 0.0;
+  }
+
   bool is_of_boxes(const Patch& patch) const {
     return 0 <= patch.box_a && patch.box_a < patch.box_b && patch.box_b < box_count() &&
            body_of(patch.box_a) == patch.a && body_of(patch.box_b) == patch.b && patch.a >= 0 &&
@@ -200,7 +240,9 @@ class PatchForces {
       bool is_b = bodies_[size_t(patch.a)].inverse_mass < bodies_[size_t(patch.b)].inverse_mass;
       return axes_of(is_b ? patch.box_b : patch.box_a, poses[is_b ? patch.b : patch.a]);
     });
-    patch.depth = answer.volume[k] / (4.0 * patch.shape.half_1 * patch.shape.half_2);
+    // Of the mere touch on a large floor, whose volume is that of a box pressed in to 1e-9 of the size.
+    patch.depth = std::min(answer.volume[k] / (4.0 * patch.shape.half_1 * patch.shape.half_2),
+                           -answer.separation[k]);
     patch.friction = answer.friction ? answer.friction[k] : options_.friction;
     patch.stiffness = answer.stiffness ? answer.stiffness[k] : 0.0;
     if (answer.surface) patch.surface = sign * vector_at(answer.surface + 3 * k);

@@ -171,7 +171,7 @@ bc_status explain(PatchForces::Held held) {
 }
 
 // Solve the contacts of one's own, and take them.
-bc_status solve_own(PatchForces& self, const bc_pose* poses) {
+bc_status solve_own(PatchForces& self, double dt, const bc_pose* poses, const bc_wrench* outside) {
   const Kernel* kernel = chosen_kernel();
   if (!kernel) return fail(BC_BAD_ENVIRONMENT, "BOX_CONTACT_INSTRUCTION_SET is unknown");
   auto solve = [&](const Rows& rows, long count, const Results& results) {
@@ -180,7 +180,7 @@ bc_status solve_own(PatchForces& self, const bc_pose* poses) {
                       counts);
   };
   PatchForces::Held held;
-  long refused = self.solve_own(poses, solve, held);
+  long refused = self.solve_own(dt, poses, outside, solve, held);
   if (refused >= 0) return fail(BC_BAD_POSE, "pairs[%ld]: a box is beyond 1e50 m", refused);
   return explain(held);
 }
@@ -334,7 +334,7 @@ bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, const bc_p
     if (!read(motion, all)) return fail(BC_BAD_ABI, "motion.size is unknown");
     if (bc_status status = check_step(dt, bodies, poses, velocities, outside)) return status;
     PatchForces& self = forces_of(forces);
-    if (bc_status status = solve_own(self, poses)) return status;
+    if (bc_status status = solve_own(self, dt, poses, outside)) return status;
     self.advance(
         dt, poses, velocities, outside, all,
         [](long threads, long chunks, const auto& work) { in_threads(threads, chunks, work); });
