@@ -7,6 +7,7 @@ from __future__ import annotations
 import copy
 import math
 import pickle
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -143,6 +144,18 @@ def test_a_yard_leaves_few_pairs():
     assert 0 < answer.near < 10
     assert_same(answer, alone(scene, {'load': down}))
     assert answer.touching == 1
+
+
+def test_a_hundred_thousand_boxes():
+    """They become a scene in seconds: the time goes with their number, not with its square."""
+    n, begin = 100_000, time.process_time()
+    boxes = {f'box{k}': Box((1.0, 1.0, 1.0), (2.0 * k, 0, 0, 0, 0, 0, 1) if k % 2 else None)
+             for k in range(n)}
+    scene = Scene(boxes, patterns=EVERY_PAIR, pose_array=True)
+    SceneSolver(scene)
+    fixed = n // 2
+    assert scene.pair_count == n * (n - 1) // 2 - fixed * (fixed - 1) // 2
+    assert time.process_time() - begin < 15.0
 
 
 def test_one_pair_with_a_fixed_box():
