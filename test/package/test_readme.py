@@ -418,7 +418,16 @@ SOFT, LATE, PARALLEL = (constant(file, name) for file, name in (
 LENGTHS, QUATERNIONS = (
     ' to '.join(constant('poses.hpp', f'{what}_{end}') for end in ('min', 'max'))
     for what in ('length', 'quaternion'))
+HEADER = 'box_contact_ros/core/include/box_contact/box_contact.hpp'
+CERTIFICATE = 'overlap/certificate.hpp'
+ROUNDING = constant(CERTIFICATE, 'centroid_rounding')
 LIMITS = {
+    f'../{HEADER}': (
+        f'up to {constant("poses.hpp", "contact_ulps")} ulp of the largest',
+        f'max({constant(CERTIFICATE, "least_centroid_error")}, {ROUNDING} · size / depth) · size',
+        f'max({constant(CERTIFICATE, "least_covariance_error")}, {ROUNDING} · size / depth) of the '
+        'trace',
+        f'shallower than {constant("minimum_depth.hpp", "depth_floor")} · size'),
     'contributing/decisions/patch-law.md': (
         f'Frequency of {SOFT}/window', f'Frequency of {LATE}/T',
         f'Damping ratio {constant(FORCES, "soft_damping_ratio")}',
@@ -467,11 +476,11 @@ LIMITS = {
         f'More than {topics.MOST_PAIRS_WITH_TOPICS:,} pairs need `pair_topics:=false`',
         f'for {pairing.PATIENCE} later ticks'),
 }
-"""What pages say of limits and constants of the code."""
+"""What pages and the C++ header say of limits and constants of the code, by paths from docs/."""
 
 
 def words_of(page: str) -> str:
-    """Return the text of a page below docs/ in one line."""
+    """Return the text of a page, by its path from docs/, in one line."""
     return ' '.join((ROOT / 'docs' / page).read_text('utf-8').split())
 
 
