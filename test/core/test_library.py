@@ -227,7 +227,7 @@ def test_by_the_compiler_alone(tmp_path: Path) -> None:
 
 
 def test_without_exceptions(tmp_path: Path) -> None:
-    """The header compiles; what would be thrown ends the program."""
+    """The header compiles; the words of what would be thrown are printed, and the program ends."""
     source, program = tmp_path / 'one.cpp', tmp_path / 'one'
     source.write_text('#include "box_contact/box_contact.hpp"\n'
                       'int main(int argc, char**) {\n'
@@ -237,7 +237,9 @@ def test_without_exceptions(tmp_path: Path) -> None:
     run(tool('g++'), '-std=c++17', *STRICT, '-fno-exceptions', '-fno-rtti', INCLUDES,
         source, *LINKED, '-o', program)
     assert run(program) == ''
-    assert subprocess.run([program, 'flat']).returncode < 0
+    done = subprocess.run([program, 'flat'], stderr=subprocess.PIPE, text=True)
+    assert done.returncode < 0
+    assert done.stderr == 'box_contact: size_b (1, 1, 0) is not within 1e-50 to 1e50 m\n'
 
 
 def configure(source: Path, folder: Path, *options: str, **environment: str) -> None:
@@ -321,6 +323,35 @@ def test_a_debug_build_is_as_fast(tmp_path: Path) -> None:
     commands = json.loads((tmp_path / 'compile_commands.json').read_text())
     assert len(commands) >= 3
     assert all(' -O3 ' in command['command'] for command in commands)
+
+
+LIBRARY_CPP = 'box_contact_ros/core/src/library/library.cpp'
+OTHER_FLAGS = f"""
+cmake_minimum_required(VERSION 3.18)
+project(others LANGUAGES CXX)
+add_compile_options(-fno-exceptions -fno-rtti -fsanitize=address,undefined)
+add_subdirectory({ROOT} box_contact)
+"""
+
+
+@pytest.mark.parametrize('wanted', ['OFF', 'ON'])
+def test_a_part_of_a_project_without_exceptions_and_with_sanitizers(
+        tmp_path: Path, wanted: str) -> None:
+    """The library keeps its exceptions; its kernels are sanitized where that is asked for alone."""
+    (tmp_path / 'CMakeLists.txt').write_text(OTHER_FLAGS)
+    run(tool('cmake'), '-S', tmp_path, '-B', tmp_path, '-DCMAKE_EXPORT_COMPILE_COMMANDS=ON',
+        f'-DBOX_CONTACT_SANITIZE={wanted}')
+    commands = json.loads((tmp_path / 'compile_commands.json').read_text())
+    kernels = [command for command in commands if command['file'].endswith('kernel.cpp')]
+    assert len(kernels) >= 1
+    for command in commands:
+        words = shlex.split(command['command'])
+        assert words.index('-fexceptions') > words.index('-fno-exceptions')
+        is_sanitized = command not in kernels or wanted == 'ON'
+        assert ('-fno-sanitize=all' in words[words.index('-fsanitize=address,undefined'):]) != (
+            is_sanitized)
+    if wanted == 'OFF':
+        run('make', '-C', tmp_path / 'box_contact', f'{LIBRARY_CPP}.o')
 
 
 # --- machines -------------------------------------------------------------------------------------

@@ -42,6 +42,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <new>
 #include <optional>
@@ -89,7 +90,8 @@ class Span {
 
 namespace detail {
 
-// Without exceptions (-fno-exceptions) the program ends; such programs call box_contact.h instead.
+// Without exceptions (-fno-exceptions) the words are printed, and the program ends; call box_contact.h
+// where it must go on.
 [[noreturn]] inline void raise(bc_status status, const char* words) {
 #if defined(__cpp_exceptions) || defined(_CPPUNWIND)
   if (status == BC_NO_MEMORY) throw std::bad_alloc();
@@ -97,7 +99,8 @@ namespace detail {
     throw std::runtime_error(words);
   throw std::invalid_argument(words);
 #else
-  (void)status, (void)words;
+  (void)status;
+  std::fprintf(stderr, "box_contact: %s\n", words);
   std::abort();
 #endif
 }
