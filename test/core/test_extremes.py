@@ -14,6 +14,7 @@ import poses
 import pytest
 from poses import Pairs
 
+from box_contact_ros import ContactSolver
 from box_contact_ros.core import LENGTH_MAX, LENGTH_MIN, native
 from box_contact_ros.models.networks import core_numbers
 from box_contact_ros.models.weights_file import Network
@@ -52,6 +53,20 @@ def accepted(pairs: Pairs) -> np.ndarray:
         for size in pairs[2:]:
             good &= ((size >= LENGTH_MIN) & (size <= LENGTH_MAX)).all(axis=1)
     return good
+
+
+@pytest.mark.parametrize('model', ['exact', 'mlp'])
+def test_no_volume_is_negative(model: str) -> None:
+    """Of parallel boxes that touch, of extents a volume of which rounding leaves nothing."""
+    rng = np.random.default_rng(8)
+    size_a, size_b = 10.0 ** rng.uniform(-50.0, 50.0, (2, N, 3))
+    size_b = np.where(rng.random((N, 1)) < 0.5, size_a, size_b)
+    a = np.tile(poses.IDENTITY, (N, 1))
+    b = a.copy()
+    b[:, :3] = 0.5 * (size_a + size_b) * rng.choice([-1.0, 0.0, 0.5, 1.0, 1.0 - 1e-10], (N, 3))
+    found = ContactSolver(model=model).batch(a, b, size_a=size_a, size_b=size_b)
+    assert found.colliding.mean() > 0.5
+    assert np.all(found.volume >= 0.0)
 
 
 def outside(pose: np.ndarray, size: np.ndarray, point: np.ndarray) -> np.ndarray:

@@ -26,18 +26,20 @@ BC_INLINE Mask<T> are_parallel(const Pair<T>& pair) {
 }
 
 // Find the overlap of parallel boxes. It is pressed in as `enforce_minimum_depth` does: to the minimum
-// depth along the normal, and along the axes on which less than half of it is left.
+// depth along the normal, and along the axes on which less than half of it is left. Plates thinner than
+// the minimum depth are pressed in to their thickness, and not through each other.
 template <class T, class Found>
 BC_INLINE void overlap_by_intervals(const Pair<T>& pair, const Triple<T>& normal, Found& found) {
   Triple<T> zero{}, offset = pair.offset_a, reach = abs(pair.b_in_a) * pair.half_b;
   Triple<T> depth = (pair.half_a + reach) - abs(offset);
-  Triple<T> floor = uniform(T(depth_floor * pair.size));
+  Triple<T> floor = min(uniform(T(depth_floor * pair.size)), 2.0 * min(pair.half_a, reach));
   Flags<T> is_normal = abs(normal) > uniform(splat<T>(0.5));
   Flags<T> is_shallow = choose(is_normal, floor, 0.5 * floor) > depth;
   Triple<T> closer = choose(is_shallow, floor - depth, zero);
   offset = offset - choose(offset >= zero, closer, -closer);
   Triple<T> high = min(pair.half_a, offset + reach), low = max(-pair.half_a, offset - reach);
-  Triple<T> width = high - low;
+  // The offset may be rounded by more than a thin plate has.
+  Triple<T> width = choose(high > low, high - low, floor);
   found.volume = (width[0] * width[1]) * width[2];
   found.centroid = components<T>(point_in_common_frame(pair, Triple<T>(0.5 * (high + low))));
   if constexpr (std::is_same_v<Found, Moments<T>>) {
