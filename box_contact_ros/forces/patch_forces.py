@@ -24,7 +24,15 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core import INERTIA_SLACK, LENGTH_MAX, MASS_MAX, MASS_MIN, THREADS_MAX, native
+from ..core import (
+    INERTIA_SLACK,
+    ITERATIONS_MAX,
+    LENGTH_MAX,
+    MASS_MAX,
+    MASS_MIN,
+    THREADS_MAX,
+    native,
+)
 from ..solver.checks import (
     as_floats,
     as_number,
@@ -45,7 +53,6 @@ GRAVITY = 9.81
 FRICTION = 0.5
 """Coulomb's μ [1], steel on steel, dry."""
 
-_MOST = 2**31 - 1  # an int of C
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,12 +184,13 @@ class PatchForces:
         iterations: of sequential impulses in a sub-step, at most.
         relaxations: further iterations, which remove the speed of pushing out.
         threads: at most. They change no bit.
+        substeps, iterations and relaxations may be 1,000 each.
         ValueError: names the field and its value.
         """
         self._native = native.PatchForces(
-            *_columns(bodies), as_whole(substeps, 'substeps', 1, _MOST),
-            as_whole(iterations, 'iterations', 1, _MOST),
-            as_whole(relaxations, 'relaxations', 0, _MOST),
+            *_columns(bodies), as_whole(substeps, 'substeps', 1, ITERATIONS_MAX),
+            as_whole(iterations, 'iterations', 1, ITERATIONS_MAX),
+            as_whole(relaxations, 'relaxations', 0, ITERATIONS_MAX),
             as_whole(threads, 'threads', 1, THREADS_MAX), as_number(friction, 'friction'))
 
     def set_bodies(self, bodies: Sequence[Body]) -> None:

@@ -105,6 +105,26 @@ def test_a_copy_has_boxes_and_pairs() -> None:
         assert one.tobytes() == other.tobytes()
 
 
+@pytest.mark.parametrize('own', [True, False])
+def test_a_step_beyond_float64_names_the_body_and_changes_nothing(own: bool) -> None:
+    rows = *askew(), ((1.0, 1.0, 1.0), 100.0, (9.0, 0, 0.501))
+    world, twin = World(*rows).run(0.1), World(*rows).run(0.1)
+    pairs = np.array([(a, b) for a in range(7) for b in range(a + 1, 7)])
+    contacts = ContactSolver().batch(world.poses, sizes=world.size, pairs=pairs)
+    for each in () if own else (world, twin):
+        each.forces.hold(pairs, contacts, each.poses)
+    poses, wild = world.poses.copy(), world.outside.copy()
+    wild[6, 3:] = 1e100
+    with pytest.raises(ValueError, match=r'^bodies\[6\]: in a step of 0.001 s its numbers leave'):
+        world.forces.advance(STEP, world.poses, world.velocities, wild)
+    assert np.array_equal(world.poses, poses)
+    for one, two in zip(world.forces.loads(), twin.forces.loads()):
+        assert one.tobytes() == two.tobytes()
+    for each in (world, twin):
+        each.run(0.02)
+    assert world.poses.tobytes() == twin.poses.tobytes()
+
+
 def test_threads_change_no_bit() -> None:
     places = [(k % 20 - 10, k // 20 % 10 - 5, 0.26 + 0.52 * (k // 200)) for k in range(400)]
     rows = [FLOOR, *(((0.5, 0.5, 0.5), 50.0, place, turned((1, 1, 0), 0.01 * (k % 7)))

@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The library as a Python extension: its functions and types.
-#include "../src/force/rectangle.hpp"
-#include "../src/force/rigid_body.hpp"
+#include "../src/force/patch_forces.hpp"
 #include "broad_phase.hpp"
 #include "forces.hpp"
 #include "pair_solver.hpp"
@@ -99,7 +98,8 @@ PyObject* make_module() {
                              {"FEATURES", detail::network_features},
                              {"OUTPUTS", detail::network_outputs},
                              {"UNITS_MAX", detail::network_units_max},
-                             {"THREADS_MAX", detail::threads_max}})
+                             {"THREADS_MAX", detail::threads_max},
+                             {"ITERATIONS_MAX", force::iterations_max}})
     add(name, PyLong_FromLong(value));
   using Real = std::pair<const char*, double>;
   for (auto [name, value] : {Real{"LENGTH_MIN", length_min},

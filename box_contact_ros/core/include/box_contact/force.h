@@ -79,9 +79,9 @@ typedef struct bc_patches {
 typedef struct bc_force_options {
   size_t size;     /* sizeof(bc_force_options) */
   int substeps;    /* equal parts of an advance, more if 5 ms are exceeded; heavy bodies on light
-                      ones need them */
-  int iterations;  /* of sequential impulses in a sub-step, at most */
-  int relaxations; /* iterations more, at most, which remove the speed of pushing out */
+                      ones need them; 1 to 1,000 */
+  int iterations;  /* of sequential impulses in a sub-step, at most; 1 to 1,000 */
+  int relaxations; /* iterations more, at most, which remove the speed of pushing out; 0 to 1,000 */
   int threads;     /* 1 to 1,024; bodies that patches join are moved by one of them */
   double friction; /* Coulomb's μ [1] */
 } bc_force_options;
@@ -144,7 +144,9 @@ BC_API bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches*
 /* Advance by `dt` seconds: 1e-50 or more, and less than 1. Steps may differ in length. `outside` are
  * the wrenches beside those of contacts, gravity among them, constant over the step; NULL: none.
  * Without poses and velocities in `motion`, the wrenches are taken to move the bodies until the next
- * advance, which then removes the speed of pushing out. */
+ * advance, which then removes the speed of pushing out.
+ * BC_BAD_ARGUMENT, and nothing changes, for numbers beyond the limits above, and where those of a body
+ * would leave the range of float64: the text names it. */
 BC_API bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, const bc_pose* poses,
                                          const bc_velocity* velocities, const bc_wrench* outside,
                                          const bc_motion* motion);

@@ -32,6 +32,7 @@ struct Moving {
   double quaternion[4];  // of length 1
   Placed placed;
   Vec<double> impulse, angular_impulse;  // of contacts, since the advance began [N s], [N m s]
+  Motion pushed;  // its velocities before relaxation, at the end of the advance
 
   // Move by the velocities for a time.
   void move(double h) {

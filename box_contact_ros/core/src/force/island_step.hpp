@@ -6,6 +6,8 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include "clock.hpp"
@@ -21,6 +23,9 @@ constexpr double least_change = 1e-8;
 // than this [m/s]. What is left of a closing speed comes back as an overlap that is pushed out.
 constexpr double impact_change = 0.01;
 constexpr int impact_iterations = 100;
+
+// Most sub-steps, iterations or relaxations: their product is a number of 32 bits.
+constexpr int iterations_max = 1000;
 
 struct Options {
   int substeps, iterations, relaxations, threads;
@@ -81,8 +86,18 @@ class IslandStep {
       for (size_t k = island.block; k < island.block_end; ++k)
         store(blocks_[k], now.kept, patches_[size_t(blocks_[k].patch)]);
     }
-    for (size_t k = island.body; k < island.body_end; ++k) write_end(moving_[k]);
-    for (size_t k = island.block; k < island.block_end; ++k) end(blocks_[k]);
+  }
+
+  // The first body whose numbers are not finite at the end of the islands, or −1.
+  int64_t first_lost() const {
+    for (const Moving& moving : moving_)
+      if (!ends_finite(moving)) return moving.body;
+    return -1;
+  }
+  // Write where the islands end.
+  void write_ends() const {
+    for (const Moving& moving : moving_) write_end(moving);
+    for (const Block& block : blocks_) end(block);
   }
 
   // A body that no force moves goes on by its velocity. One that rests keeps its pose to the bit.
@@ -195,25 +210,31 @@ class IslandStep {
       count(block, moving_[size_t(block.a)], moving_[size_t(block.b)]);
     }
   }
-  // Write what pushing out leads to: the wrenches that do so if they are constant over the advance.
   void end_pushing(const Island& island) const {
     if (step_.motion.wrenches) count_impulses(island);
-    double rate = 1.0 / step_.steps.dt;
     for (size_t k = island.body; k < island.body_end; ++k) {
-      const Moving& moving = moving_[k];
-      auto body = size_t(moving.body);
-      if (!bodies_[body].is_free()) continue;
-      ended_[body].pushed = {moving.linear, moving.angular};
-      if (step_.motion.wrenches)
-        write(rate * moving.impulse, rate * moving.angular_impulse,
-              step_.motion.wrenches[body].force, step_.motion.wrenches[body].torque);
+      Moving& moving = moving_[k];
+      moving.pushed = {moving.linear, moving.angular};
     }
   }
+  // A sum is finite only if all its numbers are.
+  bool ends_finite(const Moving& moving) const {
+    double rate = 1.0 / step_.steps.dt, norm2 = squared_norm(moving.quaternion), sum = norm2;
+    for (const Vec<double>& v : {moving.placed.position, moving.linear, moving.angular,
+                                 rate * moving.impulse, rate * moving.angular_impulse})
+      sum += std::fabs(v[0]) + std::fabs(v[1]) + std::fabs(v[2]);
+    return std::isfinite(sum) && norm2 > 0.0;
+  }
+  // The wrenches lead to the speeds of pushing out if they are constant over the advance.
   void write_end(const Moving& moving) const {
     auto k = size_t(moving.body);
     if (!bodies_[k].is_free()) return;
-    ended_[k].relaxed = {moving.linear, moving.angular};
+    double rate = 1.0 / step_.steps.dt;
+    ended_[k] = {moving.pushed, {moving.linear, moving.angular}};
     write_pose(moving);
+    if (step_.motion.wrenches)
+      write(rate * moving.impulse, rate * moving.angular_impulse, step_.motion.wrenches[k].force,
+            step_.motion.wrenches[k].torque);
     if (step_.motion.velocities)
       write(moving.linear, moving.angular, step_.motion.velocities[k].linear,
             step_.motion.velocities[k].angular);

@@ -125,10 +125,11 @@ class PatchForces {
 
   // From poses, velocities and outside wrenches at the start of a step `dt` to poses and velocities at
   // its end. Or to the mean wrenches of contacts, with those that push overlaps out. `in_threads` shares
-  // chunks of work among threads.
+  // chunks of work among threads. Returns −1, or a body whose numbers are not finite at the end: then
+  // all is as it was at the last `keep`.
   template <class InThreads>
-  void advance(double dt, const bc_pose* poses, const bc_velocity* velocities,
-               const bc_wrench* outside, const bc_motion& motion, const InThreads& in_threads) {
+  int64_t advance(double dt, const bc_pose* poses, const bc_velocity* velocities,
+                  const bc_wrench* outside, const bc_motion& motion, const InThreads& in_threads) {
     Advance step{clock_.begin(dt, options_.substeps),
                  poses,
                  velocities,
@@ -137,13 +138,27 @@ class PatchForces {
                  moves_by_wrenches_};
     if (!is_grouped_) islands_.group(bodies_, patches_);
     is_grouped_ = true;
-    loads_.resize(patches_.size());
     IslandStep islands(options_, bodies_, step, ended_, patches_, loads_, islands_);
     in_chunks(in_threads, [&](const Island& island) { islands.advance(island); });
+    int64_t lost = islands.first_lost();
+    if (lost >= 0) {
+      patches_.swap(kept_patches_);
+      clock_ = kept_clock_;
+      is_grouped_ = false;
+      return lost;
+    }
+    loads_.resize(patches_.size());
+    islands.write_ends();
     for (size_t k = 0; k < bodies_.size(); ++k)
       if (!bodies_[k].is_free()) islands.move_alone(k);
     clock_.end(dt);
     moves_by_wrenches_ = motion.wrenches && !motion.poses && !motion.velocities;
+    return -1;
+  }
+  // Keep what an advance changes before its end, for one that fails.
+  void keep() {
+    kept_patches_ = patches_;
+    kept_clock_ = clock_;
   }
 
  private:
@@ -183,6 +198,7 @@ class PatchForces {
     if (patches > room_) room_ = std::max(patches, 2 * room_);
     patches_.reserve(room_);
     next_.reserve(room_);
+    kept_patches_.reserve(room_);
     loads_.reserve(room_);
     islands_.make_room(bodies_.size(), room_);
   }
@@ -304,6 +320,8 @@ class PatchForces {
   std::vector<Load> loads_;            // of the last advance, by pair
   // Memory that calls use again.
   Islands islands_;
+  std::vector<Patch> kept_patches_;  // for an advance that fails
+  Clock kept_clock_;
   size_t room_ = 0;          // for patches
   bool is_grouped_ = false;  // whether islands are those of the patches
 };

@@ -127,10 +127,16 @@ bc_status check_row(const bc_patches& answer, size_t k, const PatchForces& self)
 }
 
 bc_status check_options(const bc_force_options& all) {
-  for (auto [field, count] : {std::pair("substeps", all.substeps), {"iterations", all.iterations}})
-    if (count < 1) return fail(BC_BAD_ARGUMENT, "%s must be 1 or more, not %d", field, count);
-  if (all.relaxations < 0)
-    return fail(BC_BAD_ARGUMENT, "relaxations must be 0 or more, not %d", all.relaxations);
+  struct Count {
+    const char* field;
+    int least, count;
+  };
+  for (auto [field, least, count] :
+       {Count{"substeps", 1, all.substeps}, Count{"iterations", 1, all.iterations},
+        Count{"relaxations", 0, all.relaxations}})
+    if (count < least || count > force::iterations_max)
+      return fail(BC_BAD_ARGUMENT, "%s must be within %d and %d, not %d", field, least,
+                  force::iterations_max, count);
   if (all.threads < 1 || all.threads > threads_max)
     return fail(BC_BAD_ARGUMENT, "threads must be within 1 and %d, not %d", threads_max,
                 all.threads);
@@ -334,11 +340,17 @@ bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, const bc_p
     if (!read(motion, all)) return fail(BC_BAD_ABI, "motion.size is unknown");
     if (bc_status status = check_step(dt, bodies, poses, velocities, outside)) return status;
     PatchForces& self = forces_of(forces);
+    self.keep();
     if (bc_status status = solve_own(self, dt, poses, outside)) return status;
-    self.advance(
+    int64_t lost = self.advance(
         dt, poses, velocities, outside, all,
         [](long threads, long chunks, const auto& work) { in_threads(threads, chunks, work); });
-    return BC_OK;
+    if (lost < 0) return BC_OK;
+    return fail(
+        BC_BAD_ARGUMENT,
+        "bodies[%lld]: in a step of %g s its numbers leave the range of float64; try a shorter "
+        "step, or a larger mass and inertia",
+        (long long)lost, dt);
   });
 }
 
