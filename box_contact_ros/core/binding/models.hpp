@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "../src/library/batch.hpp"
+#include "../src/mlp/format.hpp"
 #include "../src/mlp/shipped_network.hpp"
 #include "contacts.hpp"
 #include "pair_arrays.hpp"

@@ -38,7 +38,7 @@ inline PyObject* mlp_inputs(PyObject*, PyObject* const* args, Py_ssize_t count) 
     const Query<double>* queries[] = {&q};
     mlp::PatchBox<double> box(queries);
     mlp::Cuts<float> cuts(box);
-    std::copy_n(cuts.told, features_count, features.numbers + features_count * row);
+    std::copy_n(cuts.features, features_count, features.numbers + features_count * row);
     Triple<double> place = box.point(box.centre, 0);
     write(components<double>(point_in_common_frame(q.pair, place)), middle.numbers + 3 * row);
     Columns<double> common;

@@ -61,7 +61,7 @@ inline Bounds bounds_of(const Pose<double>& pose, const Vec<double>& half) {
 // level, up to the root. A search tests all bounds of a block at once.
 class BoundsTree {
  public:
-  // The boxes, by their places in the tree.
+  // The boxes, in the order of the tree.
   const std::vector<int32_t>& order() const { return order_; }
 
   // Whether searches since the tree was built have visited so many blocks that building it anew
@@ -85,16 +85,16 @@ class BoundsTree {
 
   // Take other bounds of the same boxes.
   void refit(const std::vector<Bounds>& bounds) {
-    for (size_t place = 0; place < order_.size(); ++place)
-      blocks_[place / width].set(place % width, bounds[size_t(order_[place])]);
+    for (size_t index = 0; index < order_.size(); ++index)
+      blocks_[index / width].set(index % width, bounds[size_t(order_[index])]);
     for (int level = 1; level < levels_; ++level)
       for (size_t below = starts_[level - 1]; below < starts_[level]; ++below) {
-        size_t place = below - starts_[level - 1];
-        blocks_[starts_[level] + place / width].set(place % width, blocks_[below].around());
+        size_t index = below - starts_[level - 1];
+        blocks_[starts_[level] + index / width].set(index % width, blocks_[below].around());
       }
   }
 
-  // Call `visit` with each box from place `first` on whose bounds overlap, until it returns false.
+  // Call `visit` with each box from index `first` on whose bounds overlap, until it returns false.
   // Returns whether it never did.
   template <class Visit>
   bool each_near(const Bounds& bounds, size_t first, Visit visit) {
@@ -111,8 +111,8 @@ class BoundsTree {
     Block() {
       for (auto& end : ends) std::fill_n(end, width, infinity);
     }
-    void set(size_t place, const Bounds& bounds) {
-      for (int k = 0; k < 6; ++k) ends[k][place] = bounds.ends[k];
+    void set(size_t index, const Bounds& bounds) {
+      for (int k = 0; k < 6; ++k) ends[k][index] = bounds.ends[k];
     }
     Bounds around() const {
       Bounds bounds = nowhere;
@@ -124,14 +124,14 @@ class BoundsTree {
     unsigned overlapping(const Bounds& bounds) const {
       using Two = Lanes<double, 2>;
       unsigned found = 0;
-      for (size_t place = 0; place < width; place += 2) {
+      for (size_t index = 0; index < width; index += 2) {
         Two gap = splat<Two>(-infinity);
         for (int k = 0; k < 6; ++k) {
           Two end;
-          std::memcpy(&end, &ends[k][place], sizeof end);
+          std::memcpy(&end, &ends[k][index], sizeof end);
           gap = max(end + splat<Two>(bounds.ends[(k + 3) % 6]), gap);
         }
-        found |= bits(gap <= 0.0) << place;
+        found |= bits(gap <= 0.0) << index;
       }
       return found;
     }
@@ -144,8 +144,8 @@ class BoundsTree {
     size_t begin = width * block, first_here = first >> (width_bits * level);
     if (first_here > begin) near &= ~0U << (first_here - begin);
     for (; near; near &= near - 1) {
-      size_t place = begin + size_t(__builtin_ctz(near));
-      if (level ? !each_below(level - 1, place, bounds, first, visit) : !visit(order_[place]))
+      size_t index = begin + size_t(__builtin_ctz(near));
+      if (level ? !each_below(level - 1, index, bounds, first, visit) : !visit(order_[index]))
         return false;
     }
     return true;

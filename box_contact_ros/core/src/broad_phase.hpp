@@ -209,16 +209,16 @@ class BroadPhase {
   // Returns false with too many pairs.
   bool search(bool all) {
     near_count_ = pairs_.size();
-    for (size_t place = 0; place < changed_.size(); ++place) {
+    for (size_t index = 0; index < changed_.size(); ++index) {
       if (!all && moving_tree_.is_worn()) build_moving();
-      int32_t box = changed_[place];
+      int32_t box = changed_[index];
       auto take = [&](int32_t other) {
         bool is_twice = !all && is_changed_[size_t(other)] && other <= box;
         return is_twice || add(box, other);
       };
       const Bounds& fat = fat_[size_t(box)];
       if (!fixed_tree_.each_near(fat, 0, take) ||
-          !moving_tree_.each_near(fat, all ? place + 1 : 0, take))
+          !moving_tree_.each_near(fat, all ? index + 1 : 0, take))
         return false;
     }
     return true;

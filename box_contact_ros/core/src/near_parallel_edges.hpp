@@ -120,10 +120,10 @@ BC_INLINE void find_precise_axis(Pair<T> pair, const Pose<T>& a, const Pose<T>& 
                inverse, tolerance);
   }
   Mask<T> chosen = found.doubtful & pair.valid;
-  Place<T> place = best.winner(tolerance);
+  Index<T> index = best.winner(tolerance);
   found.separation = select<T>(chosen, best.largest(), found.separation);
-  found.axis = select<Place<T>>(chosen, place, found.axis);
-  found.normal = select(chosen, axis_normal(pair, best, place), found.normal);
+  found.axis = select<Index<T>>(chosen, index, found.axis);
+  found.normal = select(chosen, axis_normal(pair, best, index), found.normal);
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET

@@ -68,18 +68,18 @@ class Queue {
   }
   BC_INLINE void finish() {
     if (waiting_->count) solve_waiting();
-    if (held_->count) solve_held(*held_);
+    if (pending_->count) solve_pending(*pending_);
   }
 
  private:
-  // A block that is held changes places with a free one.
+  // A block that is held is exchanged for a free one.
   BC_INLINE void solve(Block<T>*& block) {
-    if constexpr (Model::takes_two) {
-      if (held_->count) {
-        solve_held(*block);
+    if constexpr (Model::solves_two_blocks) {
+      if (pending_->count) {
+        solve_pending(*block);
       } else {
-        std::swap(held_, block);
-        held_->count = width<T>;
+        std::swap(pending_, block);
+        pending_->count = width<T>;
       }
     } else {
       typename Model::template Found<T> found{};
@@ -87,7 +87,7 @@ class Queue {
                touching = bits(block->query.touching);
       write_overlaps<T>(found, touching & ~left, block->rows, results_);
       for (left &= touching; left; left &= left - 1)
-        if (held_->take(*block, __builtin_ctz(left))) solve_held(*held_);
+        if (pending_->take(*block, __builtin_ctz(left))) solve_pending(*pending_);
     }
   }
   BC_INLINE void solve_waiting() {
@@ -96,18 +96,18 @@ class Queue {
     waiting_->count = 0;
   }
   // With the second of two blocks, where the model solves two at once.
-  [[gnu::noinline]] void solve_held(const Block<T>& second) {
+  [[gnu::noinline]] void solve_pending(const Block<T>& second) {
     typename Model::template Found<T> found{};
-    if constexpr (Model::takes_two) {
+    if constexpr (Model::solves_two_blocks) {
       typename Model::template Found<T> of_second;
-      model_.solve_two(held_->query, second.query, found, of_second);
+      model_.solve_two(pending_->query, second.query, found, of_second);
       write_overlaps<T>(of_second, bits(second.query.touching), second.rows, results_);
     } else {
-      held_->fill();
-      model_.solve_left(held_->query, found, counts_);
+      pending_->fill();
+      model_.solve_left(pending_->query, found, counts_);
     }
-    write_overlaps<T>(found, bits(held_->query.touching), held_->rows, results_);
-    held_->count = 0;
+    write_overlaps<T>(found, bits(pending_->query.touching), pending_->rows, results_);
+    pending_->count = 0;
   }
 
   const Model& model_;
@@ -116,7 +116,7 @@ class Queue {
   Block<T> blocks_[blocks_at_once + 2];
   Block<T>* next_[blocks_at_once];
   Block<T>* waiting_ = &blocks_[blocks_at_once];   // for others, to fill a block
-  Block<T>* held_ = &blocks_[blocks_at_once + 1];  // the first of two, or what the model left
+  Block<T>* pending_ = &blocks_[blocks_at_once + 1];  // the first of two, or what the model left
 };
 
 // A row alone. No model leaves it.

@@ -19,14 +19,14 @@ BC_INLINE bool want_overlap(const Results& results) {
   return results.point || results.volume || results.covariance;
 }
 
-// The numbers of row `row`: places of the poses and sizes of its boxes.
-struct RowPlaces {
+// Row `row`: the addresses of the poses and sizes of its boxes.
+struct RowAddresses {
   const double *pose_a, *pose_b, *size_a, *size_b;
 
-  RowPlaces() = default;
-  BC_INLINE RowPlaces(const Rows& rows, long row) {
+  RowAddresses() = default;
+  BC_INLINE RowAddresses(const Rows& rows, long row) {
     long of_a = row, of_b = row;
-    if (rows.pairs) of_a = place(rows, 2 * row), of_b = place(rows, 2 * row + 1);
+    if (rows.pairs) of_a = row_of(rows, 2 * row), of_b = row_of(rows, 2 * row + 1);
     pose_a = of_a < 0 ? nothing : rows.poses_a + 7 * of_a;
     pose_b = of_b < 0 ? nothing : rows.poses_b + 7 * of_b;
     size_a = of_a < 0 ? nothing : rows.sizes_a + rows.size_step_a * of_a;
@@ -39,7 +39,7 @@ struct RowPlaces {
                                         not_a_number, not_a_number, not_a_number};
 
   // The row of a box, or −1. Read once: another thread may change pairs that were checked.
-  BC_INLINE static long place(const Rows& rows, long number) {
+  BC_INLINE static long row_of(const Rows& rows, long number) {
     long found = long(*static_cast<const volatile int64_t*>(rows.pairs + number));
     return found < rows.pose_count ? found : -1;
   }
@@ -67,8 +67,8 @@ template <class T>
     load(every(rows.poses_a, 7), every(rows.poses_b, 7), every(rows.sizes_a, rows.size_step_a),
          every(rows.sizes_b, rows.size_step_b));
   } else {
-    RowPlaces at[width<T>];
-    for (int i = 0; i < width<T>; ++i) at[i] = RowPlaces(rows, min(first + i, last - 1));
+    RowAddresses at[width<T>];
+    for (int i = 0; i < width<T>; ++i) at[i] = RowAddresses(rows, min(first + i, last - 1));
     load([&](int i) { return at[i].pose_a; }, [&](int i) { return at[i].pose_b; },
          [&](int i) { return at[i].size_a; }, [&](int i) { return at[i].size_b; });
   }
@@ -89,14 +89,14 @@ template <class T>
   // Zeros keep no sign on a swap.
   Triple<T> from_a = select(q.pair.swapped, Triple<T>{} - from_first, from_first);
   Vec<T> normal = components<T>(select(near, from_a, none));
-  Place<T> axis = select<Place<T>>(q.pair.swapped, swapped_axis(q.axis.axis), q.axis.axis);
+  Index<T> axis = select<Index<T>>(q.pair.swapped, swapped_axis(q.axis.axis), q.axis.axis);
   T separation = select<T>(q.pair.valid, q.axis.separation, nothing);
   long count = min(last - first, long(width<T>));
   unsigned here = all >> (width<T> - count);
   if (results.normal) {
-    double* places[width<T>];
-    for (int i = 0; i < width<T>; ++i) places[i] = results.normal + 3 * (first + i);
-    store_rows(places, here, normal.v);
+    double* addresses[width<T>];
+    for (int i = 0; i < width<T>; ++i) addresses[i] = results.normal + 3 * (first + i);
+    store_rows(addresses, here, normal.v);
   }
   auto store = [&](auto* array, auto number_of) __attribute__((always_inline)) {
     if (!array) return;
@@ -123,10 +123,10 @@ template <class T>
 template <class T, class Found>
 [[gnu::noinline]] inline void write_overlaps(const Found& found, unsigned chosen,
                                              const long (&rows)[width<T>], const Results& results) {
-  double* places[width<T>];
+  double* addresses[width<T>];
   auto store = [&](double* array, int numbers, int from, const auto& x) {
-    for (int i = 0; i < width<T>; ++i) places[i] = array + (numbers * rows[i] + from);
-    store_rows(places, chosen, x);
+    for (int i = 0; i < width<T>; ++i) addresses[i] = array + (numbers * rows[i] + from);
+    store_rows(addresses, chosen, x);
   };
   if constexpr (Found::has_normal)
     if (results.normal) store(results.normal, 3, 0, found.normal.v);
@@ -150,9 +150,9 @@ template <class T, class Found>
 // Ask for the memory that rows will be written to, so that it is in the cache when they are solved.
 inline void fetch_rows(const Results& results, long first, long last) {
   constexpr long line = 64 / sizeof(double);
-  auto fetch = [&](const double* place, long numbers) {
-    for (long k = numbers * first; place && k < numbers * last; k += line)
-      __builtin_prefetch(place + k, 1);
+  auto fetch = [&](const double* array, long numbers) {
+    for (long k = numbers * first; array && k < numbers * last; k += line)
+      __builtin_prefetch(array + k, 1);
   };
   fetch(results.normal, 3);
   fetch(results.point, 3);

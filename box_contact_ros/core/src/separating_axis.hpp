@@ -51,8 +51,8 @@ constexpr int first_edge_axis = 6;
 template <class T>
 struct SeparatingAxis {
   T separation;      // largest gap [m]
-  Place<T> axis;     // 0–2 faces of A, 3–5 faces of B, 6 + 3 i + j for a_i × b_j
-  Place<T> face;     // best face axis, 0–5, whatever wins
+  Index<T> axis;     // 0–2 faces of A, 3–5 faces of B, 6 + 3 i + j for a_i × b_j
+  Index<T> face;     // best face axis, 0–5, whatever wins
   T face_gap;        // largest gap of all face axes [m]
   Triple<T> normal;  // unit vector along the axis, from A to B, in A's frame
   Mask<T> doubtful;  // rounding of an edge axis may matter: see near_parallel_edges.hpp
@@ -68,22 +68,22 @@ BC_INLINE SeparatingAxis<double> lane(const SeparatingAxis<T>& axis, int i) {
 // keep the earlier axis.
 template <class T, bool = packed<T>>
 struct BestAxis {
-  T gap, place, scale, largest_gap;
+  T gap, index, scale, largest_gap;
 
-  // Offer the axes at the places `first` to `first` + 2. `scales` give their vectors length one.
+  // Offer the axes with the indices `first` to `first` + 2. `scales` give their vectors length one.
   BC_INLINE void offer(int first, const Triple<T>& gaps, const Triple<T>& scales, T tolerance) {
-    if (first == 0) gap = largest_gap = gaps[0], place = T{}, scale = scales[0];
+    if (first == 0) gap = largest_gap = gaps[0], index = T{}, scale = scales[0];
     for (int k = first == 0; k < 3; ++k)
       offer_one(gaps[k], splat<T>(first + k), scales[k], tolerance);
   }
   BC_INLINE T largest() const { return largest_gap; }
-  BC_INLINE Place<T> winner(T) const { return Place<T>(place); }
+  BC_INLINE Index<T> winner(T) const { return Index<T>(index); }
 
  private:
   BC_INLINE void offer_one(T candidate_gap, T candidate, T candidate_scale, T tolerance) {
     Mask<T> wins = candidate_gap > gap + tolerance;
     gap = select<T>(wins, candidate_gap, gap);
-    place = select<T>(wins, candidate, place);
+    index = select<T>(wins, candidate, index);
     scale = select<T>(wins, candidate_scale, scale);
     largest_gap = max(largest_gap, candidate_gap);
   }
@@ -114,11 +114,11 @@ struct BestAxis<T, true> {
  private:
   [[gnu::noinline]] int first_of_near(T tolerance) const {
     T gap = offered[0][0];
-    int place = 0;
+    int index = 0;
     for (int n = 0; n < count; ++n)
       for (int k = 0; k < 3; ++k)
-        if (offered[n][k] > gap + tolerance) gap = offered[n][k], place = 3 * n + k;
-    return place;
+        if (offered[n][k] > gap + tolerance) gap = offered[n][k], index = 3 * n + k;
+    return index;
   }
 };
 
@@ -226,40 +226,40 @@ BC_INLINE void offer_edge_axes(const Pair<T>& pair, BestAxis<T>& best, Mask<T>& 
   doubtful = (gap <= pair.touch) & ((largest(largest_possible) > gap) | skipped_may_win);
 }
 
-// The edges of A and of B, 0 to 2, of the edge axis at a place.
-BC_INLINE int edge_of_a(int place) {
+// The edges of A and of B, 0 to 2, of the edge axis with an index.
+BC_INLINE int edge_of_a(int index) {
   static constexpr int8_t edges[15] = {0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 2, 2, 2};
-  return edges[place];
+  return edges[index];
 }
-BC_INLINE int edge_of_b(int place) {
+BC_INLINE int edge_of_b(int index) {
   static constexpr int8_t edges[15] = {0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2};
-  return edges[place];
+  return edges[index];
 }
 template <class T>
-BC_INLINE T edge_of_a(T place) {
-  return select<T>(place < double(first_edge_axis + 3), T{},
-                   select<T>(place < double(first_edge_axis + 6), splat<T>(1.0), splat<T>(2.0)));
+BC_INLINE T edge_of_a(T index) {
+  return select<T>(index < double(first_edge_axis + 3), T{},
+                   select<T>(index < double(first_edge_axis + 6), splat<T>(1.0), splat<T>(2.0)));
 }
 template <class T>
-BC_INLINE T edge_of_b(T place) {
-  return (place - double(first_edge_axis)) - 3.0 * edge_of_a(place);
+BC_INLINE T edge_of_b(T index) {
+  return (index - double(first_edge_axis)) - 3.0 * edge_of_a(index);
 }
 
-// The winning axis, at a place, as a unit vector from A to B, in A's frame.
+// The winning axis, with its index, as a unit vector from A to B, in A's frame.
 template <class T>
-BC_INLINE Triple<T> axis_normal(const Pair<T>& pair, const BestAxis<T, false>& best, Place<T>) {
-  T place = best.place;
+BC_INLINE Triple<T> axis_normal(const Pair<T>& pair, const BestAxis<T, false>& best, Index<T>) {
+  T index = best.index;
   // A face of A or of B: a unit vector, or a column of R.
   Vec<T> face{};
   T face_offset{};
   for (int k = 0; k < 3; ++k) {
-    Mask<T> of_a = place == double(k), of_b = place == double(3 + k);
+    Mask<T> of_a = index == double(k), of_b = index == double(3 + k);
     face_offset = select<T>(of_a, pair.offset_a[k], select<T>(of_b, pair.offset_b[k], face_offset));
     face = select(of_b, components<T>(pair.b_in_a[k]), face);
     face[k] = select<T>(of_a, splat<T>(1.0), face[k]);
   }
   // A pair of edges.
-  T i = edge_of_a(place), j = edge_of_b(place);
+  T i = edge_of_a(index), j = edge_of_b(index);
   Vec<T> u;
   for (int k = 0; k < 3; ++k) {
     const Triple<T>& edges = pair.a_in_b[k];
@@ -270,7 +270,7 @@ BC_INLINE Triple<T> axis_normal(const Pair<T>& pair, const BestAxis<T, false>& b
   n[1] = select<T>(i == 0.0, -u[2], select<T>(i == 1.0, T{}, u[0]));
   n[2] = select<T>(i == 0.0, u[1], select<T>(i == 1.0, -u[0], T{}));
 
-  Mask<T> edges = place >= double(first_edge_axis);
+  Mask<T> edges = index >= double(first_edge_axis);
   T along = select<T>(edges, dot(components<T>(pair.offset_a), n), face_offset);
   T side = select<T>(along >= 0.0, splat<T>(1.0), splat<T>(-1.0));
   return triple(select(edges, (side * best.scale) * n, side * face));
@@ -278,13 +278,13 @@ BC_INLINE Triple<T> axis_normal(const Pair<T>& pair, const BestAxis<T, false>& b
 
 // The same for a single pair whose triples are vectors of the machine.
 template <class T>
-BC_INLINE Triple<T> axis_normal(const Pair<T>& pair, const BestAxis<T, true>& best, int place) {
-  int group = place / 3, k = place % 3;
+BC_INLINE Triple<T> axis_normal(const Pair<T>& pair, const BestAxis<T, true>& best, int index) {
+  int group = index / 3, k = index % 3;
   Triple<T> zero{}, n, offset = pair.offset_a;
   T along;
-  if (place < 6) {
-    n = select(place < 3, choose(is_at<T>(k), uniform(1.0), zero), pair.b_in_a[k]);
-    along = pick(place < 3, pair.offset_a, pair.offset_b)[k];
+  if (index < 6) {
+    n = select(index < 3, choose(is_at<T>(k), uniform(1.0), zero), pair.b_in_a[k]);
+    along = pick(index < 3, pair.offset_a, pair.offset_b)[k];
   } else {
     int i = group - 2, y = (i + 1) % 3, z = (i + 2) % 3;
     Triple<T> u = pair.b_in_a[k];

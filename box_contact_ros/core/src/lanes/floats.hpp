@@ -10,7 +10,7 @@ namespace box_contact::BOX_CONTACT_SET {
 
 // Blocks of T that are solved together.
 template <class T>
-constexpr int together = is_scalar<T> ? 1 : 2;
+constexpr int blocks_together = is_scalar<T> ? 1 : 2;
 
 template <class T>
 using Floats = typename std::conditional_t<is_scalar<T>, std::enable_if<true, float>,

@@ -3,9 +3,10 @@
 
 // Lanes: the numbers of one pair of boxes, or of W pairs side by side.
 //
-// Every algorithm of the core is one template over T. T is `double` for a single pair, or
-// `Lanes<double, W>`, a vector of the compiler, with one pair in each of its W lanes. All functions
-// here work on each lane alone, so a pair has the same bits in every lane of every width.
+// From poses to moments, the core's functions are templates over T: `double` for a pair alone, or
+// `Lanes<double, W>`, a vector of the compiler, with one pair in each of its W lanes. Forces and the
+// broad phase have no lanes. All functions here work on each lane alone, so a pair has the same bits
+// in every lane of every width. Where a pair alone takes another way (`packed`), tests compare bits.
 #pragma once
 
 #include <cmath>
@@ -62,7 +63,7 @@ using Mask = decltype(T() < T());
 
 // A small whole number: of a single pair an index.
 template <class T>
-using Place = std::conditional_t<is_scalar<T>, int, T>;
+using Index = std::conditional_t<is_scalar<T>, int, T>;
 
 // The same number, which compilers do not know: a loop of so many rounds stays a loop. Code that does
 // not fit the first cache, or that of decoded instructions, takes up to twice the time.

@@ -39,12 +39,12 @@ BC_INLINE void transpose_fours(T (&x)[4]) {
   }
 }
 
-// The first `count` numbers at each place, three or four of them. `place(i)`: that of lane i.
-template <int count, class T, class Place>
-BC_INLINE void load_rows(const Place& place, T (&x)[count]) {
+// The first `count` numbers of each row, three or four of them. `row_at(i)`: the address of that of lane i.
+template <int count, class T, class Row>
+BC_INLINE void load_rows(const Row& row_at, T (&x)[count]) {
   if constexpr (shuffles<T>) {
     auto row = [&](int i) {
-      const double* at = place(i);
+      const double* at = row_at(i);
       return FourNumbers{at[0], at[1], at[2], at[count - 1]};
     };
     T all[4];
@@ -59,13 +59,13 @@ BC_INLINE void load_rows(const Place& place, T (&x)[count]) {
     for (int k = 0; k < count; ++k) x[k] = all[k];
   } else {
     for (int k = 0; k < count; ++k)
-      for (int i = 0; i < width<T>; ++i) set_lane(x[k], i, place(i)[k]);
+      for (int i = 0; i < width<T>; ++i) set_lane(x[k], i, row_at(i)[k]);
   }
 }
 
-// Write up to four numbers to the places of the lanes whose bit is set.
+// Write up to four numbers to the addresses of the lanes whose bit is set.
 template <int count, class T>
-BC_INLINE void store_rows(double* const (&places)[width<T>], unsigned chosen, const T (&x)[count]) {
+BC_INLINE void store_rows(double* const (&addresses)[width<T>], unsigned chosen, const T (&x)[count]) {
   if constexpr (shuffles<T> && count >= 3) {
     T all[4] = {x[0], x[1], x[2], x[count - 1]};
     transpose_fours(all);
@@ -73,15 +73,15 @@ BC_INLINE void store_rows(double* const (&places)[width<T>], unsigned chosen, co
       if constexpr (width<T> == 8) {
         FourNumbers low = __builtin_shufflevector(all[i], all[i], 0, 1, 2, 3);
         FourNumbers high = __builtin_shufflevector(all[i], all[i], 4, 5, 6, 7);
-        if (chosen >> i & 1) std::memcpy(places[i], &low, count * sizeof(double));
-        if (chosen >> (i + 4) & 1) std::memcpy(places[i + 4], &high, count * sizeof(double));
+        if (chosen >> i & 1) std::memcpy(addresses[i], &low, count * sizeof(double));
+        if (chosen >> (i + 4) & 1) std::memcpy(addresses[i + 4], &high, count * sizeof(double));
       } else {
-        if (chosen >> i & 1) std::memcpy(places[i], &all[i], count * sizeof(double));
+        if (chosen >> i & 1) std::memcpy(addresses[i], &all[i], count * sizeof(double));
       }
     }
   } else {
     for (int i = 0; i < width<T>; ++i)
-      for (int k = 0; chosen >> i & 1 && k < count; ++k) places[i][k] = lane(x[k], i);
+      for (int k = 0; chosen >> i & 1 && k < count; ++k) addresses[i][k] = lane(x[k], i);
   }
 }
 

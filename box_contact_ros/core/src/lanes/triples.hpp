@@ -131,16 +131,16 @@ BC_INLINE Three select(const M& mask, const Three& a, const Three& b) {
   }
 }
 
-// Which of three numbers is the one at `place`: 0, 1 or 2.
+// Which of three numbers is the one at `index`: 0, 1 or 2.
 template <class T>
-BC_INLINE Flags<T> is_at(Place<T> place) {
+BC_INLINE Flags<T> is_at(Index<T> index) {
   if constexpr (packed<T>) {
     static constexpr int64_t flags[3][4] = {{-1}, {0, -1}, {0, 0, -1, -1}};
     Flags<T> found;
-    std::memcpy(&found, flags[place], sizeof found);
+    std::memcpy(&found, flags[index], sizeof found);
     return found;
   } else {
-    T number = T(place);
+    T number = T(index);
     return Flags<T>{number == 0.0, number == 1.0, number == 2.0};
   }
 }

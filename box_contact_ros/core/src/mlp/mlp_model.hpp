@@ -10,14 +10,12 @@
 // and not above that of the bounds, and the covariance is positive definite.
 #pragma once
 
-#include "../overlap/exact.hpp"
+#include "../overlap/moments.hpp"
 #include "network.hpp"
 #include "patch_box.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
 namespace mlp {
-
-static_assert(features == detail::network_features, "what the cuts tell is what the network reads");
 
 // Least volume [of the patch box's], and least standard deviation along an axis [half extents].
 constexpr float least_volume = 1e-5F, least_deviation = 1e-3F;
@@ -37,31 +35,31 @@ BC_INLINE F within(F x, float least, float most) {
   return min<F>(splat<F>(most), max<F>(splat<F>(least), x));
 }
 
-// What the network says of an overlap.
+// The outputs of the network for an overlap.
 template <class F>
 struct Overlap {
-  F said[up_to_eights(detail::network_outputs)];
+  F outputs[up_to_eights(detail::network_outputs)];
   F point[3];  // −1 to 1 between the bounds
   F volume;    // of the patch box's
 
-  BC_INLINE Overlap(const Network& network, const Cuts<F>& cuts, int outputs) {
-    answer(network, cuts.told, outputs, said);
-    for (int i = 0; i < 3; ++i) point[i] = cuts.flip[i] * within<F>(said[i], -1.0F, 1.0F);
-    volume = within<F>(said[3] * said[3], least_volume, 1.0F);
+  BC_INLINE Overlap(const Network& network, const Cuts<F>& cuts, int wanted) {
+    answer(network, cuts.features, wanted, outputs);
+    for (int i = 0; i < 3; ++i) point[i] = cuts.flip[i] * within<F>(outputs[i], -1.0F, 1.0F);
+    volume = within<F>(outputs[3] * outputs[3], least_volume, 1.0F);
   }
   // Move a point that is outside of a box inwards, within the bounds.
   BC_INLINE void move_into(const Side<F>& slabs, const F (&by_half2)[3]) {
     Triple<F> at =
-        (point[0] * slabs.share[0] + point[1] * slabs.share[1]) + point[2] * slabs.share[2];
+        (point[0] * slabs.slope[0] + point[1] * slabs.slope[1]) + point[2] * slabs.slope[2];
     Triple<F> off = min(slabs.plus, max(-slabs.minus, at)) - at;
     for (int i = 0; i < 3; ++i) {
-      F moved = point[i] + (way_inwards * by_half2[i]) * dot(slabs.share[i], off);
+      F moved = point[i] + (way_inwards * by_half2[i]) * dot(slabs.slope[i], off);
       point[i] = within<F>(moved, -1.0F, 1.0F);
     }
   }
 };
 
-// The covariance L Lᵀ, in the common frame. The network says the lower triangle L: xx, yy, zz, yx, zx, zy
+// The covariance L Lᵀ, in the common frame. The network gives the lower triangle L: xx, yy, zz, yx, zx, zy
 // [half extents].
 template <class T>
 BC_INLINE Sym<T> covariance(const PatchBox<T>& box, const Cuts<Floats<T>>& cuts,
@@ -71,11 +69,11 @@ BC_INLINE Sym<T> covariance(const PatchBox<T>& box, const Cuts<Floats<T>>& cuts,
   F root[6];
   for (int i = 0; i < 3; ++i) {
     int j = i == 2 ? 1 : 0, k = i == 0 ? 1 : 2;  // of yx, zx, zy
-    const F* said = overlap.said + point_outputs;
+    const F* outputs = overlap.outputs + point_outputs;
     axis[i] = box.half[i] * box.a.axes[i];
-    root[i] = within<F>(said[i], least_deviation, most_deviation);
+    root[i] = within<F>(outputs[i], least_deviation, most_deviation);
     root[3 + i] =
-        (cuts.flip[j] * cuts.flip[k]) * within<F>(said[3 + i], -most_deviation, most_deviation);
+        (cuts.flip[j] * cuts.flip[k]) * within<F>(outputs[3 + i], -most_deviation, most_deviation);
   }
   Triple<F> columns[3] = {(root[0] * axis[0] + root[3] * axis[1]) + root[4] * axis[2],
                           root[1] * axis[1] + root[5] * axis[2], root[2] * axis[2]};
@@ -93,7 +91,7 @@ BC_INLINE Sym<T> covariance(const PatchBox<T>& box, const Cuts<Floats<T>>& cuts,
 
 // `FoundOf`: Moments, or PointAndVolume.
 template <template <class> class FoundOf>
-struct ByCuts {
+struct OverlapByNetwork {
   template <class T>
   using Found = FoundOf<T>;
 
@@ -113,7 +111,7 @@ struct ByCuts {
     }
     for (int i = 0; i < 3; ++i) from_origin[i] = box.centre[i] + box.half[i] * overlap.point[i];
     F volume = (8.0F * ((box.half[0] * box.half[1]) * box.half[2])) * overlap.volume;
-    for (int n = 0; n < together<T>; ++n) {
+    for (int n = 0; n < blocks_together<T>; ++n) {
       const Query<T>& query = *queries[n];
       T unit = box.meetings[n].unit, unit3 = (unit * unit) * unit;
       found[n]->centroid =
@@ -124,7 +122,7 @@ struct ByCuts {
   }
 };
 
-using MlpModel = NetworkModel<ByCuts<Moments>>;
-using MlpPointModel = NetworkModel<ByCuts<PointAndVolume>>;
+using MlpModel = NetworkModel<OverlapByNetwork<Moments>>;
+using MlpPointModel = NetworkModel<OverlapByNetwork<PointAndVolume>>;
 
 }  // namespace box_contact::BOX_CONTACT_SET

@@ -8,6 +8,7 @@
 #include "../kernel.hpp"
 #include "../lanes/floats.hpp"
 #include "../query.hpp"
+#include "format.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
 
@@ -124,14 +125,14 @@ template <class F>
 
 // What is solved together: a pair alone, or two blocks of pairs.
 template <class T>
-using Queries = const Query<T>* const (&)[together<T>];
+using Queries = const Query<T>* const (&)[blocks_together<T>];
 template <class Found, class T>
-using Answers = Found* const (&)[together<T>];
+using Answers = Found* const (&)[blocks_together<T>];
 
 // A model that asks a network. `Way` has Found<T>, and solve<T>(network, Queries<T>, Answers<Found<T>, T>).
 template <class Way>
 struct NetworkModel {
-  static constexpr bool takes_two = true;
+  static constexpr bool solves_two_blocks = true;
 
   Network network;
 

@@ -15,7 +15,7 @@
 // 4. The point is where that direction leaves the first box. It goes to the middle of the depth.
 #pragma once
 
-#include "../overlap/exact.hpp"
+#include "../overlap/moments.hpp"
 #include "network.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
@@ -86,33 +86,34 @@ struct Touching {
   }
 };
 
-// What the network reads of a pair, and what it says.
+// The answer of the network for a pair.
 template <class F>
 struct Impact {
   Vec<F> point, normal;  // first box's frame and unit
 
   BC_INLINE Impact(const Network& network, const Vec<F>& t, const Vec<F> (&r)[3],
                    const Vec<F>& half) {
-    F m[3], told[up_to_fours(detail::paper_inputs)], said[up_to_eights(detail::paper_outputs)];
-    for (int i = 0; i < 3; ++i) m[i] = sign(t[i]), told[i] = abs(t[i]);
+    F m[3], features[up_to_fours(detail::paper_inputs)];
+    F outputs[up_to_eights(detail::paper_outputs)];
+    for (int i = 0; i < 3; ++i) m[i] = sign(t[i]), features[i] = abs(t[i]);
     // r: columns of R. Cosines of yaw and of roll are not below 0.
     F nx = sign<F>(m[0] * r[0][0]), nz = sign<F>(m[2] * r[2][2]);
     F ny = ((m[0] * m[1]) * m[2]) * (nx * nz), sine_of_pitch = -(m[2] * r[0][2] * nx);
     F cosine2 = max<F>(1.0F - sine_of_pitch * sine_of_pitch, F{});
-    told[3] = angle<F>(m[2] * r[1][2] * ny, abs(r[2][2]));
-    told[4] = angle<F>(sine_of_pitch, sqrt(cosine2));
-    told[5] = angle<F>(m[1] * r[0][1] * nx, abs(r[0][0]));
-    told[6] = told[7] = F{};
-    answer(network, told, network.outputs, said);
+    features[3] = angle<F>(m[2] * r[1][2] * ny, abs(r[2][2]));
+    features[4] = angle<F>(sine_of_pitch, sqrt(cosine2));
+    features[5] = angle<F>(m[1] * r[0][1] * nx, abs(r[0][0]));
+    features[6] = features[7] = F{};
+    answer(network, features, network.outputs, outputs);
     if (network.outputs == detail::paper_places) {  // the point, in half of the longest edge
       F longest = max<F>(max<F>(half[0], half[1]), half[2]);
-      for (int i = 0; i < 3; ++i) point[i] = longest * (m[i] * said[i]), normal[i] = F{};
+      for (int i = 0; i < 3; ++i) point[i] = longest * (m[i] * outputs[i]), normal[i] = F{};
       return;
     }
-    Vec<F> way = direction<F>(said[0], said[1]);
+    Vec<F> way = direction<F>(outputs[0], outputs[1]);
     F farthest =
         max<F>(max<F>(abs(way[0]) / half[0], abs(way[1]) / half[1]), abs(way[2]) / half[2]);
-    normal = direction<F>(said[2], said[3]);
+    normal = direction<F>(outputs[2], outputs[3]);
     for (int i = 0; i < 3; ++i) point[i] = m[i] * way[i] / farthest, normal[i] = m[i] * normal[i];
   }
 };
@@ -127,7 +128,7 @@ struct PointAndNormal : PointAndVolume<T> {
   Vec<T> normal;  // from the caller's A, common frame
 };
 
-struct ByImpact {
+struct ImpactByNetwork {
   template <class T>
   using Found = PointAndNormal<T>;
 
@@ -135,8 +136,8 @@ struct ByImpact {
   [[gnu::noinline]] static void solve(const Network& network, Queries<T> queries,
                                       Answers<Found<T>, T> found) {
     using F = Floats<T>;
-    paper::Touching<T> pairs[together<T>];
-    for (int n = 0; n < together<T>; ++n) pairs[n] = {*queries[n], network.in_half_edges};
+    paper::Touching<T> pairs[blocks_together<T>];
+    for (int n = 0; n < blocks_together<T>; ++n) pairs[n] = {*queries[n], network.in_half_edges};
     auto vector = [&](auto get) {
       return components<F>(triple_of_floats<T>([&](int n) { return get(pairs[n]); }));
     };
@@ -146,24 +147,24 @@ struct ByImpact {
     paper::Impact<F> impact(network, vector([](const auto& pair) { return pair.offset; }), columns,
                             vector([](const auto& pair) { return pair.half; }));
     Triple<F> point = triple(impact.point), normal = triple(impact.normal);
-    for (int n = 0; n < together<T>; ++n)
-      place(network, *queries[n], pairs[n], triple_of_doubles<T>(point, n),
+    for (int n = 0; n < blocks_together<T>; ++n)
+      write(network, *queries[n], pairs[n], triple_of_doubles<T>(point, n),
             triple_of_doubles<T>(normal, n), *found[n]);
   }
 
  private:
   // To the common frame.
   template <class T>
-  BC_INLINE static void place(const Network& network, const Query<T>& q,
+  BC_INLINE static void write(const Network& network, const Query<T>& q,
                               const paper::Touching<T>& touching, const Triple<T>& point,
-                              const Triple<T>& said, Found<T>& found) {
+                              const Triple<T>& answered, Found<T>& found) {
     const Pair<T>& pair = q.pair;
     Columns<T> axes = select<T>(touching.first_is_b, pair.axes_b, pair.axes_a);
     Triple<T> origin = select(touching.first_is_b, pair.origin_b, pair.origin_a);
     Triple<T> at = touching.unit * point + (0.5 * q.axis.separation) * touching.normal;
-    T by_length = 1.0 / sqrt(dot(said, said));  // of float32, 1 to seven digits
+    T by_length = 1.0 / sqrt(dot(answered, answered));  // of float32, 1 to seven digits
     bool is_place = network.outputs == detail::paper_places;
-    Triple<T> normal = axes * (is_place ? touching.normal : by_length * said);
+    Triple<T> normal = axes * (is_place ? touching.normal : by_length * answered);
     Triple<T> zero{};
     // Zeros keep no sign on a swap.
     normal = select(Mask<T>(touching.first_is_b ^ pair.swapped), zero - normal, zero + normal);
@@ -173,6 +174,6 @@ struct ByImpact {
   }
 };
 
-using PaperModel = NetworkModel<ByImpact>;
+using PaperModel = NetworkModel<ImpactByNetwork>;
 
 }  // namespace box_contact::BOX_CONTACT_SET

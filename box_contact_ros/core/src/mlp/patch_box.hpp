@@ -15,7 +15,7 @@
 //    (Benhamou and others 1999, hull consistency).
 //
 // All of it is float32, in a unit of about the size. So that boxes that just touch keep their digits,
-// places are measured from an origin near the patch, which float64 finds in both boxes' frames.
+// coordinates are measured from an origin near the patch, which float64 finds in both boxes' frames.
 #pragma once
 
 #include "../minimum_depth.hpp"
@@ -46,7 +46,7 @@ BC_INLINE F least_of(const Triple<F>& x) {
   return min<F>(min<F>(x[0], x[1]), x[2]);
 }
 
-// The place of the largest of three numbers.
+// Which is the largest of three numbers.
 template <class F>
 struct LargestOf {
   Mask<F> first, second;
@@ -126,9 +126,9 @@ struct Side {
   Triple<F> axes[3];  // x, y and z of the patch box
   Triple<F> corner;   // deepest in the other box, from the centre: plus or minus the half extents
   Triple<F> reach;    // half of what is within the depth, along the box's axes
-  // Its half-spaces, a slab for each of its axes: −minus ≤ Σ share_i u_i ≤ plus, u from −1 to 1. `plus`
+  // Its half-spaces, a slab for each of its axes: −minus ≤ Σ slope_i u_i ≤ plus, u from −1 to 1. `plus`
   // is the side of the corner.
-  Triple<F> share[3], plus, minus;
+  Triple<F> slope[3], plus, minus;
 
   // Numbers along the box's axes, counted towards the corner.
   BC_INLINE Triple<F> outwards(const Triple<F>& x) const {
@@ -141,30 +141,30 @@ struct Side {
   }
   // Slabs about the origin. to_origin: from the corner.
   BC_INLINE void find_slabs(const Triple<F>& to_origin) {
-    for (int i = 0; i < 3; ++i) share[i] = outwards(axes[i]);
+    for (int i = 0; i < 3; ++i) slope[i] = outwards(axes[i]);
     plus = outwards(-to_origin);
     minus = 2.0F * abs(corner) - plus;
   }
-  // Go on from a place on axis i.
-  BC_INLINE void move(int i, F place) {
-    Triple<F> moved = place * share[i];
+  // Go on from a coordinate on axis i.
+  BC_INLINE void move(int i, F coordinate) {
+    Triple<F> moved = coordinate * slope[i];
     plus = plus - moved;
     minus = minus + moved;
   }
   // Grow on both sides along axis i.
   BC_INLINE void grow(int i, F more) {
-    Triple<F> grown = more * abs(share[i]);
+    Triple<F> grown = more * abs(slope[i]);
     plus = plus + grown;
     minus = minus + grown;
   }
   // Reduce how far coordinate i may be above and below, where the others have half extents `half`.
   BC_INLINE void bound(int i, const F (&half)[3], F& above, F& below) const {
     int j = (i + 1) % 3, k = (i + 2) % 3;
-    Triple<F> rest = half[j] * abs(share[j]) + half[k] * abs(share[k]);
-    Triple<F> by_share = inverses<F>(max(abs(share[i]), uniform(splat<F>(least_component))));
-    auto forwards = share[i] >= Triple<F>{};
-    above = min<F>(above, least_of<F>(by_share * (rest + choose(forwards, plus, minus))));
-    below = min<F>(below, least_of<F>(by_share * (rest + choose(forwards, minus, plus))));
+    Triple<F> rest = half[j] * abs(slope[j]) + half[k] * abs(slope[k]);
+    Triple<F> by_slope = inverses<F>(max(abs(slope[i]), uniform(splat<F>(least_component))));
+    auto forwards = slope[i] >= Triple<F>{};
+    above = min<F>(above, least_of<F>(by_slope * (rest + choose(forwards, plus, minus))));
+    below = min<F>(below, least_of<F>(by_slope * (rest + choose(forwards, minus, plus))));
   }
 };
 
@@ -173,19 +173,19 @@ template <class T>
 struct PatchBox {
   using F = Floats<T>;
   Queries<T> queries;
-  Meeting<T> meetings[together<T>];
+  Meeting<T> meetings[blocks_together<T>];
   Side<F> a, b;
   F centre[3], half[3];  // along x, y and z, from the origin [unit]
 
   BC_INLINE explicit PatchBox(Queries<T> of) : queries(of) {
-    for (int n = 0; n < together<T>; ++n) meetings[n] = Meeting<T>(*queries[n]);
+    for (int n = 0; n < blocks_together<T>; ++n) meetings[n] = Meeting<T>(*queries[n]);
     depth = length([](const auto& meeting) { return meeting.depth; });
     least = length([](const auto& meeting) { return meeting.least; });
     for (int s = 0; s < 2; ++s) {
       Side<F>& side = s ? b : a;
       side.axes[2] = significant<F>(
           triple_of_floats<T>([&](int n) { return meetings[n].normal[s]; }), least_component);
-      side.corner = place([s](const auto& meeting) { return meeting.corner[s]; });
+      side.corner = vector([s](const auto& meeting) { return meeting.corner[s]; });
       Triple<F> steep = max(abs(side.axes[2]), uniform(splat<F>(least_component)));
       side.reach = min(abs(side.corner), (0.5F * depth) * inverses<F>(steep));
     }
@@ -193,7 +193,7 @@ struct PatchBox {
     bound_by_reach();
     bound_by_slabs();
     for (int i = 0; i < 3; ++i)
-      a.share[i] = half[i] * a.share[i], b.share[i] = half[i] * b.share[i];
+      a.slope[i] = half[i] * a.slope[i], b.slope[i] = half[i] * b.slope[i];
   }
 
   // A point in A's frame, from its coordinates along x, y and z about the origin [unit].
@@ -215,7 +215,7 @@ struct PatchBox {
     return floats<T>([&](int n) { return meetings[n].by_unit * of(meetings[n]); });
   }
   template <class Of>
-  BC_INLINE Triple<F> place(const Of& of) const {
+  BC_INLINE Triple<F> vector(const Of& of) const {
     return triple_of_floats<T>([&](int n) { return meetings[n].by_unit * of(meetings[n]); });
   }
 
@@ -242,8 +242,8 @@ struct PatchBox {
       side->axes[1] = rotated(z) * rotated_back(x) - rotated_back(z) * rotated(x);
     }
 
-    // Of two edges that cross, the place on P's that is closest to Q's.
-    Triple<F> gap = place([](const auto& meeting) { return meeting.gap; });
+    // Of two edges that cross, the point on P's that is closest to Q's.
+    Triple<F> gap = vector([](const auto& meeting) { return meeting.gap; });
     Triple<F> from_q = select(is_b, gap, -(a_in_b * gap)), edge_q = select(is_b, edge_a, edge_b);
     auto is_edge = across_q >= uniform(largest(across_q));
     Triple<F> zero{}, one = uniform(splat<F>(1.0F)), across = choose(is_edge, zero, edge_q);
@@ -253,15 +253,15 @@ struct PatchBox {
     on_edge = min<F>(farthest, max<F>(inwards * on_edge, F{}));
     Triple<F> along_edge = (inwards * on_edge) * edge_a;
     F p_is_b = either<F>(is_b, splat<F>(1.0F), F{});
-    for (int n = 0; n < together<T>; ++n)
+    for (int n = 0; n < blocks_together<T>; ++n)
       meetings[n].place_origin(*queries[n], doubles<T>(p_is_b, n),
                                triple_of_doubles<T>(along_edge, n));
   }
 
   // By what is within the depth.
   BC_INLINE void bound_by_reach() {
-    Triple<F> to_origin_a = place([](const auto& meeting) { return meeting.to_origin[0]; });
-    Triple<F> to_origin_b = place([](const auto& meeting) { return meeting.to_origin[1]; });
+    Triple<F> to_origin_a = vector([](const auto& meeting) { return meeting.to_origin[0]; });
+    Triple<F> to_origin_b = vector([](const auto& meeting) { return meeting.to_origin[1]; });
     a.find_slabs(to_origin_a);
     b.find_slabs(to_origin_b);
     // Beyond the far end of a box that is less thick than the depth there is no overlap.
@@ -302,9 +302,9 @@ struct PatchBox {
     centre[0] = 0.5F * (above - below);
     move(0, centre[0]);
   }
-  BC_INLINE void move(int i, F place) {
-    a.move(i, place);
-    b.move(i, place);
+  BC_INLINE void move(int i, F coordinate) {
+    a.move(i, coordinate);
+    b.move(i, coordinate);
   }
   // Reduce how far coordinate i may be above and below. Boxes that touch along several axes have no
   // overlap: B grows as far as the overlap lacks of the least width.
@@ -331,30 +331,29 @@ struct PatchBox {
 //   11–18: how deep the corners of the box are cut off, +++ ++− +−+ +−− −++ −+− −−+ −−−
 //
 // Axes are mirrored so that 0–2 are not above 0.
-constexpr int features = 19;
-// A smaller share [1] of the sum of three counts as none: the digits of float32 end before it.
-constexpr float least_share = 1e-8F;
+// A slope that is a smaller part of the sum of the three counts as 0: the digits of float32 end before it.
+constexpr float least_slope = 1e-8F;
 
 template <class F>
 struct Cuts {
-  F flip[3], told[up_to_fours(features)];
+  F flip[3], features[up_to_fours(detail::network_features)];
 
   template <class T>
   BC_INLINE explicit Cuts(const PatchBox<T>& box) {
-    for (F& number : told) number = F{};
+    for (F& number : features) number = F{};
     Side<F> slabs[2] = {box.a, box.b};
     Triple<F> one = uniform(splat<F>(1.0F)), whole = uniform(splat<F>(2.0F)), zero{};
     Triple<F> depth[2], pull[2][3];
     for (int n = 0; n < 2; ++n) {
-      Triple<F>(&share)[3] = slabs[n].share;
-      Triple<F> scale = inverses<F>((abs(share[0]) + abs(share[1])) + abs(share[2]));
-      for (int i = 0; i < 3; ++i) share[i] = significant<F>(scale * share[i], least_share);
+      Triple<F>(&slope)[3] = slabs[n].slope;
+      Triple<F> scale = inverses<F>((abs(slope[0]) + abs(slope[1])) + abs(slope[2]));
+      for (int i = 0; i < 3; ++i) slope[i] = significant<F>(scale * slope[i], least_slope);
       slabs[n].plus = scale * slabs[n].plus;
       slabs[n].minus = scale * slabs[n].minus;
       auto cut = [&](const Triple<F>& side) { return min(whole, max(one - side, zero)); };
       Triple<F> above = cut(slabs[n].plus), below = cut(slabs[n].minus);
       depth[n] = above + below;
-      for (int i = 0; i < 3; ++i) pull[n][i] = (above - below) * share[i];
+      for (int i = 0; i < 3; ++i) pull[n][i] = (above - below) * slope[i];
     }
     auto add = [](const Triple<F>& x, const Triple<F>& y) { return sum(x + y); };
     auto add_products = [&](int i, int j) {
@@ -363,27 +362,27 @@ struct Cuts {
     for (int i = 0; i < 3; ++i) {
       F all = add(pull[0][i], pull[1][i]);
       flip[i] = either<F>(all > F{}, splat<F>(-1.0F), splat<F>(1.0F));
-      told[i] = flip[i] * all;
-      told[5 + i] = add_products(i, i);
+      features[i] = flip[i] * all;
+      features[5 + i] = add_products(i, i);
     }
-    told[3] = add(depth[0], depth[1]);
-    told[4] = add(depth[0] * depth[0], depth[1] * depth[1]);
-    told[8] = flip[0] * flip[1] * add_products(0, 1);
-    told[9] = flip[0] * flip[2] * add_products(0, 2);
-    told[10] = flip[1] * flip[2] * add_products(1, 2);
+    features[3] = add(depth[0], depth[1]);
+    features[4] = add(depth[0] * depth[0], depth[1] * depth[1]);
+    features[8] = flip[0] * flip[1] * add_products(0, 1);
+    features[9] = flip[0] * flip[2] * add_products(0, 2);
+    features[10] = flip[1] * flip[2] * add_products(1, 2);
     for (const Side<F>& of_box : slabs) {
       Triple<F> a[3];
-      for (int i = 0; i < 3; ++i) a[i] = flip[i] * of_box.share[i];
+      for (int i = 0; i < 3; ++i) a[i] = flip[i] * of_box.slope[i];
       Triple<F> along = a[0] + a[1], against = a[0] - a[1];
       Triple<F> corners[4] = {along + a[2], along - a[2], against + a[2], against - a[2]};
       for (int i = 0; i < 4; ++i) {
         Triple<F> here = max(corners[i] - of_box.plus, -corners[i] - of_box.minus);
         Triple<F> there = max(-corners[i] - of_box.plus, corners[i] - of_box.minus);
-        told[11 + i] = max(told[11 + i], largest(here));
-        told[18 - i] = max(told[18 - i], largest(there));
+        features[11 + i] = max(features[11 + i], largest(here));
+        features[18 - i] = max(features[18 - i], largest(there));
       }
     }
-    for (int i = 11; i < features; ++i) told[i] = min(told[i], splat<F>(2.0F));
+    for (int i = 11; i < detail::network_features; ++i) features[i] = min(features[i], splat<F>(2.0F));
   }
 };
 

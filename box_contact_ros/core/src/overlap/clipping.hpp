@@ -41,17 +41,17 @@ constexpr double negligible_face = 1e-11;
 
 namespace clipping {
 
-// A place (u, v, w) in the reference box's frame. The fourth number repeats the third.
-using Place3 = Lanes<double, 4>;
+// A point (u, v, w) in the reference box's frame. The fourth number repeats the third.
+using Point3 = Lanes<double, 4>;
 // A flag for each of its numbers.
-using Flags3 = Mask<Place3>;
+using Flags3 = Mask<Point3>;
 
-BC_INLINE Place3 place(double u, double v, double w) { return Place3{u, v, w, w}; }
+BC_INLINE Point3 point3(double u, double v, double w) { return Point3{u, v, w, w}; }
 
 // Up to the first order, about the middle of a rectangle in the contact plane.
 struct FirstMoments {
   double volume = 0.0;  // six times ∫ w
-  Place3 first{};       // 24 times ∫ (u w, v w, w²)
+  Point3 first{};       // 24 times ∫ (u w, v w, w²)
 
   FirstMoments& operator+=(const FirstMoments& other) {
     volume += other.volume;
@@ -64,10 +64,10 @@ struct FirstMoments {
 // face along a side of a slab may wind about it by rounding, which leaves some more.
 struct Polygon {
   int count = 0;
-  Place3 corners[16];
+  Point3 corners[16];
 };
 
-// What lies between two parallel planes: least ≤ place[axis] ≤ most.
+// What lies between two parallel planes: least ≤ point[axis] ≤ most.
 struct Slab {
   int axis;
   double least, most;
@@ -79,13 +79,13 @@ inline void clip(const Polygon& from, const Slab& slab, Polygon& kept) {
   Flags3 axis = on_axis[slab.axis];
   kept.count = 0;
   if (from.count == 0) return;
-  Place3 before = from.corners[from.count - 1];
+  Point3 before = from.corners[from.count - 1];
   double x_before = before[slab.axis];
   bool below_before = x_before < slab.least;
   bool above_before = x_before > slab.most;
   int count = 0;
   for (int i = 0; i < from.count; ++i) {
-    Place3 here = from.corners[i], way = here - before;
+    Point3 here = from.corners[i], way = here - before;
     double x = here[slab.axis], step = x - x_before;
     bool below = x < slab.least;
     bool above = x > slab.most;
@@ -93,7 +93,7 @@ inline void clip(const Polygon& from, const Slab& slab, Polygon& kept) {
     // The edge crosses one plane on its way in, and then the other on its way out.
     bool at_least = below != below_before, at_most = above != above_before;
     auto crossing = [&](double plane) {
-      return choose(axis, splat<Place3>(plane), before + ((plane - x_before) / step) * way);
+      return choose(axis, splat<Point3>(plane), before + ((plane - x_before) / step) * way);
     };
     kept.corners[count] = crossing(rises ? slab.least : slab.most);
     count += rises ? at_least : at_most;
@@ -111,10 +111,10 @@ inline void clip(const Polygon& from, const Slab& slab, Polygon& kept) {
 // on (u, v), with a sign.
 template <class Visit>
 BC_INLINE void each_triangle(const Polygon& polygon, Visit visit) {
-  const Place3& a = polygon.corners[0];
+  const Point3& a = polygon.corners[0];
   for (int i = 1; i + 1 < polygon.count; ++i) {
-    const Place3 &b = polygon.corners[i], &c = polygon.corners[i + 1];
-    Place3 ab = b - a, ac = c - a;
+    const Point3 &b = polygon.corners[i], &c = polygon.corners[i + 1];
+    Point3 ab = b - a, ac = c - a;
     visit(ab[0] * ac[1] - ac[0] * ab[1], a, b, c);
   }
 }
@@ -122,8 +122,8 @@ BC_INLINE void each_triangle(const Polygon& polygon, Visit visit) {
 // The moments of the columns between a polygon and the plane w = 0.
 inline FirstMoments integrate(const Polygon& polygon) {
   FirstMoments sum;
-  each_triangle(polygon, [&](double area, const Place3& a, const Place3& b, const Place3& c) {
-    Place3 total = (a + b) + c;
+  each_triangle(polygon, [&](double area, const Point3& a, const Point3& b, const Point3& c) {
+    Point3 total = (a + b) + c;
     sum.volume += area * total[2];
     sum.first += area * (total[2] * total + ((a[2] * a + b[2] * b) + c[2] * c));
   });
@@ -135,7 +135,7 @@ inline FirstMoments integrate(const Polygon& polygon) {
 // have the middle, hence the triangles.
 template <class Visit>
 inline void lifted(const Polygon& polygon, double floor, Visit visit) {
-  each_triangle(polygon, [&](double, const Place3& a, const Place3& b, const Place3& c) {
+  each_triangle(polygon, [&](double, const Point3& a, const Point3& b, const Point3& c) {
     Polygon triangle{3, {a, b, c}}, part;
     double low = min(min(a[2], b[2]), c[2]), high = max(max(a[2], b[2]), c[2]);
     // A triangle in the plane, to the last bit, is a part below it and none above.
@@ -151,25 +151,25 @@ inline void lifted(const Polygon& polygon, double floor, Visit visit) {
   });
 }
 
-// 120 times the second moments of the columns between a polygon and the plane w = 0 about a place, by
-// uu vv ww and by vw uw uv. With c the place's height, a column has ∫ dw = w, ∫ (w − c) dw = w (w/2 − c)
+// 120 times the second moments of the columns between a polygon and the plane w = 0 about a point, by
+// uu vv ww and by vw uw uv. With c the point's height, a column has ∫ dw = w, ∫ (w − c) dw = w (w/2 − c)
 // and ∫ (w − c)² dw = w ((w/2 − c)² + w²/12). These are products of three linear functions. With the
 // sums X, Y, Z of their values x, y, z at a triangle's corners, the integral is
 //   area/60 · (X Y Z + X Σ y z + Y Σ x z + Z Σ x y + 2 Σ x y z).
 struct SecondMoments {
-  Place3 diagonal{}, beside{};
+  Point3 diagonal{}, beside{};
 
-  BC_INLINE void add(const Polygon& polygon, const Place3& about) {
-    each_triangle(polygon, [&](double area, const Place3& a, const Place3& b, const Place3& c) {
-      const Place3 halved{1.0, 1.0, 0.5, 0.5};
-      Place3 corners[3] = {halved * a - about, halved * b - about, halved * c - about};
+  BC_INLINE void add(const Polygon& polygon, const Point3& about) {
+    each_triangle(polygon, [&](double area, const Point3& a, const Point3& b, const Point3& c) {
+      const Point3 halved{1.0, 1.0, 0.5, 0.5};
+      Point3 corners[3] = {halved * a - about, halved * b - about, halved * c - about};
       double heights[3] = {a[2], b[2], c[2]}, height = (a[2] + b[2]) + c[2];
-      Place3 total = (corners[0] + corners[1]) + corners[2], weighted{};
-      Place3 own = height * (total * total);
-      Place3 others = height * (rotated(total) * rotated_back(total));
+      Point3 total = (corners[0] + corners[1]) + corners[2], weighted{};
+      Point3 own = height * (total * total);
+      Point3 others = height * (rotated(total) * rotated_back(total));
       double squares = 0.0, cubes = 0.0;
       for (int k = 0; k < 3; ++k) {
-        const Place3& x = corners[k];
+        const Point3& x = corners[k];
         double h = heights[k], weight = height + 2.0 * h;
         weighted += h * x;
         own += weight * (x * x);
@@ -180,7 +180,7 @@ struct SecondMoments {
       own += 2.0 * (total * weighted);
       others += rotated(total) * rotated_back(weighted) + rotated_back(total) * rotated(weighted);
       double along = height * (height * height) + (3.0 * height * squares + 2.0 * cubes);
-      own += (1.0 / 12.0) * along * Place3{0.0, 0.0, 1.0, 1.0};
+      own += (1.0 / 12.0) * along * Point3{0.0, 0.0, 1.0, 1.0};
       diagonal += area * own;
       beside += area * others;
     });
@@ -204,21 +204,21 @@ inline Found overlap_from(const Pair<double>& pair, int face, double& kept) {
   double side = offset[w] >= 0.0 ? 1.0 : -1.0;
 
   // The incident box in (u, v, w): its centre, and its half axes.
-  Place3 centre = place(offset[axes[0]], offset[axes[1]], side * offset[w]);
-  Place3 half = place(own[axes[0]], own[axes[1]], own[w]), edges[3], radius{};
+  Point3 centre = point3(offset[axes[0]], offset[axes[1]], side * offset[w]);
+  Point3 half = point3(own[axes[0]], own[axes[1]], own[w]), edges[3], radius{};
   for (int j = 0; j < 3; ++j) {
-    edges[j] = other[j] * place(turn[axes[0]][j], turn[axes[1]][j], side * turn[w][j]);
+    edges[j] = other[j] * point3(turn[axes[0]][j], turn[axes[1]][j], side * turn[w][j]);
     radius += abs(edges[j]);
   }
   // Moments are taken about the middle of the rectangle that bounds both projections, so that a
   // small box on a large one keeps its digits. Heights count from the contact face.
-  Place3 low = max(centre - radius, -half), high = min(centre + radius, half);
+  Point3 low = max(centre - radius, -half), high = min(centre + radius, half);
   const Flags3 heights{0, 0, -1, -1};
-  Place3 middle = choose(heights, half, Place3(0.5 * (low + high)));
-  Place3 most = half - middle, least = -half - middle;
+  Point3 middle = choose(heights, half, Point3(0.5 * (low + high)));
+  Point3 most = half - middle, least = -half - middle;
 
   // 1. Corners. Bits of `outside`: above w = 0, beyond the most u and v, and the least.
-  Place3 corners[8] = {centre - middle};
+  Point3 corners[8] = {centre - middle};
   unsigned outside[8];
   for (int j = 0, count = 1; j < 3; ++j, count *= 2)
     for (int c = 0; c < count; ++c) {
@@ -274,14 +274,14 @@ inline Found overlap_from(const Pair<double>& pair, int face, double& kept) {
 
   // The sign of the volume is that of the frame's handedness, and cancels in the ratios. Boxes
   // thinner than the rounding of their sizes have no volume.
-  Place3 zero{}, bottom = choose(heights, splat<Place3>(max(floor, lowest)), Place3(low - middle));
-  Place3 top = choose(heights, zero, Place3(high - middle));
-  Place3 found = choose(heights, Place3(0.5 * bottom), zero);
+  Point3 zero{}, bottom = choose(heights, splat<Point3>(max(floor, lowest)), Point3(low - middle));
+  Point3 top = choose(heights, zero, Point3(high - middle));
+  Point3 found = choose(heights, Point3(0.5 * bottom), zero);
   if (sum.volume != 0.0) {
-    Place3 mean = (1.0 / sum.volume) * (Place3{0.25, 0.25, 0.125, 0.125} * sum.first);
+    Point3 mean = (1.0 / sum.volume) * (Point3{0.25, 0.25, 0.125, 0.125} * sum.first);
     found = min(top, max(bottom, mean));
   }
-  Place3 at = found + middle;
+  Point3 at = found + middle;
   Vec<double> centroid;
   centroid[axes[0]] = at[0];
   centroid[axes[1]] = at[1];

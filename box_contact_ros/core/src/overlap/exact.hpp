@@ -4,7 +4,8 @@
 // Model `exact`: the overlap of pairs that touch.
 //
 // 1. Parallel boxes: by intervals (intervals.hpp).
-// 2. Others, pressed in where they are at exact touch: by the planes that meet the overlap (certificate.hpp).
+// 2. Others, pressed in where they are at exact touch: by the planes that meet the overlap
+//    (overlap_by_planes.hpp).
 // 3. Where that is not certain: once more about the centroid that was found where digits have
 //    cancelled, else by clipping (clipping.hpp).
 #pragma once
@@ -12,9 +13,9 @@
 #include "../kernel.hpp"
 #include "../minimum_depth.hpp"
 #include "../query.hpp"
-#include "certificate.hpp"
 #include "clipping.hpp"
 #include "intervals.hpp"
+#include "overlap_by_planes.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
 
@@ -168,14 +169,14 @@ template <class T, class Found>
 //     common frame. It returns the bits of those that it leaves; it leaves no pair alone.
 //   solve_left(query, found, counts): the same for pairs that were left, side by side.
 //
-// A model that leaves none may take two blocks of pairs at once: `takes_two` says so. It then has
+// A model that leaves none may take two blocks of pairs at once: `solves_two_blocks` says so. It then has
 // solve_two(query, other, found, other_found) in their place, and `solve` for a pair alone.
 
 // Model `exact`. `FoundOf`: Moments, or PointAndVolume. It leaves few pairs of W that have two planes
 // across an axis.
 template <template <class> class FoundOf>
 struct ExactModelOf {
-  static constexpr bool takes_two = false;
+  static constexpr bool solves_two_blocks = false;
 
   template <class T>
   using Found = FoundOf<T>;

@@ -26,7 +26,7 @@ BC_INLINE void clip(const N& at, const N& slab, const N& inverse, N& back, N& to
 // What is left within the slabs of the lines of a plane of P with the planes across Q's axes.
 template <class T>
 struct Pieces {
-  Triple<T> span, middle;            // lengths in units of D, and the places of the middles
+  Triple<T> span, middle;            // lengths in units of D, and the coordinates of the middles
   Triple<T> u, v;                    // g − c f, and f − c g [m]
   Triple<T> at_y, at_z, at_k, at_l;  // the lines' nearest points to the origin, in P and in Q [m]
 };
@@ -42,8 +42,8 @@ BC_INLINE Pieces<T> clipped_lines(const PairOfBoxes<T>& boxes, int i, int s, int
   const Triple<T>&c = boxes.rows[i], &qy = boxes.rows[y], &qz = boxes.rows[z];
   Triple<T> pk = rotated(c), pl = rotated_back(c);
   const Triple<T>&by_i = boxes.by_rows[i], &by_y = boxes.by_rows[y], &by_z = boxes.by_rows[z];
-  Triple<T> f = repeated(of_p.place, i);
-  const Triple<T>&g = of_q.place, &scale = boxes.scales[i];
+  Triple<T> f = repeated(of_p.distance, i);
+  const Triple<T>&g = of_q.distance, &scale = boxes.scales[i];
 
   Pieces<T> pieces;
   pieces.u = g - c * f;
@@ -75,8 +75,8 @@ BC_INLINE void add_pieces(const PairOfBoxes<T>& boxes, int i, int s, int t, cons
   int y = following[i], z = following[y];
   const Triple<T>&qy = boxes.rows[y], &qz = boxes.rows[z];
   Triple<T> pk = rotated(boxes.rows[i]), pl = rotated_back(boxes.rows[i]);
-  Triple<T> f = repeated(of_p.place, i);
-  const Triple<T>&g = of_q.place, &span = pieces.span, &middle = pieces.middle;
+  Triple<T> f = repeated(of_p.distance, i);
+  const Triple<T>&g = of_q.distance, &span = pieces.span, &middle = pieces.middle;
   Triple<T> side = span * (repeated(of_p.sign, i) * of_q.sign);
   Triple<T> area_p = side * pieces.u, area_q = side * pieces.v;
   Triple<T> my = pieces.at_y - middle * qz, mz = pieces.at_z + middle * qy;
@@ -181,7 +181,7 @@ BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, Sums<T>& of_p, Sums<T>& of
       for (int i = 0; i < 3; ++i)
         add_lines<1, squares, two_sided>(boxes, i, s, side, of_q, largest_lever2);
     }
-    const Triple<T>& f = boxes.p.planes[s].place;
+    const Triple<T>& f = boxes.p.planes[s].distance;
     Faces<Triple<T>>& faces = of_p.faces[s];
     faces.area = side.area.sums();
     faces.next = side.next.sums();
@@ -201,13 +201,13 @@ template <bool squares, class T>
 BC_INLINE void add_edges(const Box<T>& x, int s, int t, const Box<T>& y, const Columns<T>& axes,
                          const Columns<T>& inverse, Sums<T>& sums, Triple<T>& length) {
   const Planes<T>&of_f = x.planes[s], &of_g = x.planes[t];
-  Triple<T> f = rotated(of_f.place), g = rotated_back(of_g.place);
+  Triple<T> f = rotated(of_f.distance), g = rotated_back(of_g.distance);
   Triple<T> start = min(rotated(of_f.start), rotated_back(of_g.start));
   Triple<T> back = min(start, x.slab - x.middle), to = min(start, x.slab + x.middle);
 #pragma GCC unroll 3
   for (int m = 0; m < 3; ++m) {
-    Triple<T> place = f * rotated(axes[m]) + g * rotated_back(axes[m]);
-    clip(place - repeated(y.middle, m), repeated(y.slab, m), inverse[m], back, to);
+    Triple<T> point = f * rotated(axes[m]) + g * rotated_back(axes[m]);
+    clip(point - repeated(y.middle, m), repeated(y.slab, m), inverse[m], back, to);
   }
   Triple<T> span = max(to + back, Triple<T>{}), middle = 0.5 * (to - back);
   length += span;

@@ -22,8 +22,8 @@ namespace planes {
 
 // Least magnitude of an entry of R that is inverted: an edge exactly along a slab must not give 0 · ∞.
 constexpr double least_entry = 1e-90;
-// Rounding of a place [of the size] that may not decide whether a plane meets the overlap.
-constexpr double place_slack = 1e-14;
+// Rounding of a coordinate [of the size] that may not decide whether a plane meets the overlap.
+constexpr double coordinate_slack = 1e-14;
 // Sides of P that cut off less than this [of the overlap's extent] count as flush: they are left out.
 constexpr double flush_limit = 1e-10;
 // Squared sine up to which two planes meet in no line.
@@ -61,13 +61,13 @@ BC_INLINE OneOf<T, Thing> one_of(Mask<T> mask, const Thing& a, const Thing& b) {
   }
 }
 
-// The number of a triple, or the column of a matrix, at the axis `place` (0, 1 or 2).
+// The number of a triple, or the column of a matrix, at the axis `index` (0, 1 or 2).
 template <class T, class Things>
-BC_INLINE auto at(const Things& of, Place<T> place) {
+BC_INLINE auto at(const Things& of, Index<T> index) {
   if constexpr (is_scalar<T>) {
-    return of[place];
+    return of[index];
   } else {
-    return one_of<T>(place == 0.0, of[0], one_of<T>(place == 1.0, of[1], of[2]));
+    return one_of<T>(index == 0.0, of[0], one_of<T>(index == 1.0, of[1], of[2]));
   }
 }
 
@@ -86,7 +86,7 @@ BC_INLINE unsigned bits_of_any(const Flags<T>& chosen) {
 // One plane across each axis of a box.
 template <class T>
 struct Planes {
-  Triple<T> sign, place;  // side of the box: ±1; distance from the origin along the axis [m]
+  Triple<T> sign, distance;  // side of the box: ±1; distance from the origin along the axis [m]
   Triple<T> start;        // where its lines begin to be clipped; `nowhere`: there is no such plane
   unsigned axes;          // a bit for each axis that has one, of any pair
 };
@@ -96,7 +96,7 @@ template <class T>
 struct Box {
   Triple<T> half;          // half extents [m]
   Triple<T> origin;        // of the sums [m]
-  Triple<T> first;         // the places of the first planes along the axes [m]
+  Triple<T> first;         // of the first planes along the axes [m]
   Triple<T> top, bottom;   // where the slabs end that clip lines [m]
   Triple<T> slab, middle;  // half widths of these slabs, and their middles from the origin [m]
   Planes<T> planes[2];     // two across an axis where both sides meet the overlap
@@ -119,20 +119,20 @@ struct Box {
     planes[1].start = choose(both, here, -here);
     planes[1].axes = bits_of_any<T>(both);
   }
-  BC_INLINE void place_planes() {
+  BC_INLINE void measure_planes() {
     Triple<T> high = top - origin, low = bottom - origin;
     slab = 0.5 * (high - low);
     middle = 0.5 * (high + low);
-    planes[0].place = first - origin;
-    planes[1].place = -half - origin;
+    planes[0].distance = first - origin;
+    planes[1].distance = -half - origin;
   }
 };
 
 // The depth of a pair on a face axis, 0 to 5 [m].
 template <class T>
-BC_INLINE T depth_on(const Pair<T>& pair, Place<T> face) {
-  Mask<T> of_a = face < splat<Place<T>>(3);
-  Place<T> z = select<Place<T>>(of_a, face, face - splat<Place<T>>(3));
+BC_INLINE T depth_on(const Pair<T>& pair, Index<T> face) {
+  Mask<T> of_a = face < splat<Index<T>>(3);
+  Index<T> z = select<Index<T>>(of_a, face, face - splat<Index<T>>(3));
   Triple<T> across = at<T>(one_of<T>(of_a, pair.a_in_b, pair.b_in_a), z);
   Triple<T> own = select(of_a, pair.half_a, pair.half_b);
   Triple<T> other = select(of_a, pair.half_b, pair.half_a);
@@ -154,7 +154,7 @@ struct PairOfBoxes {
   // [m].
   BC_INLINE PairOfBoxes(const Pair<T>& pair, const SeparatingAxis<T>& axis, const Triple<T>& from_a,
                         const Triple<T>& from_b, T depth)
-      : p_is_a(axis.face < splat<Place<T>>(3)),
+      : p_is_a(axis.face < splat<Index<T>>(3)),
         columns(one_of<T>(p_is_a, pair.b_in_a, pair.a_in_b)),
         rows(transposed_columns(pair)) {
     // By a division that does not wait for the best face.
@@ -176,8 +176,8 @@ struct PairOfBoxes {
   BC_INLINE void take_sums_about(const Triple<T>& origin) {
     p.origin = origin;
     q.origin = rows * (origin - offset);
-    p.place_planes();
-    q.place_planes();
+    p.measure_planes();
+    q.measure_planes();
   }
 
  private:
@@ -192,8 +192,8 @@ struct PairOfBoxes {
 
   BC_INLINE void find_planes(const Pair<T>& pair, const SeparatingAxis<T>& axis, T depth) {
     // 1. Q's part below the contact face.
-    Place<T> z = select<Place<T>>(p_is_a, axis.face, axis.face - splat<Place<T>>(3));
-    T slack = place_slack * pair.size;
+    Index<T> z = select<Index<T>>(p_is_a, axis.face, axis.face - splat<Index<T>>(3));
+    T slack = coordinate_slack * pair.size;
     Triple<T> zero{}, up = at<T>(rows, z), c = offset;
     T height = at<T>(c, z);
     // Of faces that tie, the best may be deeper by the tolerance.
@@ -219,15 +219,15 @@ struct PairOfBoxes {
     q.choose_planes(most_q >= edge, -least_q >= edge, most_q, least_q, slack);
 
     // The origin: the middle of P's part. A contact of two edges may be small in it.
-    Mask<T> by_edges = axis.axis >= splat<Place<T>>(first_edge_axis);
+    Mask<T> by_edges = axis.axis >= splat<Index<T>>(first_edge_axis);
     if (any(by_edges)) middle = select(by_edges, crossing(pair, axis), middle);
     take_sums_about(middle);
   }
 
   // Where the two edges of an edge axis cross: the middle of the shortest way between them, in P's frame.
   BC_INLINE Triple<T> crossing(const Pair<T>& pair, const SeparatingAxis<T>& axis) const {
-    Place<T> of_a = edge_of_a(axis.axis), of_b = edge_of_b(axis.axis);
-    Place<T> i = select<Place<T>>(p_is_a, of_a, of_b), j = select<Place<T>>(p_is_a, of_b, of_a);
+    Index<T> of_a = edge_of_a(axis.axis), of_b = edge_of_b(axis.axis);
+    Index<T> i = select<Index<T>>(p_is_a, of_a, of_b), j = select<Index<T>>(p_is_a, of_b, of_a);
     Triple<T> zero{}, n_a = axis.normal, n_b = pair.a_in_b * n_a;
     Triple<T> n_p = select(p_is_a, n_a, -n_b), n_q = select(p_is_a, n_b, -n_a);
     auto corner = [&](const Triple<T>& half, const Triple<T>& direction) {

@@ -35,7 +35,7 @@ struct Faces {
 // And to the sums over the overlap, for the planes across an axis of P and its lines with Q's.
 template <class N, bool squares>
 struct Weighted {
-  N w{}, y{}, z{};  // Σ w, and w times the middles' places along the two axes that follow
+  N w{}, y{}, z{};  // Σ w, and w times the middles' coordinates along the two axes that follow
   N yy{}, zz{}, yz{};
 };
 
@@ -85,7 +85,7 @@ BC_INLINE Surface<T> surface(const Box<T>& box, const Sums<T>& sums) {
 #pragma GCC unroll 2
   for (int n = 0; n < (two_sided ? 2 : 1); ++n) {
     const Faces<Triple<T>>& faces = sums.faces[n];
-    Triple<T> f = box.planes[n].place, by_f = f * faces.area, by_f2 = f * by_f;
+    Triple<T> f = box.planes[n].distance, by_f = f * faces.area, by_f2 = f * by_f;
     s.normal += faces.area;
     s.size += abs(faces.area);
     own += by_f;
@@ -100,7 +100,7 @@ BC_INLINE Surface<T> surface(const Box<T>& box, const Sums<T>& sums) {
           s.second.beside + (rotated(third * faces.next) + rotated_back(third * faces.after));
     }
   }
-  // Column k has its own component from the places of the planes, and two from the moments.
+  // Column k has its own component from the distances of the planes, and two from the moments.
   s.volume = sum(own);
   s.gross = sum(gross);
   s.x_n = from_diagonals<T>({{0.5 * own, (1.0 / 3.0) * next, (1.0 / 3.0) * after}});
