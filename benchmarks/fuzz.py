@@ -38,7 +38,7 @@ from box_contact_ros.solver.contact import FIELDS, Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix
 
-from . import judge, output
+from . import judge, output, probes
 from .pose_sets import (
     CONTAINER,
     HIGH_CUBE,
@@ -222,7 +222,7 @@ def mlp_faults(pairs: Pairs, found: Contacts) -> np.ndarray:
     are the patch box (core/src/mlp/patch_box.hpp).
     """
     rows = np.flatnonzero(found.colliding)
-    axes, middle, half, _ = native.mlp_inputs(*pairs.rows(rows))
+    axes, middle, half, _ = probes.patch_boxes(pairs.rows(rows))
     off = np.abs(np.einsum('nji,nj->ni', axes, found.point[rows] - middle))
     size = pairs.size[rows]
     deep = np.maximum(half[:, 2], -found.separation[rows])

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from benchmarks import settled
+from benchmarks import probes, settled
 from benchmarks.pose_sets import (
     CONTAINER,
     CUBE,
@@ -27,7 +27,6 @@ from benchmarks.pose_sets import (
     stacked,
     turns,
 )
-from box_contact_ros.core import native
 
 PIECE = 100_000  # pairs that are made at a time
 
@@ -69,7 +68,7 @@ def describe(pairs: Pairs) -> tuple[MlpSamples, np.ndarray]:
     """Return the samples of the pairs that touch, and which these are (n,)."""
     exact = pairs.contacts()
     rows = exact.colliding & (exact.volume > 0.0)
-    axes, middle, half, features = native.mlp_inputs(*pairs.rows(rows))
+    axes, middle, half, features = probes.patch_boxes(pairs.rows(rows))
     to_box = axes.swapaxes(1, 2)
     covariance = to_box @ exact.covariance[rows] @ axes
     return MlpSamples(

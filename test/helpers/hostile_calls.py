@@ -298,8 +298,6 @@ def random_calls(seed: int, rounds: int) -> None:
         (native.Contact, [True, -1.0, np.ones(3), np.ones(3), 1.0, np.eye(3), 2], {}),
         (native.write_poses, [rows(), np.array([3, 0]), [POSE, None]], {}),
         (native.place_boxes, [rows(), np.array([3, -1]), rows(2)], {}),
-        (native.mlp_inputs, [rows(), rows(), one, one], {}),
-        (native.clipped, [rows(), rows(), one, one], {}),
         (native.BroadPhase, phase_arguments(), {}),
         (native.BroadPhase(*phase_arguments()).find, [rows(), 10], {}),
         (native.BroadPhase(*phase_arguments()).resize, [np.arange(4), np.ones((4, 3))], {}),

@@ -19,7 +19,7 @@ from safetensors.numpy import save_file
 
 pytest.importorskip('benchmarks.pose_sets')
 
-from benchmarks import settled
+from benchmarks import probes, settled
 from benchmarks.contestant import MLP_SIZES, idle_mlp
 from benchmarks.errors import contact_errors
 from benchmarks.pose_sets import LOADS, SETS, Generator, Pairs, at_depth, log_uniform
@@ -95,7 +95,7 @@ def assert_sound(pairs: Pairs, found: Contacts) -> None:
     The box is that of float32, but for its axis along the normal.
     """
     rows = found.colliding
-    axes, middle, half, *_ = native.mlp_inputs(*pairs.rows(rows))
+    axes, middle, half, *_ = probes.patch_boxes(pairs.rows(rows))
     assert rows.any() and np.isfinite(found.point[rows]).all()
     reach = np.abs(found.point[rows]).max(axis=1) + pairs.size[rows]
     off = np.abs(np.einsum('nji,nj->ni', axes, found.point[rows] - middle))
@@ -164,7 +164,7 @@ def test_the_bounds_hold_the_overlap(pairs: Pairs) -> None:
     """The exact centroid is between them, and the exact volume below theirs."""
     truth = pairs.contacts()
     rows = truth.colliding & (truth.separation < -1e-8 * pairs.size)
-    axes, middle, half, _ = native.mlp_inputs(*pairs.rows(rows))
+    axes, middle, half, _ = probes.patch_boxes(pairs.rows(rows))
     off = np.einsum('nji,nj->ni', axes, truth.point[rows] - middle)
     assert np.all(np.abs(off) <= half + FLOAT_ROUNDING * pairs.size[rows, None])
     thick = half.min(axis=1) > 1e-4 * pairs.size[rows]  # others are rounded by more than a percent
@@ -363,7 +363,7 @@ def test_a_network_of_zeros_answers_with_the_middle(tmp_path: Path) -> None:
     found = pairs.contacts(ContactSolver(
         model=make_model('mlp', weights=written(tmp_path / 'zeros'))))
     rows = found.colliding
-    axes, middle, half, _ = native.mlp_inputs(*pairs.rows(rows))
+    axes, middle, half, _ = probes.patch_boxes(pairs.rows(rows))
     inside = pairs.rows(rows).beyond(middle) < 0.0  # what is not is moved into both boxes
     assert inside.mean() > 0.5
     np.testing.assert_allclose(found.volume[rows], 1e-5 * np.prod(2.0 * half, axis=1), rtol=1e-5)

@@ -5,7 +5,6 @@
 #pragma once
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <iterator>
 #include <memory>
@@ -19,7 +18,6 @@
 
 namespace box_contact::binding {
 
-using detail::Counts;
 using detail::Model;
 
 inline const detail::Kernel* kernel = nullptr;  // of this process
@@ -27,22 +25,14 @@ inline PyTypeObject *exact_type = nullptr, *mlp_type = nullptr, *paper_type = nu
 
 struct NativeModel {
   Model kind = Model::exact;
-  std::vector<float> network;    // of `Mlp` and `Paper`
-  std::atomic<long> clipped{0};  // contacts that took another way than most
+  std::vector<float> network;  // of `Mlp` and `Paper`
 
   detail::Solver solver() const { return {kernel, kind, network.data()}; }
-  void count(const Counts& counts) {
-    if (counts.clipped) clipped += counts.clipped;
-  }
   // Solve rows without Python's lock. Returns the first row that is refused, or −1.
-  long solve(const Rows& rows, const ContactArrays& found, double margin, long threads) {
-    Counts counts{};
-    long refused = without_lock([&] {
-      return detail::solve_rows(solver(), rows, long(found.count), found.results(margin), threads,
-                                counts);
+  long solve(const Rows& rows, const ContactArrays& found, double margin, long threads) const {
+    return without_lock([&] {
+      return detail::solve_rows(solver(), rows, long(found.count), found.results(margin), threads);
     });
-    if (refused < 0) count(counts);
-    return refused;
   }
 };
 
@@ -153,10 +143,6 @@ inline PyObject* model_solve(PyObject* self, PyObject* const* args, Py_ssize_t c
   return Py_BuildValue("(Nl)", found.release(), refused);
 }
 
-inline PyObject* model_clipped(PyObject* self, void*) {
-  return PyLong_FromLong(ModelObject::of(self)->clipped.load());
-}
-
 inline PyMethodDef solve_method(PyCFunction solve) {
   return {"solve", solve, METH_FASTCALL,
           "solve(a, b, size_a, size_b, threads=1, patch=True, pairs=None, margin=0.0, /)\n--\n\n"
@@ -172,17 +158,12 @@ inline PyMethodDef network_methods[] = {
     solve_method(method<model_solve>()),
     {"__reduce__", method<network_reduce>(), METH_NOARGS, "Pickle the network."},
     {}};
-inline PyGetSetDef model_attributes[] = {{"clipped", Guarded<model_clipped>::call, nullptr,
-                                          "Contacts of `Exact` that were clipped.", nullptr},
-                                         {}};
-
 inline PyType_Slot exact_slots[] = {
     {Py_tp_doc, const_cast<char*>("Exact()\n--\n\n"
                                   "Model `exact`: the exact moments of the overlap.")},
     {Py_tp_new, slot<exact_new>()},
     {Py_tp_dealloc, reinterpret_cast<void*>(ModelObject::dealloc)},
     {Py_tp_methods, exact_methods},
-    {Py_tp_getset, model_attributes},
     {0, nullptr}};
 inline PyType_Slot mlp_slots[] = {
     {Py_tp_doc, const_cast<char*>("Mlp(network=None)\n--\n\n"
@@ -190,7 +171,6 @@ inline PyType_Slot mlp_slots[] = {
     {Py_tp_new, slot<mlp_new>()},
     {Py_tp_dealloc, reinterpret_cast<void*>(ModelObject::dealloc)},
     {Py_tp_methods, network_methods},
-    {Py_tp_getset, model_attributes},
     {0, nullptr}};
 inline PyType_Slot paper_slots[] = {
     {Py_tp_doc, const_cast<char*>("Paper(network)\n--\n\n"
@@ -199,7 +179,6 @@ inline PyType_Slot paper_slots[] = {
     {Py_tp_new, slot<paper_new>()},
     {Py_tp_dealloc, reinterpret_cast<void*>(ModelObject::dealloc)},
     {Py_tp_methods, network_methods},
-    {Py_tp_getset, model_attributes},
     {0, nullptr}};
 inline PyType_Spec exact_spec = {"box_contact_ros.core._native.Exact", sizeof(ModelObject), 0,
                                  Py_TPFLAGS_DEFAULT | Py_TPFLAGS_IMMUTABLETYPE, exact_slots};

@@ -3,12 +3,12 @@
 
 // The library as a Python extension: its functions and types.
 #include "../src/force/patch_forces.hpp"
+#include "../src/minimum_depth.hpp"
 #include "broad_phase.hpp"
 #include "forces.hpp"
 #include "pair_solver.hpp"
 #include "patch_area.hpp"
 #include "pose_faults.hpp"
-#include "probes.hpp"
 
 namespace {
 
@@ -42,14 +42,6 @@ PyMethodDef module_methods[] = {
      "Write the poses of boxes of bodies to the first n rows of an array (m, 7).\n\n"
      "bodies (n,): the row of each box's body, or -1. local (n, 7): poses in the bodies' frames.\n"
      "Return the row of a body with a bad pose, or -1. Of one with seven NaN, boxes get NaN."},
-    {"mlp_inputs", method<mlp_inputs>(), METH_FASTCALL,
-     "mlp_inputs(poses_a, poses_b, sizes_a, sizes_b)\n--\n\n"
-     "Return what model `mlp` reads of n pairs that touch.\n\n"
-     "axes (n, 3, 3), middle (n, 3), half (n, 3) of the patch box: its axes as columns, mirrored as\n"
-     "the features are, common frame [m]. features (n, FEATURES) of the network."},
-    {"clipped", method<clipped>(), METH_FASTCALL,
-     "clipped(poses_a, poses_b, sizes_a, sizes_b)\n--\n\n"
-     "Return points, volumes and covariances of n pairs that touch, all by clipping: for tests."},
     {"message_numbers", method<message_numbers>(), METH_FASTCALL,
      "message_numbers(point, normal, separation, volume, covariance)\n--\n\n"
      "Return rows (n, 15) of contacts: point, normal, depth, volume, area, upper covariance."},

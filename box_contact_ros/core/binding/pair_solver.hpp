@@ -87,10 +87,8 @@ inline PyObject* solver_call(PyObject* self, PyObject* args, PyObject* keywords)
     const double* a = numbers_of(PyTuple_GET_ITEM(args, 0), 7, copy_a);
     const double* b = a ? numbers_of(PyTuple_GET_ITEM(args, 1), 7, copy_b) : nullptr;
     bc_contact contact;
-    Counts counts{};
     if (b && detail::solve_pair(setup->model->solver(), setup->pair(a, b), BC_COVARIANCE,
-                                setup->margin, contact, counts)) {
-      setup->model->count(counts);
+                                setup->margin, contact)) {
       return Contact::make(contact_type, std::move(contact));
     }
   }
@@ -167,11 +165,6 @@ inline PyObject* solver_batch(PyObject* self, PyObject* args, PyObject* keywords
   return call_method(self, name_batch_general, args, keywords);
 }
 
-inline PyObject* solver_clipped(PyObject* self, void*) {
-  const Setup* setup = Holder<PairSolver>::of(self).setup.get();
-  return PyLong_FromLong(setup ? setup->model->clipped.load() : 0);
-}
-
 inline PyMethodDef solver_methods[] = {
     {"batch", method<solver_batch>(), METH_VARARGS | METH_KEYWORDS,
      "batch($self, poses_a, poses_b=None, *, size_a=None, size_b=None, sizes=None, pairs=None, "
@@ -185,10 +178,6 @@ inline PyMethodDef solver_methods[] = {
      "NaN;\n"
      "points then have the same error bounds, not always the same bits."},
     {nullptr, nullptr, 0, nullptr}};
-inline PyGetSetDef solver_attributes[] = {{"clipped", Guarded<solver_clipped>::call, nullptr,
-                                    "Contacts of model exact that were clipped.", nullptr},
-                                   {nullptr, nullptr, nullptr, nullptr, nullptr}};
-
 inline PyType_Slot solver_slots[] = {
     {Py_tp_doc,
      const_cast<char*>(
@@ -202,7 +191,6 @@ inline PyType_Slot solver_slots[] = {
     {Py_tp_dealloc, reinterpret_cast<void*>(Holder<PairSolver>::dealloc)},
     {Py_tp_call, slot<solver_call>()},
     {Py_tp_methods, solver_methods},
-    {Py_tp_getset, solver_attributes},
     {0, nullptr}};
 
 inline PyType_Spec solver_spec = {"box_contact_ros.core._native.PairSolver",

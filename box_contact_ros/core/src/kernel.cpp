@@ -6,6 +6,7 @@
 
 #include "mlp/mlp_model.hpp"
 #include "mlp/paper_model.hpp"
+#include "overlap/exact.hpp"
 #include "pair.hpp"
 #include "queue.hpp"
 
@@ -42,13 +43,12 @@ M model_of(const float* network) {
 }
 template <class M>
 bool pair_by(const float* network, const detail::PairNumbers& pair, double margin,
-             bc_contact& contact, Counts& counts) {
-  return solve_pair(model_of<M>(network), pair, margin, contact, counts);
+             bc_contact& contact) {
+  return solve_pair(model_of<M>(network), pair, margin, contact);
 }
 template <class M>
-long rows_by(const float* network, const Rows& rows, long begin, long end, const Results& results,
-             Counts& counts) {
-  return solve_rows<Lanes<double, lanes>>(model_of<M>(network), rows, begin, end, results, counts);
+long rows_by(const float* network, const Rows& rows, long begin, long end, const Results& results) {
+  return solve_rows<Lanes<double, lanes>>(model_of<M>(network), rows, begin, end, results);
 }
 
 }  // namespace

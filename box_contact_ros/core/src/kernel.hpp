@@ -34,13 +34,6 @@ struct Results {
   double margin;  // [m]; normals are given up to this separation
 };
 
-// How many contacts took another way than most.
-struct Counts {
-  long clipped;  // by model `exact`: clipped, because the certificate did not hold
-
-  void operator+=(const Counts& part) { clipped += part.clipped; }
-};
-
 enum class Model { exact, mlp, paper };
 constexpr int model_count = 3;
 
@@ -55,10 +48,10 @@ struct Kernel {
   // Solve a pair alone. Returns false, and leaves `contact`, if it is refused. What is not found of the
   // overlap is NaN.
   bool (*solve_pair[model_count][2])(const float* network, const PairNumbers&, double margin,
-                                     bc_contact& contact, Counts&);
+                                     bc_contact& contact);
   // Solve rows `begin` to `end`. Returns the first row that is refused, or −1.
   long (*solve_rows[model_count][2])(const float* network, const Rows&, long begin, long end,
-                                     const Results&, Counts&);
+                                     const Results&);
 };
 
 extern const Kernel kernel_baseline, kernel_avx2, kernel_avx512;

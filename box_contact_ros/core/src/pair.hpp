@@ -5,7 +5,9 @@
 #pragma once
 
 #include "../include/box_contact/box_contact.h"
-#include "overlap/exact.hpp"
+#include "kernel.hpp"
+#include "overlap/moments.hpp"
+#include "query.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
 
@@ -34,7 +36,7 @@ BC_INLINE void store(const Moments<double>& overlap, bc_contact& contact) {
 // stays NaN.
 template <class Model>
 BC_INLINE bool solve_pair(const Model& model, const detail::PairNumbers& pair, double margin,
-                          bc_contact& contact, Counts& counts) {
+                          bc_contact& contact) {
   Query<double> q;
   query(pose_at(pair.pose_a), pose_at(pair.pose_b), size_at(pair.size_a), size_at(pair.size_b), q);
   if (!q.pair.valid) return false;
@@ -57,7 +59,7 @@ BC_INLINE bool solve_pair(const Model& model, const detail::PairNumbers& pair, d
   store(normal, contact.normal);
   if (!q.touching) return true;
   Found overlap;
-  model.solve(q, overlap, counts);  // a pair alone is left to nobody
+  model.solve(q, overlap);  // a pair alone is left to nobody
   store(overlap, contact);
   if constexpr (Found::has_normal) store(triple(overlap.normal), contact.normal);
   return true;

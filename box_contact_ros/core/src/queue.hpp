@@ -7,7 +7,6 @@
 // A row of a batch has the bits of a single call, whatever it waits with.
 #pragma once
 
-#include "overlap/exact.hpp"
 #include "rows.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
@@ -47,8 +46,8 @@ class Queue {
   // the first cache, so blocks of four gain by it. Blocks of eight do not.
   static constexpr int blocks_at_once = width<T> < 8 ? 8 : 1;
 
-  BC_INLINE Queue(const Model& model, const Results& results, Counts& counts)
-      : model_(model), results_(results), counts_(counts) {
+  BC_INLINE Queue(const Model& model, const Results& results)
+      : model_(model), results_(results) {
     for (int n = 0; n < blocks_at_once; ++n) next_[n] = &blocks_[n];
   }
 
@@ -72,7 +71,7 @@ class Queue {
   }
 
  private:
-  // A block that is held is exchanged for a free one.
+  // A first block of two is exchanged for a free one.
   BC_INLINE void solve(Block<T>*& block) {
     if constexpr (Model::solves_two_blocks) {
       if (pending_->count) {
@@ -83,7 +82,7 @@ class Queue {
       }
     } else {
       typename Model::template Found<T> found{};
-      unsigned left = model_.solve(block->query, found, counts_),
+      unsigned left = model_.solve(block->query, found),
                touching = bits(block->query.touching);
       write_overlaps<T>(found, touching & ~left, block->rows, results_);
       for (left &= touching; left; left &= left - 1)
@@ -95,7 +94,8 @@ class Queue {
     solve(waiting_);
     waiting_->count = 0;
   }
-  // With the second of two blocks, where the model solves two at once.
+  // Solve what is pending: with `second` where the model solves two blocks; else it is what the model
+  // left, and `second` is not read.
   [[gnu::noinline]] void solve_pending(const Block<T>& second) {
     typename Model::template Found<T> found{};
     if constexpr (Model::solves_two_blocks) {
@@ -104,7 +104,7 @@ class Queue {
       write_overlaps<T>(of_second, bits(second.query.touching), second.rows, results_);
     } else {
       pending_->fill();
-      model_.solve_left(pending_->query, found, counts_);
+      model_.solve_left(pending_->query, found);
     }
     write_overlaps<T>(found, bits(pending_->query.touching), pending_->rows, results_);
     pending_->count = 0;
@@ -112,23 +112,22 @@ class Queue {
 
   const Model& model_;
   const Results& results_;
-  Counts& counts_;
   Block<T> blocks_[blocks_at_once + 2];
   Block<T>* next_[blocks_at_once];
-  Block<T>* waiting_ = &blocks_[blocks_at_once];   // for others, to fill a block
+  Block<T>* waiting_ = &blocks_[blocks_at_once];      // for others, to fill a block
   Block<T>* pending_ = &blocks_[blocks_at_once + 1];  // the first of two, or what the model left
 };
 
 // A row alone. No model leaves it.
 template <class Model>
 [[gnu::noinline]] inline long solve_row(const Model& model, const Rows& rows, long row,
-                                        const Results& results, Counts& counts) {
+                                        const Results& results) {
   Query<double> query;
   query_rows(rows, row, row + 1, query);
   long refused = write_query(query, row, row + 1, results);
   if (query.touching && want_overlap(results)) {
     typename Model::template Found<double> found;
-    model.solve(query, found, counts);
+    model.solve(query, found);
     write_overlaps<double>(found, 1, {row}, results);
   }
   return refused;
@@ -141,11 +140,11 @@ template <class Model>
 // registers of two a pair alone is slower than a block of two with an idle lane.
 template <class T, class Model>
 [[gnu::noinline]] inline long solve_rows(const Model& model, const Rows& rows, long begin, long end,
-                                         const Results& results, Counts& counts) {
+                                         const Results& results) {
   long refused = -1, first = begin;
   auto note = [&](long row) { refused = refused < 0 ? row : refused; };
   if constexpr (!is_scalar<T>) {
-    Queue<T, Model> queue(model, results, counts);
+    Queue<T, Model> queue(model, results);
     constexpr int lanes = width<T>;
     constexpr long few = lanes <= 2 ? 0 : 2;
     bool no_others = end - begin <= lanes;
@@ -163,7 +162,7 @@ template <class T, class Model>
     }
     queue.finish();
   }
-  for (; first < end; ++first) note(solve_row(model, rows, first, results, counts));
+  for (; first < end; ++first) note(solve_row(model, rows, first, results));
   return refused;
 }
 

@@ -11,7 +11,6 @@
 
 namespace box_contact::BOX_CONTACT_SET {
 
-using detail::Counts;
 using detail::Results;
 using detail::Rows;
 

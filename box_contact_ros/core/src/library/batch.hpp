@@ -35,20 +35,19 @@ struct Solver {
   const float* network;  // of models `mlp` and `paper`
 
   // Solve rows `begin` to `end` in this thread. Returns the first row that is refused, or −1.
-  long solve(const Rows& rows, long begin, long end, const Results& results,
-             Counts& counts) const {
+  long solve(const Rows& rows, long begin, long end, const Results& results) const {
     auto* solve_rows =
         kernel->solve_rows[int(model)][int(results.covariance ? Finds::patch : Finds::point)];
-    return solve_rows(network, rows, begin, end, results, counts);
+    return solve_rows(network, rows, begin, end, results);
   }
 };
 
 // Solve one pair. Returns false, and leaves `contact`, if it is refused.
 inline bool solve_pair(const Solver& solver, const PairNumbers& pair, bc_patch patch, double margin,
-                       bc_contact& contact, Counts& counts) {
+                       bc_contact& contact) {
   Finds finds = patch == BC_COVARIANCE ? Finds::patch : Finds::point;
   auto* solve = solver.kernel->solve_pair[int(solver.model)][int(finds)];
-  if (!solve(solver.network, pair, margin, contact, counts)) return false;
+  if (!solve(solver.network, pair, margin, contact)) return false;
   if (patch == BC_NO_PATCH && contact.colliding)
     contact.volume = std::numeric_limits<double>::quiet_NaN();
   return true;
@@ -58,16 +57,14 @@ inline bool solve_pair(const Solver& solver, const PairNumbers& pair, bc_patch p
 constexpr long rows_per_chunk = 512;
 
 inline long solve_in_threads(const Solver& solver, const Rows& rows, long count,
-                             const Results& results, long threads, Counts& counts) {
+                             const Results& results, long threads) {
   long chunks = (count + rows_per_chunk - 1) / rows_per_chunk;
-  std::vector<Counts> counts_of(threads, Counts{});
   std::vector<long> refused_of(threads, count);
   in_threads(threads, chunks, [&](long thread, long chunk) {
     long begin = chunk * rows_per_chunk, end = std::min(begin + rows_per_chunk, count);
-    long refused = solver.solve(rows, begin, end, results, counts_of[thread]);
+    long refused = solver.solve(rows, begin, end, results);
     if (refused >= 0) refused_of[thread] = std::min(refused_of[thread], refused);
   });
-  for (const Counts& part : counts_of) counts += part;
   long refused = *std::min_element(refused_of.begin(), refused_of.end());
   return refused < count ? refused : -1;
 }
@@ -75,10 +72,10 @@ inline long solve_in_threads(const Solver& solver, const Rows& rows, long count,
 // Solve `count` rows, in as many threads as are asked for and worth it. Rows are independent, so no bit
 // depends on the number of threads. Returns the first row that is refused, or −1.
 inline long solve_rows(const Solver& solver, const Rows& rows, long count, const Results& results,
-                       long threads, Counts& counts) {
+                       long threads) {
   threads = std::min(threads, (count + rows_per_chunk - 1) / rows_per_chunk);
-  return threads <= 1 ? solver.solve(rows, 0, count, results, counts)
-                      : solve_in_threads(solver, rows, count, results, threads, counts);
+  return threads <= 1 ? solver.solve(rows, 0, count, results)
+                      : solve_in_threads(solver, rows, count, results, threads);
 }
 
 }  // namespace box_contact::detail

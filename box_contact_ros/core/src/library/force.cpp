@@ -181,9 +181,7 @@ bc_status solve_own(PatchForces& self, double dt, const bc_pose* poses, const bc
   const Kernel* kernel = chosen_kernel();
   if (!kernel) return fail(BC_BAD_ENVIRONMENT, "BOX_CONTACT_INSTRUCTION_SET is unknown");
   auto solve = [&](const Rows& rows, long count, const Results& results) {
-    Counts counts{};
-    return solve_rows({kernel, Model::exact, nullptr}, rows, count, results, self.threads(),
-                      counts);
+    return solve_rows({kernel, Model::exact, nullptr}, rows, count, results, self.threads());
   };
   PatchForces::Held held;
   long refused = self.solve_own(dt, poses, outside, solve, held);

@@ -137,8 +137,7 @@ bc_status collide_rows(const Solver& solver, const bc_rows& given, double margin
             long(given.pose_count)};
   Results results{wanted.colliding, wanted.separation, wanted.normal, wanted.point,
                   wanted.volume,    wanted.covariance, wanted.axis,   margin};
-  Counts counts{};
-  refused = solve_rows(solver, rows, long(given.count), results, threads, counts);
+  refused = solve_rows(solver, rows, long(given.count), results, threads);
   if (refused < 0) return BC_OK;
   // Another thread may have changed the pairs since: each place is read once.
   int64_t places[2] = {refused, refused};
@@ -178,8 +177,7 @@ bc_status bc_collide(const bc_box* a, const bc_box* b, const bc_query* query,
     if (!a || !b || !contact) return refuse_null(!a ? "a" : !b ? "b" : "contact");
     return with_query(query, [&](const Solver& solver, const bc_query& asked) {
       PairNumbers pair{numbers(&a->pose), numbers(&b->pose), numbers(&a->size), numbers(&b->size)};
-      Counts counts{};
-      if (solve_pair(solver, pair, asked.patch, asked.margin, *contact, counts)) return BC_OK;
+      if (solve_pair(solver, pair, asked.patch, asked.margin, *contact)) return BC_OK;
       return refuse_pair(pair.pose_a, pair.pose_b, pair.size_a, pair.size_b);
     });
   });

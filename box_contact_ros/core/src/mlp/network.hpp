@@ -5,7 +5,6 @@
 // them. The weights are in memory, so one function runs networks of all sizes.
 #pragma once
 
-#include "../kernel.hpp"
 #include "../lanes/floats.hpp"
 #include "../query.hpp"
 #include "format.hpp"
@@ -139,8 +138,7 @@ struct NetworkModel {
   template <class T>
   using Found = typename Way::template Found<T>;
 
-  BC_INLINE unsigned solve(const Query<double>& query, Found<double>& found,
-                           detail::Counts&) const {
+  BC_INLINE unsigned solve(const Query<double>& query, Found<double>& found) const {
     Way::template solve<double>(network, {&query}, {&found});
     return 0;
   }

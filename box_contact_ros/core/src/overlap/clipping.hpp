@@ -289,8 +289,8 @@ inline Found overlap_from(const Pair<double>& pair, int face, double& kept) {
   kept = gross > 0.0 ? std::fabs(sum.volume) / gross : 0.0;
   Found overlap;
   overlap.volume = (1.0 / 6.0) * std::fabs(sum.volume);
-  overlap.centroid =
-      of_a ? centroid : components<double>(pair.offset_a + pair.b_in_a * triple(centroid));
+  Triple<double> in_a = of_a ? triple(centroid) : pair.offset_a + pair.b_in_a * triple(centroid);
+  overlap.centroid = components<double>(point_in_common_frame(pair, in_a));
 
   // 5. Second moments about the centroid.
   if constexpr (std::is_same_v<Found, Moments<double>>) {
@@ -319,8 +319,8 @@ inline Found overlap_from(const Pair<double>& pair, int face, double& kept) {
 
 }  // namespace clipping
 
-// The overlap of a pair that has been pressed in, with its centroid in A's frame. `face`: the best face
-// axis, 0–5. Found: Moments, or PointAndVolume.
+// The overlap of a pair that has been pressed in. `face`: the best face axis, 0–5. Found: Moments, or
+// PointAndVolume.
 template <class Found>
 inline Found overlap_by_clipping(const Pair<double>& pair, int face) {
   double kept;

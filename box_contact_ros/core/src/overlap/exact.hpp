@@ -10,7 +10,6 @@
 //    cancelled, else by clipping (clipping.hpp).
 #pragma once
 
-#include "../kernel.hpp"
 #include "../minimum_depth.hpp"
 #include "../query.hpp"
 #include "clipping.hpp"
@@ -18,8 +17,6 @@
 #include "overlap_by_planes.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
-
-using detail::Counts;
 
 // The way between the boxes, where pairs at exact touch are pressed in to the minimum depth.
 template <class T>
@@ -48,17 +45,21 @@ struct Pressed {
   }
 };
 
-// The overlap of a pair whose planes have been found, with its centroid in the common frame.
-template <bool two_sided, class T, class Found>
-BC_INLINE planes::Certificate<T> overlap_of(const Query<T>& q, const Pressed<T>& pressed,
-                                            const planes::PairOfBoxes<T>& boxes, Found& found) {
-  const Pair<T>& pair = q.pair;
-  T depth = max(-q.axis.separation, depth_floor * pair.size);
-  auto certificate = overlap_by_planes<two_sided>(pair, boxes, depth, found);
-  found.centroid = components<T>(planes::one_of<T>(boxes.p_is_a, pair.origin_a, pressed.origin_b) +
-                                 planes::one_of<T>(boxes.p_is_a, pair.axes_a, pair.axes_b) *
-                                     triple(found.centroid));
-  return certificate;
+// The depth that an overlap has at least [m], for its accuracy.
+template <class T>
+BC_INLINE T pressed_depth(const Query<T>& q) {
+  return max(-q.axis.separation, depth_floor * q.pair.size);
+}
+
+// Find the overlap of a single pair by sums about a point near it. Returns whether they are right.
+template <class Found>
+bool find_about(const Query<double>& q, const Pressed<double>& pressed, const Vec<double>& near,
+                Found& found) {
+  planes::PairOfBoxes<double> boxes(q.pair, q.axis, pressed.from_a, pressed.from_b, pressed.depth);
+  Columns<double> to_p = transpose(boxes.p_is_a ? q.pair.axes_a : q.pair.axes_b);
+  Triple<double> origin = boxes.p_is_a ? q.pair.origin_a : pressed.origin_b;
+  boxes.take_sums_about(to_p * (triple(near) - origin));
+  return overlap_by_planes<true>(q.pair, boxes, pressed.origin_b, pressed_depth(q), found).holds;
 }
 
 // The overlap of a single pair that is not certain. Where sums about a point far from a thin overlap
@@ -66,21 +67,12 @@ BC_INLINE planes::Certificate<T> overlap_of(const Query<T>& q, const Pressed<T>&
 // is lost, or too long a lever moves its end, about any point.
 template <class Found>
 [[gnu::noinline]] void solve_uncertain(Query<double> q, const Vec<double>& near, bool cancelled,
-                                       Found& found, Counts& counts) {
+                                       Found& found) {
   Pressed<double> pressed(q);
-  if (cancelled) {
-    planes::PairOfBoxes<double> boxes(q.pair, q.axis, pressed.from_a, pressed.from_b,
-                                      pressed.depth);
-    Columns<double> to_p = transpose(boxes.p_is_a ? q.pair.axes_a : q.pair.axes_b);
-    Triple<double> origin = boxes.p_is_a ? q.pair.origin_a : pressed.origin_b;
-    boxes.take_sums_about(to_p * (triple(near) - origin));
-    if (overlap_of<true>(q, pressed, boxes, found).holds) return;
-  }
-  ++counts.clipped;
+  if (cancelled && find_about(q, pressed, near, found)) return;
   q.pair.offset_a = pressed.from_a;
   q.pair.offset_b = -pressed.from_b;
   found = overlap_by_clipping<Found>(q.pair, int(q.axis.face));
-  found.centroid = components<double>(point_in_common_frame(q.pair, triple(found.centroid)));
 }
 
 // Shortest edge [of the size] of boxes whose second moments are sound. Of longer needles and thinner
@@ -105,17 +97,18 @@ BC_INLINE void mend_needles(const Pair<T>& pair, unsigned chosen, Found& found) 
 
 // The overlaps of the chosen lanes, whose planes have been found.
 template <bool two_sided, class T, template <class> class FoundOf>
-BC_INLINE void solve_overlaps(const Query<T>& q, const Pressed<T>& pressed,
-                              const planes::PairOfBoxes<T>& boxes, unsigned chosen,
-                              FoundOf<T>& found, Counts& counts) {
-  auto certificate = overlap_of<two_sided>(q, pressed, boxes, found);
+BC_INLINE void solve_chosen(const Query<T>& q, const Pressed<T>& pressed,
+                            const planes::PairOfBoxes<T>& boxes, unsigned chosen,
+                            FoundOf<T>& found) {
+  auto certificate =
+      overlap_by_planes<two_sided>(q.pair, boxes, pressed.origin_b, pressed_depth(q), found);
   for (unsigned uncertain = chosen & ~bits(certificate.holds); uncertain;
        uncertain &= uncertain - 1) {
     int i = __builtin_ctz(uncertain);
     Vec<double> near;
     copy_lane<T, double>(found.centroid, i, near, 0);
     FoundOf<double> one;
-    solve_uncertain(lane(q, i), near, lane(certificate.cancelled, i) != 0, one, counts);
+    solve_uncertain(lane(q, i), near, lane(certificate.cancelled, i) != 0, one);
     copy_lane<double, T>(one, 0, found, i);
   }
   mend_needles(q.pair, chosen, found);
@@ -124,8 +117,8 @@ BC_INLINE void solve_overlaps(const Query<T>& q, const Pressed<T>& pressed,
 template <class T, class Found>
 [[gnu::noinline]] void solve_two_sided(const Query<T>& q, const Pressed<T>& pressed,
                                        const planes::PairOfBoxes<T>& boxes, unsigned chosen,
-                                       Found& found, Counts& counts) {
-  solve_overlaps<true>(q, pressed, boxes, chosen, found, counts);
+                                       Found& found) {
+  solve_chosen<true>(q, pressed, boxes, chosen, found);
 }
 template <class T, class Found>
 [[gnu::noinline]] void solve_parallel(const Query<T>& q, Mask<T> chosen, Found& found) {
@@ -135,45 +128,18 @@ template <class T, class Found>
   put<T>(chosen, parallel, found);
 }
 
-// The overlaps of the chosen lanes by planes. Of W pairs those that have two planes across an axis of a
-// box are left, unless they are more than a quarter, or `all` are wanted. Returns which are left.
-template <class T, class Found>
-BC_INLINE unsigned solve_by_planes(const Query<T>& q, unsigned chosen, bool all, Found& found,
-                                   Counts& counts) {
-  Pressed<T> pressed(q);
-  planes::PairOfBoxes<T> boxes(q.pair, q.axis, pressed.from_a, pressed.from_b, pressed.depth);
-  unsigned two_sided = bits(any_of(boxes.p.both | boxes.q.both)) & chosen;
-  if (all || 4 * __builtin_popcount(two_sided) > __builtin_popcount(chosen)) {
-    solve_two_sided(q, pressed, boxes, chosen, found, counts);
-    return 0;
-  }
-  solve_overlaps<false>(q, pressed, boxes, chosen & ~two_sided, found, counts);
-  return two_sided;
-}
-
-// The overlaps of the pairs that touch. Returns which are left.
-template <class T, class Found>
-[[gnu::noinline]] unsigned solve_exactly(const Query<T>& q, bool all, Found& found,
-                                         Counts& counts) {
-  Mask<T> parallel = are_parallel(q.pair) & q.touching;
-  unsigned others = bits(q.touching) & ~bits(parallel), left = 0;
-  if (others) left = solve_by_planes(q, others, all, found, counts);
-  if (any(parallel)) solve_parallel(q, parallel, found);
-  return left;
-}
-
 // A model has three members for lanes T:
 //
 //   Found<T>: what it finds of an overlap: `Moments<T>`, or `PointAndVolume<T>`.
-//   solve(query, found, counts): fills `found` for the pairs that touch, with the centroid in the
-//     common frame. It returns the bits of those that it leaves; it leaves no pair alone.
-//   solve_left(query, found, counts): the same for pairs that were left, side by side.
+//   solve(query, found): fills `found` for the pairs that touch. It returns the bits of those that it
+//     leaves; it leaves no pair alone.
+//   solve_left(query, found): the same for pairs that were left, side by side; it leaves none.
 //
-// A model that leaves none may take two blocks of pairs at once: `solves_two_blocks` says so. It then has
-// solve_two(query, other, found, other_found) in their place, and `solve` for a pair alone.
+// A model that leaves none may solve two blocks of pairs at once: `solves_two_blocks` says so. It then
+// has solve_two(query, other, found, other_found) in their place, and `solve` for a pair alone.
 
-// Model `exact`. `FoundOf`: Moments, or PointAndVolume. It leaves few pairs of W that have two planes
-// across an axis.
+// Model `exact`. `FoundOf`: Moments, or PointAndVolume. Of W pairs it leaves those that have two planes
+// across an axis of a box, where these are at most a quarter: they take longer, and are solved together.
 template <template <class> class FoundOf>
 struct ExactModelOf {
   static constexpr bool solves_two_blocks = false;
@@ -182,12 +148,33 @@ struct ExactModelOf {
   using Found = FoundOf<T>;
 
   template <class T>
-  BC_INLINE unsigned solve(const Query<T>& query, Found<T>& found, Counts& counts) const {
-    return solve_exactly(query, false, found, counts);
+  BC_INLINE unsigned solve(const Query<T>& query, Found<T>& found) const {
+    return solve_overlaps(query, false, found);
   }
   template <class T>
-  BC_INLINE void solve_left(const Query<T>& query, Found<T>& found, Counts& counts) const {
-    solve_exactly(query, true, found, counts);
+  BC_INLINE void solve_left(const Query<T>& query, Found<T>& found) const {
+    solve_overlaps(query, true, found);
+  }
+
+ private:
+  // `all`: leave none.
+  template <class T>
+  [[gnu::noinline]] static unsigned solve_overlaps(const Query<T>& q, bool all, Found<T>& found) {
+    Mask<T> parallel = are_parallel(q.pair) & q.touching;
+    unsigned chosen = bits(q.touching) & ~bits(parallel), left = 0;
+    if (chosen) {
+      Pressed<T> pressed(q);
+      planes::PairOfBoxes<T> boxes(q.pair, q.axis, pressed.from_a, pressed.from_b, pressed.depth);
+      unsigned two_sided = bits(any_of(boxes.p.both | boxes.q.both)) & chosen;
+      if (all || 4 * __builtin_popcount(two_sided) > __builtin_popcount(chosen)) {
+        solve_two_sided(q, pressed, boxes, chosen, found);
+      } else {
+        solve_chosen<false>(q, pressed, boxes, chosen & ~two_sided, found);
+        left = two_sided;
+      }
+    }
+    if (any(parallel)) solve_parallel(q, parallel, found);
+    return left;
   }
 };
 

@@ -67,7 +67,7 @@ struct PointAndVolume {
   static constexpr bool has_normal = false;  // a normal of the model's own
 
   T volume;         // [m³]
-  Vec<T> centroid;  // in A's frame from a kernel, in the common frame from a model [m]
+  Vec<T> centroid;  // common frame [m]
 };
 
 // What a model finds of the overlap.

@@ -39,12 +39,13 @@ template <class T>
 
 }  // namespace planes
 
-// Find the overlap of a pair of boxes, `depth` deep [m], with its centroid in P's frame. Found:
-// Moments<T>, or PointAndVolume<T>, without second moments and with the equations that the centroid needs
-// alone. `two_sided`: an axis may have two planes.
+// Find the overlap of a pair of boxes, `depth` deep [m]. `origin_b`: B's centre, where it is pressed in,
+// common frame [m]. Found: Moments<T>, or PointAndVolume<T>, without second moments and with the
+// equations that the centroid needs alone. `two_sided`: an axis may have two planes.
 template <bool two_sided, class Found, class T>
 BC_INLINE planes::Certificate<T> overlap_by_planes(const Pair<T>& pair,
-                                                   const planes::PairOfBoxes<T>& boxes, T depth,
+                                                   const planes::PairOfBoxes<T>& boxes,
+                                                   const Triple<T>& origin_b, T depth,
                                                    Found& found) {
   using namespace planes;
   constexpr bool squares = std::is_same_v<Found, Moments<T>>;
@@ -66,8 +67,8 @@ BC_INLINE planes::Certificate<T> overlap_by_planes(const Pair<T>& pair,
   Triple<T> from_origin = ((1.0 / 12.0) * by_volume) * (p.first + m * q.first);
   Triple<T> centroid = boxes.p.origin + from_origin;
   T trace{}, way2{};
+  OneOf<T, Columns<T>> axes = one_of<T>(boxes.p_is_a, pair.axes_a, pair.axes_b);
   if constexpr (squares) {
-    OneOf<T, Columns<T>> axes = one_of<T>(boxes.p_is_a, pair.axes_a, pair.axes_b);
     Squares<T> from_q = turned<T>(m, q.second);
     Squares<T> mean2{from_origin * from_origin, rotated(from_origin) * rotated_back(from_origin)};
     T by_20_volume = 0.05 * by_volume;
@@ -89,7 +90,8 @@ BC_INLINE planes::Certificate<T> overlap_by_planes(const Pair<T>& pair,
     certain.holds &= inside | (shallow == 0);
   }
   found.volume = volume;
-  found.centroid = components<T>(centroid);
+  found.centroid =
+      components<T>(one_of<T>(boxes.p_is_a, pair.origin_a, origin_b) + axes * centroid);
   return certain;
 }
 
