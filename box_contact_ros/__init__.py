@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .forces.support import support
     from .models.make_model import make_model
     from .node.contact_node import ContactNode as ContactNode  # noqa: F401
+    from .plans.plan import Plan
     from .scene.scene import Box, Frame, Pair, Scene
     from .scene.scene_file import read_scene
     from .scene.scene_solver import SceneSolver
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
     from .stream.read_contacts import ReadContacts, read_contacts
 
 __all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Frame', 'Pair', 'PatchForces',
-           'ReadContacts', 'Scene', 'SceneSolver', 'contacts_of', 'make_model', 'patch_area',
-           'patch_areas', 'read_contacts', 'read_scene', 'support']
+           'Plan', 'ReadContacts', 'Scene', 'SceneSolver', 'contacts_of', 'make_model',
+           'patch_area', 'patch_areas', 'read_contacts', 'read_scene', 'support']
 # `ContactNode` needs ROS, and `import *` does without.
 
 _LOADED_WHEN_USED = {
@@ -33,6 +34,7 @@ _LOADED_WHEN_USED = {
     'forces.support': ('support',),
     'models.make_model': ('make_model',),
     'node.contact_node': ('ContactNode',),
+    'plans.plan': ('Plan',),
     'scene.scene_file': ('read_scene',),
     'scene.scene': ('Box', 'Frame', 'Pair', 'Scene'),
     'scene.scene_solver': ('SceneSolver',),

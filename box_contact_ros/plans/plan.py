@@ -1,0 +1,154 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""A plan: boxes, where they are to be, and what is known of their weights."""
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..core import LENGTH_MAX, MASS_MAX
+from ..solver.checks import (
+    absent_poses,
+    as_boxes,
+    as_floats,
+    as_places,
+    as_whole,
+    as_wholes,
+    pose_fault,
+    short_repr,
+)
+
+FAULT_KINDS = ('gap', 'twice', 'slot', 'size type', 'mass', 'dimension', 'pose', 'shape')
+"""What may be wrong with a row of a file."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What a file says wrongly, or what could not be taken from it.
+
+    Raises ValueError for a kind that is not one of FAULT_KINDS.
+    """
+
+    kind: str
+    """One of FAULT_KINDS."""
+    names: tuple[str, ...]
+    """The boxes or rows that are concerned, as the file names them."""
+    text: str
+    """What is wrong, for people."""
+
+    def __post_init__(self) -> None:
+        if self.kind not in FAULT_KINDS:
+            raise ValueError(f'kind must be one of {", ".join(FAULT_KINDS)}, not '
+                             f'{short_repr(self.kind)}')
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Plan:
+    """n boxes, where they are to be, and what is known of their weights.
+
+    Conventions: SI units; a pose is `x y z qx qy qz qw` in a frame common to all boxes.
+    """
+
+    sizes: np.ndarray
+    """(n, 3) full extents [m]."""
+    poses: np.ndarray
+    """(n, 7) of the boxes' centres."""
+    masses: np.ndarray | None
+    """(n,) [kg]; None: unknown, so that geometry alone is judged."""
+    ground: np.ndarray
+    """(g,) the boxes that are fixed, by index."""
+    names: tuple[str, ...]
+    """(n,) by which people know the boxes."""
+    centres: np.ndarray
+    """(n, 3) of mass, in the frame of each box [m]."""
+    limits: np.ndarray
+    """(n,) the most that may rest on each box [kg]; infinity: no limit is known."""
+    body: np.ndarray
+    """(n,) the number of the body of each box. The boxes of a body hold together."""
+    apart: np.ndarray
+    """(a, 2) pairs of boxes, by index, that neither touch nor overlap wherever they are."""
+    faults: tuple[Fault, ...]
+    """What is wrong with the file that the plan is from."""
+
+    def __init__(self, sizes: ArrayLike, poses: ArrayLike, masses: ArrayLike | None = None, *,
+                 ground: ArrayLike = (), names: Sequence[str] | None = None,
+                 centres: ArrayLike | None = None, limits: ArrayLike | None = None,
+                 body: ArrayLike | None = None, apart: ArrayLike = (),
+                 faults: Iterable[Fault] = ()) -> None:
+        """Take what is known; None is what the fields say of what is not.
+
+        sizes: full extents (n, 3), or (3,) of all boxes. masses: (n,), or a number for all boxes.
+        ground: a box or boxes. names: None are '0', '1', and so on. centres: (n, 3); None are the
+        boxes' own centres. body: (n,); None is a body for each box.
+
+        Raises ValueError, with field, row and value, for bad input.
+        """
+        sizes, poses = as_boxes(sizes, poses)
+        count = len(poses)
+        for row in np.flatnonzero(absent_poses(poses))[:1]:
+            raise ValueError(f'poses[{row}] {pose_fault(poses[row])}')
+        self._set(
+            sizes=sizes, poses=poses,
+            masses=None if masses is None else _amounts(masses, 'masses', count, MASS_MAX, 'kg'),
+            ground=np.unique([as_whole(box, 'ground', 0, count - 1) for box in (
+                ground if np.iterable(ground) else [ground])]).astype(np.int64),
+            names=_names(names, count), centres=_centres(centres, count),
+            limits=(np.full(count, np.inf) if limits is None else
+                    _amounts(limits, 'limits', count, np.inf, 'kg')),
+            body=_bodies(body, count), apart=as_places(apart, 'apart', count),
+            faults=tuple(faults))
+        for row, fault in enumerate(self.faults):
+            if not isinstance(fault, Fault):
+                raise ValueError(f'faults[{row}] must be a Fault, not {short_repr(fault)}')
+
+    def _set(self, **fields: object) -> None:
+        for name, value in fields.items():
+            object.__setattr__(self, name, value)
+
+    def __len__(self) -> int:
+        """Return how many boxes there are."""
+        return len(self.poses)
+
+
+def _amounts(value: ArrayLike, name: str, count: int, most: float, unit: str) -> np.ndarray:
+    """Return numbers (n,) from 0 to `most`; one stands for all."""
+    array = as_floats(value, name, f'a number, or numbers ({count},)', (), (count,))
+    array = np.broadcast_to(array, count)
+    for row in np.flatnonzero(~((array >= 0.0) & (array <= most)))[:1]:
+        raise ValueError(f'{name}[{row}] is {array[row]:g} {unit}, not from 0 to {most:g} {unit}')
+    return array
+
+
+def _centres(value: ArrayLike | None, count: int) -> np.ndarray:
+    if value is None:
+        return np.zeros((count, 3))
+    array = as_floats(value, 'centres', f'coordinates ({count}, 3)', (count, 3))
+    for row in np.flatnonzero(~(np.abs(array) <= LENGTH_MAX).all(axis=1))[:1]:
+        raise ValueError(f'centres[{row}] ({", ".join(f"{x:g}" for x in array[row])}) is not '
+                         f'finite, or exceeds {LENGTH_MAX:g} m')
+    return array
+
+
+def _names(value: Sequence[str] | None, count: int) -> tuple[str, ...]:
+    if value is None:
+        return tuple(map(str, range(count)))
+    if isinstance(value, str) or len(value) != count:
+        raise ValueError(f'names must be {count} names, not {short_repr(value)}')
+    for row, name in enumerate(value):
+        if not isinstance(name, str):
+            raise ValueError(f'names[{row}] must be a string, not {short_repr(name)}')
+    return tuple(value)
+
+
+def _bodies(value: ArrayLike | None, count: int) -> np.ndarray:
+    """Return a body's number for each box (n,), counted from 0 by their order."""
+    if value is None:
+        return np.arange(count)
+    numbers = as_wholes(value, 'body')
+    if len(numbers) != count:
+        raise ValueError(f'body must be {count} whole numbers, not {short_repr(value)}')
+    return np.unique(numbers, return_inverse=True)[1].reshape(count)
