@@ -5,6 +5,7 @@
 #include "../src/force/patch_forces.hpp"
 #include "../src/minimum_depth.hpp"
 #include "broad_phase.hpp"
+#include "faces.hpp"
 #include "forces.hpp"
 #include "pair_solver.hpp"
 #include "patch_area.hpp"
@@ -48,6 +49,15 @@ PyMethodDef module_methods[] = {
     {"patch_areas", method<patch_areas>(), METH_FASTCALL,
      "patch_areas(normal, covariance)\n--\n\n"
      "Return areas (n,) of normals (n, 3), covariances (n, 3, 3)."},
+    {"face_patches", method<face_patches>(), METH_FASTCALL,
+     "face_patches(sizes, poses, pairs, normal, tolerance)\n--\n\n"
+     "Return polygon (k, 9, 3), corner_count (k,), area (k,), centre (k, 3), rectangle (k, 4, 3)."},
+    {"bed_pressures", method<bed_pressures>(), METH_FASTCALL,
+     "bed_pressures(polygon, corner_count, at)\n--\n\n"
+     "Return the greatest pressures (k,) of unit loads at points (k, 2) on polygons (k, 9, 2)."},
+    {"hull_depths", method<hull_depths>(), METH_FASTCALL,
+     "hull_depths(points, first, at)\n--\n\n"
+     "Return how far points (n, 2) are inside hulls of points (p, 2), row k from first[k] on."},
     {nullptr, nullptr, 0, nullptr}};
 
 PyModuleDef module_definition = {PyModuleDef_HEAD_INIT,

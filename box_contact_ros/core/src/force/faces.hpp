@@ -1,0 +1,231 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// The patch of two faces: where the faces by which two boxes meet are within a tolerance of each other.
+//
+// Of each box it is the face most parallel to the normal. Both are projected along the normal and
+// intersected; what is left is cut where the gap of their planes exceeds the tolerance. No volume enters,
+// so a tilt of a micron, a depth and a gap change nothing. The overlap of such boxes is a wedge, whose
+// moments tell little of the patch.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "rigid_body.hpp"
+
+namespace box_contact::BOX_CONTACT_SET::force {
+
+struct Point {
+  double x, y;
+};
+inline Point operator+(const Point& a, const Point& b) { return {a.x + b.x, a.y + b.y}; }
+inline Point operator-(const Point& a, const Point& b) { return {a.x - b.x, a.y - b.y}; }
+inline Point operator*(double factor, const Point& a) { return {factor * a.x, factor * a.y}; }
+inline double dot(const Point& a, const Point& b) { return a.x * b.x + a.y * b.y; }
+inline double cross(const Point& a, const Point& b) { return a.x * b.y - a.y * b.x; }
+
+// A convex polygon, counter-clockwise. Each cut by a line adds at most one corner.
+struct Polygon {
+  static constexpr int corners_max = 9;  // of a face, cut by four edges and by a gap
+
+  std::array<Point, corners_max> corners;
+  int count = 0;
+
+  const Point& operator[](int k) const { return corners[size_t(k)]; }
+  const Point& after(int k) const { return corners[size_t(k + 1 < count ? k + 1 : 0)]; }
+  void add(const Point& corner) {
+    if (count < corners_max) corners[size_t(count++)] = corner;
+  }
+
+  // What is left of it where `value`, which is linear, is at most 0.
+  template <class Value>
+  Polygon where_not_above_zero(Value value) const {
+    Polygon left;
+    for (int k = 0; k < count; ++k) {
+      const Point &here = (*this)[k], &next = after(k);
+      double v = value(here), w = value(next);
+      if (v <= 0.0) left.add(here);
+      if ((v <= 0.0) != (w <= 0.0)) left.add(here + (v / (v - w)) * (next - here));
+    }
+    return left;
+  }
+};
+
+// Area and first and second moments of a polygon about a point, per density.
+struct Moments {
+  double area = 0.0;                        // [m²]
+  Point first = {0.0, 0.0};                 // ∫x, ∫y [m³]
+  double xx = 0.0, yy = 0.0, xy = 0.0;      // [m⁴]
+};
+inline Moments moments_of(const Polygon& polygon, const Point& about) {
+  Moments sum;
+  for (int k = 1; k + 1 < polygon.count; ++k) {
+    Point a = polygon[0] - about, b = polygon[k] - about, c = polygon[k + 1] - about;
+    double area = 0.5 * cross(b - a, c - a);
+    Point all = a + b + c;
+    auto second = [&](double a1, double b1, double c1, double s1, double a2, double b2, double c2,
+                      double s2) { return (a1 * a2 + b1 * b2 + c1 * c2 + s1 * s2) / 12.0; };
+    sum.area += area;
+    sum.first = sum.first + (area / 3.0) * all;
+    sum.xx += area * second(a.x, b.x, c.x, all.x, a.x, b.x, c.x, all.x);
+    sum.yy += area * second(a.y, b.y, c.y, all.y, a.y, b.y, c.y, all.y);
+    sum.xy += area * second(a.x, b.x, c.x, all.x, a.y, b.y, c.y, all.y);
+  }
+  return sum;
+}
+
+// A face of a box, relative to a point: its centre, its outward normal and its half edges.
+struct Face {
+  Vec<double> centre, outward, half_1, half_2;
+
+  double area() const { return 4.0 * length(half_1) * length(half_2); }
+};
+
+// The face of a box most along a direction.
+inline Face face_along(const bc_pose& pose, const bc_size& size, const Vec<double>& origin,
+                       const Vec<double>& direction) {
+  Mat<double> axes = rotation_matrix(pose.quaternion);
+  Vec<double> along = transposed_times(axes, direction);
+  int k = 0;
+  for (int other = 1; other < 3; ++other)
+    if (std::fabs(along[other]) > std::fabs(along[k])) k = other;
+  int next = (k + 1) % 3, last = (k + 2) % 3;
+  Vec<double> outward = (along[k] < 0.0 ? -1.0 : 1.0) * column(axes, k);
+  auto half = [&](int axis) { return 0.5 * size.extent[axis]; };
+  return {(vector(pose.position) - origin) + half(k) * outward, outward,
+          half(next) * column(axes, next), half(last) * column(axes, last)};
+}
+
+// The patch of two faces. Its axes are along the edges of the smaller face; with the normal from A to B
+// they are a right-handed frame.
+struct FacePatch {
+  Vec<double> origin, axis_1, axis_2, normal;  // the origin is the centre of A
+  Point slope;                                 // height of the patch above the origin, along the
+  double height;                               // normal: height + slope · place
+  Polygon polygon;                             // along the axes, from the origin [m]
+  double area;                                 // across the normal [m²]
+  Point centroid;
+
+  Vec<double> in_common_frame(const Point& at) const {
+    double along = height + dot(slope, at);
+    return origin + ((at.x * axis_1 + at.y * axis_2) + along * normal);
+  }
+  // The same, at the height of the centroid.
+  Vec<double> level(const Point& at) const {
+    double along = height + dot(slope, centroid);
+    return origin + ((at.x * axis_1 + at.y * axis_2) + along * normal);
+  }
+  // The corners of the bounding rectangle: ++, +-, --, -+ along axes 1 and 2.
+  std::array<Point, 4> rectangle() const {
+    Point low = polygon[0], high = polygon[0];
+    for (int k = 1; k < polygon.count; ++k) {
+      low = {std::min(low.x, polygon[k].x), std::min(low.y, polygon[k].y)};
+      high = {std::max(high.x, polygon[k].x), std::max(high.y, polygon[k].y)};
+    }
+    return {high, {high.x, low.y}, low, {low.x, high.y}};
+  }
+};
+
+// `normal`: from A to B, of length 1. `tolerance`: the largest gap of the planes within the patch [m].
+inline FacePatch patch_of_faces(const bc_pose& pose_a, const bc_size& size_a, const bc_pose& pose_b,
+                                const bc_size& size_b, const Vec<double>& normal,
+                                double tolerance) {
+  FacePatch patch{};
+  patch.origin = vector(pose_a.position);
+  patch.normal = normal;
+  Face a = face_along(pose_a, size_a, patch.origin, normal);
+  Face b = face_along(pose_b, size_b, patch.origin, -normal);
+  const Vec<double>& edge = (b.area() < a.area() ? b : a).half_1;
+  Vec<double> level = edge - dot(edge, normal) * normal;
+  patch.axis_1 = (1.0 / length(level)) * level;
+  patch.axis_2 = cross(normal, patch.axis_1);
+  auto flat = [&](const Vec<double>& v) {
+    return Point{dot(v, patch.axis_1), dot(v, patch.axis_2)};
+  };
+
+  Point middle = flat(a.centre), u = flat(a.half_1), v = flat(a.half_2);
+  if (cross(u, v) < 0.0) v = -1.0 * v;
+  for (const Point& corner : {middle + u + v, middle - u + v, middle - u - v, middle + u - v})
+    patch.polygon.add(corner);
+  middle = flat(b.centre), u = flat(b.half_1), v = flat(b.half_2);
+  for (const auto& [along, across] : {std::pair{u, v}, std::pair{v, u}}) {
+    Point side = {-across.y, across.x};
+    double reach = std::fabs(dot(side, along));
+    for (double sign : {1.0, -1.0})
+      patch.polygon = patch.polygon.where_not_above_zero(
+          [&](const Point& at) { return sign * dot(side, at - middle) - reach; });
+  }
+
+  // Heights of both planes along the normal.
+  auto plane = [&](const Face& face) {
+    double along = dot(face.outward, normal);
+    return std::pair{(-1.0 / along) * flat(face.outward), dot(face.centre, face.outward) / along};
+  };
+  auto [slope_a, height_a] = plane(a);
+  auto [slope_b, height_b] = plane(b);
+  Point slope = slope_b - slope_a;
+  double gap = height_b - height_a;
+  patch.polygon = patch.polygon.where_not_above_zero(
+      [&](const Point& at) { return gap + dot(slope, at) - tolerance; });
+  patch.slope = 0.5 * (slope_a + slope_b);
+  patch.height = 0.5 * (height_a + height_b);
+  if (patch.polygon.count == 0) return patch;
+  Point about = patch.polygon[0];
+  Moments moments = moments_of(patch.polygon, about);
+  patch.area = std::max(0.0, moments.area);
+  patch.centroid = moments.area > 0.0 ? about + (1.0 / moments.area) * moments.first : about;
+  return patch;
+}
+
+// The parts of a load at the corners of a rectangle, by its centre at `at`: bilinear, so none is below 0.
+inline std::array<double, 4> corner_shares(const std::array<Point, 4>& rectangle, const Point& at) {
+  const Point &high = rectangle[0], &low = rectangle[2];
+  auto share = [](double x, double from, double to) {
+    return to > from ? std::clamp((x - from) / (to - from), 0.0, 1.0) : 0.5;
+  };
+  double x = share(at.x, low.x, high.x), y = share(at.y, low.y, high.y);
+  return {x * y, x * (1.0 - y), (1.0 - x) * (1.0 - y), (1.0 - x) * y};
+}
+
+// The greatest pressure of a unit load with its centre at `at` on a bed of equal stiffness that does not
+// pull [1/m²]: infinite where the centre is on the rim or outside.
+//
+// The pressure is max(0, a + g · (place − at)), with the load's force and no moment about `at`. Newton's
+// method finds a and g: the equations are the gradient of a convex function, whose second derivatives are
+// the moments of what presses.
+inline double greatest_pressure(const Polygon& polygon, const Point& at) {
+  constexpr int steps_max = 100;
+  constexpr double precise = 1e-12;
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  double a = 0.0;
+  Point g = {0.0, 0.0};
+  for (int k = 0; k < polygon.count; ++k)
+    if (!(cross(polygon.after(k) - polygon[k], at - polygon[k]) >= 0.0)) return infinite;
+  Polygon pressed = polygon;
+  for (int step = 0; step < steps_max; ++step) {
+    Moments m = moments_of(pressed, at);
+    // a·(area, first) + g·(first, second) = (1, 0)
+    double determinant = m.xx * m.yy - m.xy * m.xy;
+    if (!(m.area > 0.0 && determinant > 0.0)) return infinite;
+    Point tilt = {(m.yy * m.first.x - m.xy * m.first.y) / determinant,
+                  (m.xx * m.first.y - m.xy * m.first.x) / determinant};
+    double left = m.area - dot(tilt, m.first);
+    if (!(left > 0.0)) return infinite;
+    double next_a = 1.0 / left;
+    Point next_g = -next_a * tilt;
+    double change = std::fabs(next_a - a);
+    a = next_a, g = next_g;
+    if (change <= precise * a) break;
+    pressed = polygon.where_not_above_zero([&](const Point& p) { return -(a + dot(g, p - at)); });
+  }
+  double greatest = 0.0;
+  for (int k = 0; k < polygon.count; ++k)
+    greatest = std::max(greatest, a + dot(g, polygon[k] - at));
+  return greatest;
+}
+
+}  // namespace box_contact::BOX_CONTACT_SET::force

@@ -1,0 +1,84 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The patch of two faces: where the faces by which two boxes meet are within a tolerance.
+
+Of each box it is the face most parallel to the normal. Both are projected along the normal and
+intersected; what is left is cut where the gap of their planes exceeds the tolerance. The overlap of
+boxes at rest is a wedge of a micron, whose moments tell little of this patch.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..core import native
+from .checks import as_number
+
+TOLERANCE = 1e-4
+"""Gap up to which faces touch [m]: that of a simulation at rest."""
+
+
+def as_tolerance(value: Any, sizes: np.ndarray) -> float:
+    """Return a tolerance [m], from 0 to half of the thinnest box; ValueError for others."""
+    tolerance = as_number(value, 'tolerance')
+    most = sizes.min(initial=np.inf) / 2.0
+    if not 0.0 <= tolerance <= most:
+        raise ValueError(f'tolerance must be from 0 to {most:g} m, half of the thinnest box, not '
+                         f'{tolerance:g}')
+    return tolerance
+
+
+@dataclass(frozen=True, eq=False)
+class FacePatches:
+    """The patches of k pairs of boxes, in the common frame, midway between both faces."""
+
+    polygon: np.ndarray
+    """(k, 9, 3) corners, counter-clockwise about the normal; then the first one again [m]."""
+    corner_count: np.ndarray
+    """(k,) how many corners there are: 3 to 9; 0: the faces are apart, and places are NaN."""
+    area: np.ndarray
+    """(k,) [m²] across the normal."""
+    centre: np.ndarray
+    """(k, 3) centroid [m]."""
+    rectangle: np.ndarray
+    """(k, 4, 3) corners of the bounding rectangle along the edges of the smaller face, in turn."""
+
+    @property
+    def width(self) -> np.ndarray:
+        """(k,) the shorter side of the rectangle [m]."""
+        sides = np.linalg.norm(self.rectangle[:, (1, 3)] - self.rectangle[:, :1], axis=2)
+        return sides.min(axis=1)
+
+    def __getitem__(self, rows: np.ndarray) -> FacePatches:
+        return FacePatches(self.polygon[rows], self.corner_count[rows], self.area[rows],
+                           self.centre[rows], self.rectangle[rows])
+
+
+def face_patches(sizes: np.ndarray, poses: np.ndarray, pairs: np.ndarray, normal: np.ndarray,
+                 tolerance: float) -> FacePatches:
+    """Return the patches of pairs (k, 2) with normals (k, 3) from A to B.
+
+    sizes: (n, 3). poses: (n, 7). tolerance: the largest gap within a patch [m].
+    """
+    return FacePatches(*native.face_patches(sizes, poses, pairs, normal, tolerance))
+
+
+def corner_shares(rectangle: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return the parts (k, 4) of loads at the corners (k, 4, 3), by their centres (k, 3).
+
+    They are bilinear, so none is below 0. Four corners on a rigid base are indeterminate: springs
+    would share linearly.
+    """
+    origin = rectangle[:, 2]
+
+    def along(corner: int) -> np.ndarray:
+        edge = rectangle[:, corner] - origin
+        squared = (edge**2).sum(axis=1)
+        share = ((at - origin) * edge).sum(axis=1) / np.where(squared > 0.0, squared, 1.0)
+        return np.where(squared > 0.0, np.clip(share, 0.0, 1.0), 0.5)
+
+    x, y = along(1), along(3)
+    return np.stack((x * y, x * (1.0 - y), (1.0 - x) * (1.0 - y), (1.0 - x) * y), axis=1)
