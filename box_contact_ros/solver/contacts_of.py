@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +19,7 @@ from ..core import native
 from .checks import as_boxes, as_margin, as_places, pose_fault, short_repr
 from .contact import Contacts
 from .contact_solver import ContactSolver
+from .faces import as_tolerance
 
 
 class TooManyNear(ValueError):
@@ -27,7 +29,8 @@ class TooManyNear(ValueError):
 
 
 def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = None, *,
-                fixed: ArrayLike | None = None, margin: float = 0.0, threads: int = 1,
+                fixed: ArrayLike | None = None, margin: float = 0.0, tolerance: float = 0.0,
+                threads: int = 1,
                 ) -> tuple[np.ndarray, Contacts]:
     """Return which boxes touch, as rows (k, 2) of their indices a and b, and the k contacts.
 
@@ -36,9 +39,11 @@ def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = No
     pairs: (m, 2), the pairs that are asked for, in their order; None: each two boxes, a < b.
     fixed: (n,) bool, boxes that never move. Without `pairs`, two of them are no pair.
     margin: pairs apart are listed too, behind those in contact, up to this separation [m].
+    tolerance: the gap up to which boxes touch [m]. Above 0, contacts are those of boxes that are
+    larger by it, with the separation and the volume of the boxes as they are.
 
-    Raises ValueError, with the field and the value, for what is not a size, a pose, a
-    pair or a margin.
+    Raises ValueError, with the field and the value, for what is not a size, a pose, a pair, a
+    margin or a tolerance.
     """
     sizes, poses = as_boxes(sizes, poses)
     margin = as_margin(margin)
@@ -46,13 +51,27 @@ def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = No
     listed = as_places([] if pairs is None else pairs, 'pairs', count)
     if (alone := np.flatnonzero(listed[:, 0] == listed[:, 1])).size:
         raise ValueError(f'pairs[{alone[0]}] is box {listed[alone[0], 0]} with itself')
+    tolerance = as_tolerance(tolerance, sizes)
+    grown = sizes + tolerance
     groups_meet = np.ones((1, 1) if pairs is None and count else (0, 0), np.uint8)
-    broad_phase = native.BroadPhase(sizes, _as_flags(fixed, 'fixed', count), margin, listed,
+    broad_phase = native.BroadPhase(grown, _as_flags(fixed, 'fixed', count), margin, listed,
                                     np.zeros(count, np.int32), groups_meet,
                                     np.full(count, -1, np.int32))
-    near, contacts, _ = find_contacts(broad_phase, ContactSolver(margin=margin), sizes, poses,
-                                      'poses[{}]'.format, threads=threads)
-    return in_contact(near, contacts, margin)
+    solver = ContactSolver(margin=margin)
+    near, contacts, _ = find_contacts(broad_phase, solver, grown, poses, 'poses[{}]'.format,
+                                      threads=threads)
+    near, contacts = in_contact(near, contacts, margin)
+    if not tolerance:
+        return near, contacts
+    # Turned boxes grow by more along some axes.
+    as_they_are = solver.batch(poses, sizes=sizes, pairs=near, threads=threads)
+    touches = as_they_are.separation <= tolerance
+    return in_contact(near, replace(
+        as_they_are, colliding=touches, axis=np.where(touches, contacts.axis, as_they_are.axis),
+        normal=np.where(touches[:, None], contacts.normal, as_they_are.normal),
+        point=np.where(touches[:, None], contacts.point, as_they_are.point),
+        covariance=np.where(touches[:, None, None], contacts.covariance,
+                            as_they_are.covariance)), margin)
 
 
 def _as_flags(value: ArrayLike | None, name: str, count: int) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 import poses
 import pytest
 
-from box_contact_ros import Box, ContactSolver, Scene, SceneSolver, contacts_of
+from box_contact_ros import Box, ContactSolver, Scene, SceneSolver, contacts_of, support
 
 
 def heap(rng, n):
@@ -67,3 +67,35 @@ def test_a_margin_lists_pairs_apart_behind_those_in_contact():
     pairs, contacts = contacts_of(size, pose, margin=0.3)
     assert np.array_equal(pairs, every[[*hit, *near]]) and len(near) > 20
     poses.assert_same_bits(contacts, wanted[[*hit, *near]])
+
+
+def test_a_tolerance_bridges_gaps_and_nothing_wider():
+    """Contacts are those of larger boxes, with separation and volume of the boxes as they are."""
+    rng = np.random.default_rng(5)
+    size, pose = heap(rng, 120)
+    tolerance = 0.02
+    every = np.argwhere(np.triu(np.ones((120, 120), bool), 1))
+    true = ContactSolver().batch(pose, sizes=size, pairs=every)
+    larger = ContactSolver().batch(pose, sizes=size + tolerance, pairs=every)
+    hit = np.flatnonzero(true.separation <= tolerance)
+    pairs, contacts = contacts_of(size, pose, tolerance=tolerance)
+    assert np.array_equal(pairs, every[hit]) and contacts.colliding.all()
+    assert 10 < (contacts.separation > 0).sum() < (larger.colliding & ~true.colliding).sum()
+    for name in ('separation', 'volume'):
+        assert np.array_equal(getattr(contacts, name), getattr(true, name)[hit])
+    for name in ('normal', 'point', 'covariance', 'axis'):
+        assert np.array_equal(getattr(contacts, name), getattr(larger, name)[hit])
+    both, near = contacts_of(size, pose, margin=0.1, tolerance=tolerance)
+    assert np.array_equal(both[:len(hit)], pairs) and near.colliding.sum() == len(hit)
+    apart = near.separation[len(hit):]
+    assert len(apart) > 10 and apart.min() > tolerance and apart.max() <= 0.1
+    assert len(both) == (ContactSolver(margin=0.1).batch(
+        pose, sizes=size, pairs=every).separation <= 0.1).sum()
+
+
+@pytest.mark.parametrize('tolerance', [-1e-9, 0.6, np.nan, np.inf, None, '1', True])
+def test_a_tolerance_is_at_most_half_of_the_thinnest_box(tolerance):
+    with pytest.raises(ValueError, match='^tolerance must be '):
+        contacts_of([(9, 9, 9), (1, 2, 3)], [(0,) * 6 + (1,)] * 2, tolerance=tolerance)
+    with pytest.raises(ValueError, match='^tolerance must be '):
+        support((1, 2, 3), [(0,) * 6 + (1,)], *contacts_of((1, 2, 3), []), tolerance=tolerance)
