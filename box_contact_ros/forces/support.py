@@ -3,8 +3,8 @@
 
 """Support: which boxes carry a box, on how much of its base, and whether it stands.
 
-A patch is taken as the rectangle that has its centroid and its moments across `up`. This is exact
-for boxes with parallel edges. Weights, friction and what boxes carry play no part: see PatchForces.
+The patches are those of the boxes' faces. Weights, friction and what boxes carry play no part: see
+`inspect_plan`.
 """
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core import DEPTH_FLOOR, SQUARE_SLACK
+from ..core import DEPTH_FLOOR, native
 from ..solver.checks import as_boxes, as_floats, as_places, as_whole, short_repr
-from ..solver.contact import Contacts, patch_areas
+from ..solver.contact import Contacts
+from ..solver.faces import TOLERANCE, FacePatches, as_tolerance, face_patches
 from ..solver.pose import rotation_matrix
 
 UPRIGHT = 0.9
 """Least cosine between `up` and the normal of a contact that carries: 26°, which friction 0.5
 holds."""
-_CORNERS = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
 
 
 @dataclass(frozen=True)
@@ -35,21 +35,26 @@ class Support:
     margin: np.ndarray
     """(n,) how far the centre is inside the hull of these contacts [m]; below 0: outside it."""
     stands: np.ndarray
-    """(n,) bool: the centre is inside, and all boxes that carry the box stand."""
+    """(n,) bool: the margin exceeds the tolerance and the depth of the deepest contact that carries
+    the box, and all boxes that carry it stand."""
 
 
 def support(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike, contacts: Contacts, *,
-            ground: ArrayLike = (), up: ArrayLike = (0.0, 0.0, 1.0)) -> Support:
+            ground: ArrayLike = (), up: ArrayLike = (0.0, 0.0, 1.0),
+            tolerance: float = TOLERANCE) -> Support:
     """Return what carries each of n boxes, by the contacts of their pairs.
 
     sizes: full extents (n, 3), or (3,) of all boxes [m]. poses: (n, 7) in a common frame.
     pairs, contacts: (k, 2) and k, as `contacts_of` and `SceneSolver` return them.
     ground: what stands by itself, by index: a box or boxes.
     up: the direction against gravity, of any length.
+    tolerance: the gap up to which faces touch [m]. `contacts_of` finds what is so near by the same
+    one.
 
     Raises ValueError, with the field and the value, for bad input, as a pair that is given twice.
     """
     sizes, poses = as_boxes(sizes, poses)
+    tolerance = as_tolerance(tolerance, sizes)
     count = len(poses)
     rows = as_places(pairs, 'pairs', count)
     if not isinstance(contacts, Contacts) or len(contacts) != len(rows):
@@ -70,30 +75,55 @@ def support(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike, contacts: Cont
 
     slope = contacts.normal @ direction
     carries = contacts.colliding & (np.abs(slope) >= UPRIGHT)
-    contacts, slope = contacts[carries], slope[carries]
-    if not np.isfinite(contacts.covariance).all():
-        raise ValueError('contacts must have covariances: solve them with patch=True')
-    carried_by = np.where(slope[:, None] > 0.0, rows[carries], rows[carries, ::-1])
+    contacts, slope, rows = contacts[carries], slope[carries], rows[carries]
+    patches = face_patches(sizes, poses, rows, contacts.normal, tolerance)
+    carried_by = np.where(slope[:, None] > 0.0, rows, rows[:, ::-1])
     lower, upper = carried_by.T
 
-    turned = np.abs(direction @ rotation_matrix(poses[:, 3:]))
-    base = sizes.prod(axis=1) / sizes[np.arange(count), turned.argmax(axis=1)]
-    share = np.bincount(upper, patch_areas(contacts), minlength=count) / base
-    margin = np.full(count, -np.inf)
-    smaller = np.where(base[lower] < base[upper], lower, upper)
-    corners = _corners(contacts, poses[upper, :3], poses[smaller, 3:], direction)
-    order = np.argsort(upper, kind='stable')
-    boxes, first = np.unique(upper[order], return_index=True)
-    for box, own in zip(boxes, np.split(corners[order], first[1:])):
-        margin[box] = _depth_inside(own.reshape(-1, 2))
+    base = base_areas(sizes, poses, direction)
+    share = np.bincount(upper, patches.area * np.abs(slope), minlength=count) / base
+    across = across_of(direction)
+    wide = patches.width > tolerance  # boxes beside each other may overlap by it
+    margin = hull_margins(patches[wide], upper[wide], across, poses[:, :3] @ across.T)
     share[on_ground], margin[on_ground] = 1.0, np.inf
-    # Of boxes that merely touch, the solver's depth is a share of the larger one. An edge below the
-    # centre is then a patch so wide: it carries nothing.
-    longest = sizes.max(axis=1)
-    scale = longest.copy()
-    np.maximum.at(scale, upper, longest[lower])
-    inside = margin > DEPTH_FLOOR * scale
+    # The patch below an edge is a strip. Its width is the tolerance and the depth, at most.
+    inside = margin > tolerance + deepest(sizes, carried_by, contacts.separation)
     return Support(carried_by, share, margin, _standing(carried_by, inside, on_ground))
+
+
+def base_areas(sizes: np.ndarray, poses: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """Return the areas (n,) of the faces most across `up` [m²]."""
+    turned = np.abs(up @ rotation_matrix(poses[:, 3:]))
+    return sizes.prod(axis=1) / sizes[np.arange(len(sizes)), turned.argmax(axis=1)]
+
+
+def across_of(direction: np.ndarray) -> np.ndarray:
+    """Return two unit vectors (2, 3) across a direction, and across each other."""
+    return np.linalg.svd(direction[None])[2][1:]
+
+
+def deepest(sizes: np.ndarray, carried_by: np.ndarray, separation: np.ndarray) -> np.ndarray:
+    """Return the depth (n,) of the deepest contact that carries each box [m].
+
+    Boxes that merely touch count as pressed together by the solver's share of the larger one.
+    """
+    depth = np.zeros(len(sizes))
+    longest = sizes.max(axis=1)[carried_by].max(axis=1)
+    np.maximum.at(depth, carried_by[:, 1], np.maximum(-separation, DEPTH_FLOOR * longest))
+    return depth
+
+
+def hull_margins(patches: FacePatches, upper: np.ndarray, across: np.ndarray, at: np.ndarray,
+                 ) -> np.ndarray:
+    """Return how far points (n, 2) are inside the hulls of what carries each of n boxes [m].
+
+    upper: the box (k,) that each patch carries. across: two unit vectors, along which points are.
+    −infinity: nothing carries the box.
+    """
+    order = np.argsort(upper, kind='stable')
+    first = np.searchsorted(upper[order], np.arange(len(at) + 1))
+    corners = patches.polygon[order] @ across.T
+    return native.hull_depths(corners.reshape(-1, 2), first * corners.shape[1], at)
 
 
 def _standing(carried_by: np.ndarray, inside: np.ndarray, on_ground: np.ndarray) -> np.ndarray:
@@ -107,56 +137,3 @@ def _standing(carried_by: np.ndarray, inside: np.ndarray, on_ground: np.ndarray)
         if np.array_equal(higher, stands):
             return stands
         stands = higher
-
-
-def _corners(contacts: Contacts, centre: np.ndarray, turn: np.ndarray,
-             up: np.ndarray) -> np.ndarray:
-    """Return the corners (k, 4, 2) of patches across `up`, from centres (k, 3).
-
-    Squares have the sides of the boxes with quaternions `turn` (k, 4).
-    """
-    across = np.linalg.svd(up[None])[2][1:]  # two unit vectors
-    moments = across @ contacts.covariance @ across.T
-    mean = np.trace(moments, axis1=1, axis2=2) / 2.0
-    off, mixed = (moments[:, 0, 0] - moments[:, 1, 1]) / 2.0, moments[:, 0, 1]
-    edges = rotation_matrix(turn)
-    level = np.abs(up @ edges).argmin(axis=1)
-    edge = edges[np.arange(len(edges)), :, level] @ across.T
-    is_square = np.hypot(off, mixed) < SQUARE_SLACK * mean
-    angle = np.where(is_square, np.arctan2(edge[:, 1], edge[:, 0]), np.arctan2(mixed, off) / 2.0)
-    sine, cosine = np.sin(angle), np.cos(angle)
-    axes = np.moveaxis(np.array([[cosine, -sine], [sine, cosine]]), 2, 0)
-    variances = np.einsum('kji,kjl,kli->ki', axes, moments, axes)
-    half = axes * np.sqrt(3.0 * np.maximum(variances, 0.0))[:, None]  # a rectangle's half edges
-    middle: np.ndarray = (contacts.point - centre) @ across.T
-    return middle[:, None] + _CORNERS @ half.transpose(0, 2, 1)
-
-
-def _depth_inside(points: np.ndarray) -> float:
-    """Return how far (0, 0) is inside the convex hull of points (m, 2); outside: minus how far."""
-    hull = _hull(points)
-    edge = np.roll(hull, -1, axis=0) - hull
-    length = np.maximum(np.hypot(*edge.T), np.finfo(float).tiny)  # of one point
-    offset = (edge[:, 1] * hull[:, 0] - edge[:, 0] * hull[:, 1]) / length
-    offset[length < DEPTH_FLOOR * length.max()] = np.inf  # between corners that rounding parts
-    if len(hull) > 2 and offset.min() >= 0.0:
-        return float(offset.min())
-    along = np.clip(-(hull * edge).sum(axis=1) / length**2, 0.0, 1.0)
-    return -float(np.hypot(*(hull + along[:, None] * edge).T).min())
-
-
-def _hull(points: np.ndarray) -> np.ndarray:
-    """Return the corners (h, 2) of the convex hull, counter-clockwise: the monotone chain."""
-    def chain(ordered: list[tuple[float, float]]) -> list[tuple[float, float]]:
-        corners: list[tuple[float, float]] = []
-        for x, y in ordered:
-            while len(corners) > 1:
-                (ax, ay), (bx, by) = corners[-2:]
-                if (bx - ax) * (y - ay) > (by - ay) * (x - ax):
-                    break
-                corners.pop()
-            corners.append((x, y))
-        return corners[:-1]
-
-    ordered = sorted(set(map(tuple, points.tolist())))
-    return np.array((chain(ordered) + chain(ordered[::-1])) or ordered)

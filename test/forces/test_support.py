@@ -155,3 +155,48 @@ def test_a_steep_slope_carries_nothing():
         if carries:  # the centre is half a metre above the patch
             assert found.margin[1] == pytest.approx(0.5 * np.cos(tilt) - 0.5 * np.sin(tilt),
                                                     abs=1e-8)
+
+
+def quaternion_to(direction, target):
+    """Return the shortest turn that takes a direction to a unit vector."""
+    direction = direction / np.linalg.norm(direction)
+    turn = np.append(np.cross(direction, target), 1.0 + direction @ target)
+    return turn / np.linalg.norm(turn)
+
+
+@pytest.mark.parametrize('size', [(1, 1, 1), (1, 1, 0.05), (0.3, 0.3, 2), (0.4, 0.3, 0.25),
+                                  (12.192, 2.438, 2.591), (0.05, 1, 3)])
+@pytest.mark.parametrize('place', [(1, 1, 1), (1, 1, 0), (1, 0, 1), (0, 1, 1)])
+def test_a_box_in_balance_does_not_stand(size, place):
+    """On a corner or an edge, flush and up to 1 mm deep, at four tolerances: 672 cases."""
+    down = -np.array(place) * size / 2
+    turn = quaternion_to(down, (0, 0, -1))
+    for depth in (0, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3):
+        pose = [upright((0, 0, -0.5))[0], (0, 0, np.linalg.norm(down) - depth, *turn)]
+        for tolerance in (0, 1e-6, 1e-4, 1e-3):
+            pairs, contacts = contacts_of([(50, 50, 1), size], pose, tolerance=tolerance)
+            found = support([(50, 50, 1), size], pose, pairs, contacts, ground=0,
+                            tolerance=tolerance)
+            assert len(pairs) == 1 and found.stands.tolist() == [True, False]
+
+
+@pytest.mark.parametrize('size', [(0.6, 0.4, 0.3), (12.192, 2.438, 2.591)])
+def test_stacks_in_float32_stand_by_a_tolerance(size):
+    """200 boxes with gaps of up to 27 µm; without the tolerance fewer than 130 pairs touch."""
+    sizes = np.array([(20, 20, 1), *[size] * 200], np.float32)
+    pose = upright((0, 0, -0.5), *[(0, 0, (k + 0.5) * size[2]) for k in range(200)])
+    pose = pose.astype(np.float32)
+    for tolerance, least in ((0.0, 0), (1e-5, 200), (1e-4, 200)):
+        pairs, contacts = contacts_of(sizes, pose, tolerance=tolerance)
+        found = support(sizes, pose, pairs, contacts, ground=0, tolerance=tolerance)
+        assert len(pairs) == 200 and found.stands.all() if least else len(pairs) < 130
+    assert found.share == pytest.approx(1.0)
+
+
+def test_boxes_that_stand_beside_carry_nothing():
+    """A column reaches beneath a box by less than the tolerance: that is no pillar."""
+    for reach, stands in ((5e-5, False), (1e-2, True)):
+        pose = upright((0, 0, -0.5), (-1, 0, 0.5), (1.5 - reach, 0, 0.5), (-0.1, 0, 1.5))
+        size = [(9, 9, 1), (1, 1, 1), (1, 1, 1), (2.2, 1, 1)]
+        pairs, contacts = contacts_of(size, pose, tolerance=1e-4)
+        assert support(size, pose, pairs, contacts, ground=0).stands[3] == stands
