@@ -162,6 +162,8 @@ setup(
         'view': ['viser'],
         'bag': ['rosbags'],
         'soup': ['python-fcl'],
+        # The statics of plans.
+        'plans': ['clarabel', 'scipy', 'tqdm'],
         'train': ['torch==2.13.0', 'tqdm'],
         'report': ['matplotlib', 'tqdm'],
         'fuzz': ['gmpy2', 'mpmath', 'tqdm'],

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .forces.support import support
     from .models.make_model import make_model
     from .node.contact_node import ContactNode as ContactNode  # noqa: F401
+    from .plans.inspect_plan import inspect_plan
     from .plans.plan import Plan
     from .scene.scene import Box, Frame, Pair, Scene
     from .scene.scene_file import read_scene
@@ -25,8 +26,8 @@ if TYPE_CHECKING:
     from .stream.read_contacts import ReadContacts, read_contacts
 
 __all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Frame', 'Pair', 'PatchForces',
-           'Plan', 'ReadContacts', 'Scene', 'SceneSolver', 'contacts_of', 'make_model',
-           'patch_area', 'patch_areas', 'read_contacts', 'read_scene', 'support']
+           'Plan', 'ReadContacts', 'Scene', 'SceneSolver', 'contacts_of', 'inspect_plan',
+           'make_model', 'patch_area', 'patch_areas', 'read_contacts', 'read_scene', 'support']
 # `ContactNode` needs ROS, and `import *` does without.
 
 _LOADED_WHEN_USED = {
@@ -34,6 +35,7 @@ _LOADED_WHEN_USED = {
     'forces.support': ('support',),
     'models.make_model': ('make_model',),
     'node.contact_node': ('ContactNode',),
+    'plans.inspect_plan': ('inspect_plan',),
     'plans.plan': ('Plan',),
     'scene.scene_file': ('read_scene',),
     'scene.scene': ('Box', 'Frame', 'Pair', 'Scene'),

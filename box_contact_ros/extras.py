@@ -8,7 +8,8 @@ import sys
 from importlib.util import find_spec
 from types import TracebackType
 
-MODULES = {'ros': 'rclpy', 'sim': 'mujoco', 'view': 'viser', 'soup': 'fcl', 'report': 'matplotlib'}
+MODULES = {'ros': 'rclpy', 'sim': 'mujoco', 'view': 'viser', 'soup': 'fcl', 'report': 'matplotlib',
+           'plans': 'clarabel'}
 """A module by which each extra is known."""
 APT = ', or apt install ros-jazzy-ros-base and source /opt/ros/jazzy/setup.bash'
 

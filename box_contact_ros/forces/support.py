@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ..core import DEPTH_FLOOR, native
 from ..solver.checks import as_boxes, as_floats, as_places, as_whole, short_repr
 from ..solver.contact import Contacts
-from ..solver.faces import TOLERANCE, FacePatches, as_tolerance, face_patches
+from ..solver.faces import TOLERANCE, as_tolerance, face_patches
 from ..solver.pose import rotation_matrix
 
 UPRIGHT = 0.9
@@ -84,11 +84,11 @@ def support(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike, contacts: Cont
     share = np.bincount(upper, patches.area * np.abs(slope), minlength=count) / base
     across = across_of(direction)
     wide = patches.width > tolerance  # boxes beside each other may overlap by it
-    margin = hull_margins(patches[wide], upper[wide], across, poses[:, :3] @ across.T)
+    margin = hull_margins(patches.polygon[wide] @ across.T, upper[wide], poses[:, :3] @ across.T)
     share[on_ground], margin[on_ground] = 1.0, np.inf
     # The patch below an edge is a strip. Its width is the tolerance and the depth, at most.
-    inside = margin > tolerance + deepest(sizes, carried_by, contacts.separation)
-    return Support(carried_by, share, margin, _standing(carried_by, inside, on_ground))
+    inside = margin > tolerance + deepest(sizes, carried_by, contacts.separation, upper, count)
+    return Support(carried_by, share, margin, standing(lower, upper, inside, on_ground))
 
 
 def base_areas(sizes: np.ndarray, poses: np.ndarray, up: np.ndarray) -> np.ndarray:
@@ -102,33 +102,34 @@ def across_of(direction: np.ndarray) -> np.ndarray:
     return np.linalg.svd(direction[None])[2][1:]
 
 
-def deepest(sizes: np.ndarray, carried_by: np.ndarray, separation: np.ndarray) -> np.ndarray:
-    """Return the depth (n,) of the deepest contact that carries each box [m].
+def deepest(sizes: np.ndarray, pairs: np.ndarray, separation: np.ndarray, upper: np.ndarray,
+            count: int) -> np.ndarray:
+    """Return the depth (n,) of the deepest contact that carries each of so many [m].
 
-    Boxes that merely touch count as pressed together by the solver's share of the larger one.
+    upper: what each pair (k, 2) carries. Boxes that merely touch count as pressed together by the
+    solver's share of the larger one.
     """
-    depth = np.zeros(len(sizes))
-    longest = sizes.max(axis=1)[carried_by].max(axis=1)
-    np.maximum.at(depth, carried_by[:, 1], np.maximum(-separation, DEPTH_FLOOR * longest))
+    depth = np.zeros(count)
+    longest = sizes.max(axis=1)[pairs].max(axis=1)
+    np.maximum.at(depth, upper, np.maximum(-separation, DEPTH_FLOOR * longest))
     return depth
 
 
-def hull_margins(patches: FacePatches, upper: np.ndarray, across: np.ndarray, at: np.ndarray,
-                 ) -> np.ndarray:
-    """Return how far points (n, 2) are inside the hulls of what carries each of n boxes [m].
+def hull_margins(points: np.ndarray, upper: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return how far each of n places (n, 2) is inside the hull of what carries it [m].
 
-    upper: the box (k,) that each patch carries. across: two unit vectors, along which points are.
-    −infinity: nothing carries the box.
+    points: (k, h, 2) of k patches. upper: (k,) which of the n each patch carries. Outside, it is
+    below 0; −infinity: nothing carries it.
     """
     order = np.argsort(upper, kind='stable')
     first = np.searchsorted(upper[order], np.arange(len(at) + 1))
-    corners = patches.polygon[order] @ across.T
-    return native.hull_depths(corners.reshape(-1, 2), first * corners.shape[1], at)
+    return native.hull_depths(np.ascontiguousarray(points[order].reshape(-1, 2)),
+                              first * points.shape[1], np.ascontiguousarray(at))
 
 
-def _standing(carried_by: np.ndarray, inside: np.ndarray, on_ground: np.ndarray) -> np.ndarray:
-    """Return which boxes (n,) stand: from the ground up, so a ring of boxes does not."""
-    lower, upper = carried_by.T
+def standing(lower: np.ndarray, upper: np.ndarray, inside: np.ndarray, on_ground: np.ndarray,
+             ) -> np.ndarray:
+    """Return which of n stand: from the ground up, so a ring does not."""
     stands = on_ground
     while True:
         leans = ~inside

@@ -116,7 +116,7 @@ class Plan:
 
 def _amounts(value: ArrayLike, name: str, count: int, most: float, unit: str) -> np.ndarray:
     """Return numbers (n,) from 0 to `most`; one stands for all."""
-    array = as_floats(value, name, f'a number, or numbers ({count},)', (), (count,))
+    array = as_floats(value, name, f'a number, or numbers ({count},)', (count,), ())
     array = np.broadcast_to(array, count)
     for row in np.flatnonzero(~((array >= 0.0) & (array <= most)))[:1]:
         raise ValueError(f'{name}[{row}] is {array[row]:g} {unit}, not from 0 to {most:g} {unit}')

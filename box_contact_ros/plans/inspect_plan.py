@@ -1,0 +1,266 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Is this plan sound? Overlaps, support, loads and limits of all boxes, in one call."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..core import native
+from ..extras import require
+from ..scene.contacts_of import contacts_of
+from ..scene.support import across_of, base_areas, deepest, hull_margins, standing
+from ..solver.checks import as_floats, as_number, short_repr
+from ..solver.faces import TOLERANCE, FacePatches, as_tolerance, corner_shares, face_patches
+from ..solver.pose import rotation_matrix
+from .bearings import NEGLIGIBLE, Bearings, on_corners, on_faces
+from .inspection import Inspection
+from .plan import Plan
+from .statics import Beds, Bodies, Rest, settle
+
+BESIDE = np.sqrt(0.5)
+"""Cosine between gravity and a normal below which two boxes are beside each other: that of 45°."""
+WEIGHTLESS = 1e-4
+"""Weight of a body without a mass, divided by that of the heaviest: it must be carried too."""
+MANY = 10_000
+"""With more boxes progress is shown: they take a second or more."""
+OVER = 1e-6
+"""By how much a load may exceed its limit [1]: rounding."""
+
+
+def inspect_plan(plan: Plan, *, tolerance: float = TOLERANCE, friction: float = 0.5,
+                 acceleration: ArrayLike = (0.0, 0.0, -9.81), bears: str = 'faces',
+                 sides: bool = False) -> Inspection:
+    """Return what is wrong with a plan, and what each of its boxes carries.
+
+    tolerance: the gap up to which faces touch, and the depth up to which boxes do not overlap [m].
+    friction: Coulomb's μ of all pairs.
+    acceleration: (3,) that the boxes feel, gravity included [m/s²]. On a lorry that brakes along +x
+    by 0.4 g it is (3.92, 0, −9.81).
+    bears: 'faces', or 'corners': a box stands on its corners alone, as a container does.
+    sides: whether boxes beside each other carry by friction.
+
+    Loads need the extra `plans`. A plan without masses does without it.
+    Raises ValueError, with field and value, for bad input.
+    """
+    if not isinstance(plan, Plan):
+        raise ValueError(f'plan must be a Plan, not {short_repr(plan)}')
+    if bears not in ('faces', 'corners'):
+        raise ValueError(f"bears must be 'faces' or 'corners', not {short_repr(bears)}")
+    if not isinstance(sides, (bool, np.bool_)):
+        raise ValueError(f'sides must be True or False, not {short_repr(sides)}')
+    tolerance = as_tolerance(tolerance, plan.sizes)
+    friction = as_number(friction, 'friction')
+    if not 0.0 <= friction < np.inf:
+        raise ValueError(f'friction must be 0 or more, and finite, not {friction:g}')
+    felt = as_floats(acceleration, 'acceleration', 'a vector (3,)', (3,))
+    if not 0.0 < np.abs(felt).max() < np.inf:
+        raise ValueError(f'acceleration must have a length, not {short_repr(acceleration)}')
+    meet = _meetings(plan, tolerance, felt, bool(sides), bears == 'corners')
+    bodies = _bodies(plan, meet)
+    return _judged(plan, meet, bodies, None if plan.masses is None else
+                   _loads(plan, meet, bodies, friction))
+
+
+@dataclass(frozen=True, eq=False)
+class _Meetings:
+    """The pairs of boxes that meet, and the k patches of those that bear each other."""
+
+    tolerance: float
+    felt: np.ndarray  # (3,) acceleration [m/s²]
+    frame: np.ndarray  # (3, 3) rows: two directions across it, and the one against it
+    fixed: np.ndarray  # (b,) bodies on the ground
+    met: np.ndarray  # (m, 2) all pairs
+    met_separation: np.ndarray  # (m,) [m]
+    on_top: np.ndarray  # (m,) bool: the second is on the first
+    pairs: np.ndarray  # (k, 2) the lower and the upper box
+    carries: np.ndarray  # (k,) bool: the lower one carries the upper one; else they are beside
+    separation: np.ndarray  # (k,) [m]
+    normal: np.ndarray  # (k, 3) from the lower box to the upper one
+    patches: FacePatches  # k
+    bearings: Bearings  # k
+    by_corners: bool
+
+
+def _meetings(plan: Plan, tolerance: float, felt: np.ndarray, sides: bool, by_corners: bool,
+              ) -> _Meetings:
+    fixed = np.zeros(plan.body.max(initial=-1) + 1, bool)
+    fixed[plan.body[plan.ground]] = True
+    pairs, contacts = contacts_of(plan.sizes, plan.poses, fixed=fixed[plan.body],
+                                  tolerance=tolerance)
+    rows = plan.body[pairs[:, 0]] != plan.body[pairs[:, 1]]
+    if len(plan.apart):
+        rows &= ~np.isin(pairs @ (len(plan), 1), np.sort(plan.apart, axis=1) @ (len(plan), 1))
+    pairs, contacts = pairs[rows], contacts[rows]
+    up = -felt / np.linalg.norm(felt)
+    across = across_of(up)[0]
+    slope = contacts.normal @ up
+    normal = np.where(slope[:, None] > 0.0, contacts.normal, -contacts.normal)
+    pairs = np.where(slope[:, None] > 0.0, pairs, pairs[:, ::-1])
+    patches = face_patches(plan.sizes, plan.poses, pairs, normal, tolerance)
+    on_top = np.abs(slope) >= BESIDE
+    # Boxes beside each other may overlap by the tolerance: a strip that wide carries nothing.
+    bear = np.flatnonzero((patches.width > tolerance) & (on_top | sides))
+    patches = patches[bear]
+    return _Meetings(
+        tolerance, felt, np.stack((across, np.cross(up, across), up)), fixed, pairs,
+        contacts.separation, on_top, pairs[bear], on_top[bear],
+        contacts.separation[bear], normal[bear],
+        patches, on_corners(plan.sizes, plan.poses, pairs[bear], normal[bear], patches, tolerance)
+        if by_corners else on_faces(patches), by_corners)
+
+
+def _bodies(plan: Plan, meet: _Meetings) -> Bodies:
+    """Return the bodies of the boxes, in the frame of what they feel."""
+    count = len(meet.fixed)
+
+    def sums(values: np.ndarray) -> np.ndarray:
+        rows = [np.bincount(plan.body, column, count) for column in np.atleast_2d(values.T)]
+        return np.array(rows).T.reshape(count, *values.shape[1:])
+
+    masses = np.ones(len(plan)) if plan.masses is None else plan.masses
+    given = sums(masses)
+    masses = np.where(given[plan.body] > 0.0, masses, 1.0)  # to find a centre
+    mass = sums(masses)
+    place = plan.poses[:, :3] + np.einsum('nij,nj->ni', rotation_matrix(plan.poses[:, 3:]),
+                                          plan.centres)
+    centre = sums(masses[:, None] * place) / mass[:, None]
+    arm = ((place - centre[plan.body])**2).sum(axis=1)
+    gyration = np.sqrt(sums(masses * ((plan.sizes**2).sum(axis=1) / 12.0 + arm)) / mass)
+    heaviest = given[~meet.fixed].max(initial=0.0) or 1.0
+    weight = np.linalg.norm(meet.felt) * np.where(given > 0.0, given, WEIGHTLESS * heaviest)
+    return Bodies(weight, centre @ meet.frame.T, gyration, meet.fixed)
+
+
+@dataclass(frozen=True, eq=False)
+class _Loads:
+    """What the patches carry."""
+
+    rest: Rest
+    centre: np.ndarray  # (k, 3) of pressure, common frame [m]
+    pressure: np.ndarray  # (k,) the greatest [Pa]; none where corners bear
+
+
+def _loads(plan: Plan, meet: _Meetings, bodies: Bodies, friction: float) -> _Loads:
+    require('plans')
+    from tqdm import tqdm
+
+    patches, frame, bearings = meet.patches, meet.frame, meet.bearings
+    sides = patches.rectangle[:, (1, 3)] - patches.rectangle[:, :1]
+    patch, place = np.nonzero(bearings.stiffness > NEGLIGIBLE * patches.area[:, None])
+    beds = Beds(
+        pairs=plan.body[meet.pairs], carries=meet.carries, normal=meet.normal @ frame.T,
+        centre=patches.centre @ frame.T, area=patches.area,
+        radius=np.sqrt((sides**2).sum(axis=(1, 2)) / 12.0), hull=bearings.hull @ frame.T,
+        point=bearings.point[patch, place] @ frame.T, patch=patch,
+        stiffness=bearings.stiffness[patch, place],
+        spans=place < bearings.hull.shape[1])
+    with tqdm(total=int((~meet.fixed).sum()), unit='box', desc='loads', leave=False,
+              disable=len(plan) <= MANY) as bar:
+        rest = settle(bodies, beds, friction, bar.update)
+    centre = rest.centre @ frame
+    if meet.by_corners:
+        return _Loads(rest, centre, np.zeros(0))
+    first = sides[:, 0] / np.linalg.norm(sides[:, 0], axis=1, keepdims=True)
+    plane = np.stack((first, np.cross(meet.normal, first)), axis=2)
+    unit = native.bed_pressures(
+        np.ascontiguousarray((patches.polygon - patches.centre[:, None]) @ plane),
+        patches.corner_count, np.einsum('ki,kij->kj', centre - patches.centre, plane))
+    presses = rest.load > 0.0
+    return _Loads(rest, centre, np.where(presses, rest.load, 0.0) * np.where(presses, unit, 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class _Verdict:
+    """Which of the b bodies stand, and why others do not."""
+
+    stands: np.ndarray  # bool
+    cause: np.ndarray
+    margin: np.ndarray  # [m]
+    loaded_margin: np.ndarray  # [m]
+
+
+def _verdict(plan: Plan, meet: _Meetings, bodies: Bodies, loads: _Loads | None) -> _Verdict:
+    body, fixed, count = plan.body, meet.fixed, len(meet.fixed)
+    lower, upper = body[meet.pairs[meet.carries]].T
+    hull = meet.bearings.hull[meet.carries] @ meet.frame[:2].T
+    margin = hull_margins(hull, upper, bodies.centre[:, :2])
+    need = meet.tolerance + deepest(plan.sizes, meet.pairs[meet.carries],
+                                    meet.separation[meet.carries], upper, count)
+    hangs = np.bincount(body[meet.met[meet.on_top, 1]], minlength=count) == 0
+    if loads is None:
+        loaded = np.full(count, np.nan)
+        stands = standing(lower, upper, margin > need, fixed)
+        slides = np.zeros(count, bool)
+    else:
+        pressing, at = loads.rest.load, loads.centre @ meet.frame[:2].T
+        on_it = meet.carries & (pressing > 0.0)
+        total = np.bincount(body[meet.pairs[on_it, 1]], pressing[on_it], count)
+        centre = np.stack([np.bincount(body[meet.pairs[on_it, 1]], (pressing * column)[on_it],
+                                       count) for column in at.T], axis=1)
+        loaded = np.where(total > 0.0, hull_margins(
+            hull, upper, centre / np.where(total > 0.0, total, 1.0)[:, None]), -np.inf)
+        missing = np.abs(loads.rest.missing)
+        slides = np.hypot(missing[:, 0], missing[:, 1]) > missing[:, 2:].max(axis=1)
+        beside = body[meet.pairs[~meet.carries & (pressing > 0.0)]]
+        is_held = np.bincount(beside.ravel(), minlength=count) > 0
+        stands = _resting(np.vstack((np.stack((lower, upper), axis=1), beside, beside[:, ::-1])),
+                          ~loads.rest.falls & (is_held | (loaded > need)), fixed)
+    carried = np.bincount(upper[stands[lower]], minlength=count) > 0
+    cause = np.select(
+        [stands, hangs, margin <= need, ~carried, slides, loaded <= need],
+        ['', 'hangs', 'unsupported', 'goes with what falls', 'slides', 'tips under its load'],
+        'goes with what falls')
+    return _Verdict(stands, cause, np.where(fixed, np.inf, margin),
+                    np.where(fixed & (loads is not None), np.inf, loaded))
+
+
+def _resting(carried_by: np.ndarray, holds: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+    """Return which bodies (b,) hold by themselves and rest on one that stands."""
+    stands = fixed
+    while True:
+        rests = np.zeros(len(fixed), bool)
+        rests[carried_by[stands[carried_by[:, 0]], 1]] = True
+        higher = fixed | holds & rests
+        if np.array_equal(higher, stands):
+            return stands
+        stands = higher
+
+
+def _judged(plan: Plan, meet: _Meetings, bodies: Bodies, loads: _Loads | None) -> Inspection:
+    count, body, up = len(plan), plan.body, meet.frame[2]
+    verdict = _verdict(plan, meet, bodies, loads)
+    lower, upper = meet.pairs[meet.carries].T
+    area = (meet.patches.area * (meet.normal @ up))[meet.carries]
+    share = np.bincount(upper, area, count) / base_areas(plan.sizes, plan.poses, up)
+    share[meet.fixed[body]] = 1.0
+    pressing = np.full(len(meet.pairs), np.nan) if loads is None else loads.rest.load
+    load, pressure = np.full((2, count), np.nan)
+    shares = np.full((len(pressing), 4), np.nan)
+    if loads is not None:
+        load = np.bincount(lower, pressing[meet.carries], count)
+        if not meet.by_corners:
+            pressure = np.zeros(count)
+            np.maximum.at(pressure, lower, loads.pressure[meet.carries])
+        shares = corner_shares(meet.patches.rectangle, loads.centre)
+    most = np.linalg.norm(meet.felt) * plan.limits
+    cause = verdict.cause[body]
+    cause[(cause == '') & (load > (1.0 + OVER) * most)] = 'overloaded'
+    depth = -meet.met_separation
+    deep = depth > meet.tolerance
+    mass, centre = np.nan, np.full(3, np.nan)
+    if plan.masses is not None:
+        mass = float(plan.masses.sum())
+        places = plan.poses[:, :3] + np.einsum(
+            'nij,nj->ni', rotation_matrix(plan.poses[:, 3:]), plan.centres)
+        centre = plan.masses @ places / mass if mass > 0.0 else centre
+    return Inspection(
+        plan=plan, tolerance=meet.tolerance, acceleration=meet.felt,
+        overlaps=np.sort(meet.met[deep], axis=1), depths=depth[deep], stands=verdict.stands[body],
+        cause=cause, share=share, margin=verdict.margin[body],
+        loaded_margin=verdict.loaded_margin[body], load=load, pressure=pressure,
+        carried_by=meet.pairs, loads=pressing, corners=meet.patches.rectangle,
+        corner_loads=pressing[:, None] * shares, mass=mass, centre_of_mass=centre)

@@ -1,0 +1,274 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Is a plan sound? Right values by hand, bodies, causes, and what is refused."""
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from patience import PATIENCE
+
+from box_contact_ros import Plan, inspect_plan
+from box_contact_ros.plans.plan import Fault
+
+pytest.importorskip('clarabel')
+G = 9.81
+LEVEL = (0.0, 0.0, 0.0, 1.0)
+FLOOR = ((50, 50, 1), (0, 0, -0.5, *LEVEL))
+
+
+def box(x, z, size=(1, 1, 1), y=0.0, turn=LEVEL):
+    return size, (x, y, z, *turn)
+
+
+def turned(axis, degrees):
+    half = np.radians(degrees) / 2
+    return (*np.sin(half) * np.array(axis), np.cos(half))
+
+
+def plan_of(boxes, masses, *, floor=FLOOR, **fields):
+    """Return a plan of boxes on a floor, which is box 0."""
+    sizes, poses = zip(floor, *boxes)
+    masses = None if masses is None else [0, *masses]
+    return Plan(sizes, poses, masses, ground=0, **fields)
+
+
+def loads(found):
+    """Return what each patch carries [kg], by the lower and the upper box."""
+    return {(a, b): load / np.linalg.norm(found.acceleration)
+            for (a, b), load in zip(found.carried_by.tolist(), found.loads)}
+
+
+CUBES = [10.0, 10.0, 10.0]
+PLANK, PAD = (3, 1, 0.1), (0.2, 1, 1)
+
+
+@pytest.mark.parametrize('boxes, masses, wanted', [
+    ([box(0, 0.5)], [10], {(0, 1): 10}),
+    ([box(0, 0.5), box(0.49, 1.5)], [10, 10], {(0, 1): 20, (1, 2): 10}),
+    # A plank that overhangs by 0.6 m, held by 30 kg on its inner end.
+    ([box(0, 0.5), box(0.6, 1.5, (2, 1, 1)), box(-0.1, 2.5, (0.6, 1, 1))], [10, 10, 30],
+     {(0, 1): 50, (1, 2): 40, (2, 3): 30}),
+    ([*(box(x, 0.5, PAD) for x in (-1, 0, 1)), box(0, 1.05, PLANK)], [1, 1, 1, 12],
+     {(0, 1): 5, (0, 2): 5, (0, 3): 5, (1, 4): 4, (2, 4): 4, (3, 4): 4}),
+    # A table, with 8 kg off its middle: by moments about both axes.
+    ([*(box(0.9 * x, 0.5, (0.1, 0.1, 1), 0.4 * y) for x in (-1, 1) for y in (-1, 1)),
+      box(0, 1.05, (2, 1, 0.1)), box(0.45, 1.6, (0.2, 0.2, 1), 0.2)], [1] * 4 + [20, 8],
+     {(1, 5): 5, (2, 5): 7, (3, 5): 7, (4, 5): 9, (5, 6): 8}),
+])
+def test_loads_are_those_by_hand(boxes, masses, wanted):
+    found = inspect_plan(plan_of(boxes, masses))
+    assert found.sound and found.stands.all() and not found.cause.astype(bool).any()
+    got = loads(found)
+    for pair, load in wanted.items():
+        assert got[pair] == pytest.approx(load, abs=0.01)
+    assert found.corner_loads.sum(axis=1) == pytest.approx(found.loads)
+    assert found.mass == sum(masses) and (found.loaded_margin > 0).all()
+    assert found.load[0] == pytest.approx(G * sum(masses))
+
+
+@pytest.mark.parametrize('boxes, masses, cause', [
+    ([box(0, 0.5), box(0.51, 1.5)], [10, 10], ['', 'unsupported']),
+    # Each centre is above what carries it; those of both upper cubes together are not.
+    ([box(0, 0.5), box(0.3, 1.5), box(0.7, 2.5)], [10, 10, 30],
+     ['', 'tips under its load', 'goes with what falls']),
+    ([box(0, 0.5), box(0, 2.5), box(0, 3.5)], [10, 10, 10], ['', 'hangs', 'goes with what falls']),
+    ([box(0, np.sqrt(0.5) - 1e-3, turn=turned((1, 0, 0), 45))], [10], ['unsupported']),
+])
+def test_what_falls_has_a_cause(boxes, masses, cause):
+    found = inspect_plan(plan_of(boxes, masses))
+    assert found.cause.tolist() == ['', *cause] and not found.sound
+    assert np.array_equal(found.stands, found.cause == '')
+
+
+def test_geometry_alone_does_not_see_a_load_that_tips():
+    boxes = [box(0, 0.5), box(0.3, 1.5), box(0.7, 2.5), box(3, 0.5), box(3.6, 1.5)]
+    found = inspect_plan(plan_of(boxes, None))
+    assert found.cause.tolist() == ['', '', '', '', '', 'unsupported']
+    assert np.isnan(found.loads).all() and np.isnan(found.load).all() and np.isnan(found.mass)
+    assert found.share[3] == pytest.approx(0.6) and found.margin[3] == pytest.approx(0.1)
+
+
+def test_nothing_hangs_between_walls():
+    """Rigid statics would let it: the walls press as hard as it takes. Beds do not press at all."""
+    walls = [((1, 3, 3), (x, 0, 1.5, *LEVEL)) for x in (-1, 1)]
+    for sides in (False, True):
+        found = inspect_plan(Plan(*zip(*walls, box(0, 1.5)), [0, 0, 10], ground=[0, 1]),
+                             sides=sides)
+        assert found.cause.tolist() == ['', '', 'hangs']
+
+
+def slope(degrees):
+    """Return a plan of a cube on a slope of so many degrees."""
+    turn, (x, z) = turned((0, 1, 0), degrees), np.array(
+        (np.sin(np.radians(degrees)), np.cos(np.radians(degrees)))) / 2
+    return plan_of([box(x, z, turn=turn)], [10], floor=((50, 50, 1), (-x, 0, -z, *turn)))
+
+
+@pytest.mark.parametrize('degrees, friction, holds', [
+    (20, 0.5, True), (26.5, 0.5, True), (26.6, 0.5, False), (30, 0.5, False), (30, 0.6, True),
+    (20, 0.0, False)])
+def test_a_cube_on_a_slope_slides_from_the_angle_of_friction_on(degrees, friction, holds):
+    found = inspect_plan(slope(degrees), friction=friction)
+    assert found.cause[1] == ('' if holds else 'slides')
+    assert found.loads[0] == pytest.approx(10 * G * np.cos(np.radians(degrees)), rel=1e-5)
+    if holds:
+        assert found.loaded_margin[1] == pytest.approx(
+            0.5 * np.cos(np.radians(degrees)) - 0.5 * np.sin(np.radians(degrees)), abs=1e-6)
+
+
+@pytest.mark.parametrize('boxes, brake, cause', [
+    ([box(0, 0.5), box(0, 1.5)], 0.4, ['', '']),
+    ([box(0, 0.5), box(0, 1.5)], 0.6, ['slides', 'goes with what falls']),
+    ([box(0, 1.5, (1, 1, 3))], 0.32, ['']), ([box(0, 1.5, (1, 1, 3))], 0.4, ['unsupported']),
+    ([box(-1, 0.5), box(1, 0.5), box(0, 1.05, PLANK)], 0.4, ['', '', '']),
+    ([box(-1, 0.5), box(1, 0.5), box(0, 1.05, PLANK)], 0.6, ['slides', 'slides', 'goes with what '
+                                                             'falls'])])
+def test_what_a_lorry_carries_slides_or_tips_when_it_brakes(boxes, brake, cause):
+    """By brake / μ, and by brake · height / half width."""
+    found = inspect_plan(plan_of(boxes, [10] * len(boxes)), acceleration=(brake * G, 0, -G))
+    assert found.cause.tolist() == ['', *cause]
+
+
+def test_a_trailer_weighs_on_its_axles():
+    """Pins at 1.6 and 9.6 m, 7 t of its own, 12 t at 4 m and 8 t at 9 m: by moments."""
+    pins = [((0.3, 2, 0.5), (x, 0, 0.25, *LEVEL)) for x in (1.6, 9.6)]
+    found = inspect_plan(Plan(*zip(*pins, box(6.8, 0.6, (13.6, 2.4, 0.2)), box(4, 1.2),
+                                   box(9, 1.2)), [0, 0, 7e3, 12e3, 8e3], ground=[0, 1]))
+    assert found.sound and found.load[:2] / G == pytest.approx([11_450, 15_550], abs=20)
+
+
+CONTAINERS = [((6.058, 2.438, 2.591), (-3.067, 0, 1.2955, *LEVEL)),
+              ((6.058, 2.438, 2.591), (3.067, 0, 1.2955, *LEVEL)),
+              ((12.192, 2.438, 2.591), (0, 0, 1.5 * 2.591, *LEVEL))]
+
+
+def test_containers_bear_on_their_corners():
+    """The centre of mass is off by 5 % of the length. By faces, the bed shares more evenly."""
+    plan = plan_of(CONTAINERS, [2e3, 2e3, 24e3],
+                   centres=[(0, 0, 0)] * 3 + [(0.05 * 12.192, 0, 0)])
+    by_corners = loads(inspect_plan(plan, bears='corners'))
+    assert by_corners[1, 3] == pytest.approx(10_800, abs=5)
+    assert by_corners[2, 3] == pytest.approx(13_200, abs=5)
+    by_faces = loads(inspect_plan(plan))
+    assert by_faces[1, 3] == pytest.approx(10_200, abs=60)
+    assert np.isnan(inspect_plan(plan, bears='corners').pressure[1:3]).all()
+
+
+def test_pressure_is_the_greatest_below_a_load():
+    """N / A in the middle, and N / A · (1 + 6 e / a) off it; then a triangle."""
+    for off, factor in ((0.0, 1.0), (0.1, 1.6), (0.3, 2 / (3 * 0.2))):
+        found = inspect_plan(plan_of([box(0, 0.5)], [10], centres=[(0, 0, 0), (off, 0, 0)]))
+        assert found.pressure[0] == pytest.approx(10 * G * factor, rel=1e-6)
+
+
+def test_a_limit_is_on_what_is_on_top():
+    boxes = [box(0, 0.5), box(0, 1.5), box(0, 2.5)]
+    found = inspect_plan(plan_of(boxes, CUBES, limits=[np.inf, 19.9, 10, 0]))
+    assert found.cause.tolist() == ['', 'overloaded', '', ''] and found.stands.all()
+    assert not found.sound and 'overloaded            1  20 kg on top' in str(found)
+
+
+def test_overlaps_count_beyond_the_tolerance():
+    plan = plan_of([box(0, 0.5), box(0.9, 0.5), box(0, 1.49995)], CUBES)
+    found = inspect_plan(plan)
+    assert found.overlaps.tolist() == [[1, 2]] and found.depths == pytest.approx([0.1])
+    assert found.stands.all() and not found.sound
+    assert len(inspect_plan(plan, tolerance=1e-5).overlaps) == 3
+    assert inspect_plan(plan_of([box(0, 0.5), box(0.9, 0.5), box(0, 1.49995)], CUBES,
+                                apart=[(2, 1), (3, 2)])).sound
+
+
+def test_boxes_of_a_body_hold_together():
+    """Alone, the arm of an L would fall. Its foot holds it, and what is on it."""
+    boxes = [box(0, 0.5), box(0.7, 1.5), box(0.9, 2.5)]
+    assert inspect_plan(plan_of(boxes, [10, 1, 1])).cause[2] == 'unsupported'
+    found = inspect_plan(plan_of(boxes, [10, 1, 1], body=[0, 1, 1, 2]))
+    assert found.sound and found.carried_by.tolist() == [[0, 1], [2, 3]]
+    assert loads(found) == pytest.approx({(0, 1): 12, (2, 3): 1})
+    assert found.margin[1] == found.margin[2] == pytest.approx(0.5 - 0.7 / 11)
+    assert found.loaded_margin[1] == pytest.approx(0.5 - (0.7 + 0.9) / 12)
+    fixed = inspect_plan(Plan(*zip(box(0, 5), box(0.9, 6), box(1, 7)), 1, ground=1, body=[3, 3, 4]))
+    assert fixed.sound and fixed.margin[0] == np.inf
+
+
+def test_a_fault_of_the_file_is_a_line():
+    faults = [Fault('gap', ('a',), 'nothing is below it'), Fault('mass', ('b',), 'has no weight')]
+    for some, sound in ((faults, False), (faults[1:], True)):
+        found = inspect_plan(plan_of([box(0, 0.5)], [10], faults=some))
+        assert found.sound == sound and str(found).count('\n') == len(some)
+    assert str(found) == ('mass                  b  has no weight\n1 box, 10.0 kg, centre of mass '
+                          '0.000 0.000 0.500 m: sound')
+
+
+@pytest.mark.parametrize('plan', [Plan([], []), Plan([], [], []), Plan((1, 1, 1), [
+    box(0, 0)[1]], 5, ground=0), Plan((1, 1, 1), [box(0, 0)[1], box(0, 1)[1]], 0, ground=[0, 1])])
+def test_little_is_an_answer(plan):
+    found = inspect_plan(plan)
+    assert found.sound and len(found.stands) == len(plan) and 'sound' in str(found)
+
+
+def test_what_lacks_a_mass_must_be_carried_too():
+    found = inspect_plan(plan_of([box(0, 0.5), box(0.6, 1.5), box(0, 3)], [10, 0, 0]))
+    assert found.cause.tolist() == ['', '', 'unsupported', 'hangs']
+
+
+def test_in_any_frame_the_answer_is_the_same():
+    """All is moved and turned, and so is what the boxes feel."""
+    import poses as pose_sets
+    rng = np.random.default_rng(1)
+    boxes = [box(-1, 0.5), box(1, 0.5), box(0, 1.05, PLANK), box(0.5, 1.6), box(2.2, 1.6)]
+    plan = plan_of(boxes, [1, 2, 3, 4, 5])
+    wanted = inspect_plan(plan, acceleration=(0.3 * G, 0, -G))
+    for turn in pose_sets.unit_quaternions(rng, 5):
+        moved = pose_sets.moved(plan.poses, rng.uniform(-5, 5, 3), turn[None])
+        felt = pose_sets.moved(np.array([(0.3 * G, 0, -G, *LEVEL)]), np.zeros(3), turn[None])
+        found = inspect_plan(Plan(plan.sizes, moved, plan.masses, ground=0),
+                             acceleration=felt[0, :3])
+        assert found.cause.tolist() == wanted.cause.tolist()
+        assert found.load == pytest.approx(wanted.load, rel=1e-3, abs=1e-3)
+
+
+@pytest.mark.parametrize('field, value, words', [
+    ('plan', 5, 'plan must be a Plan, not 5'),
+    ('tolerance', -1.0, 'tolerance must be from 0 to 0.5 m'),
+    ('tolerance', np.nan, 'tolerance must be from 0 to 0.5 m'),
+    ('tolerance', 0.6, 'tolerance must be from 0 to 0.5 m'),
+    ('friction', -0.1, 'friction must be 0 or more, and finite, not -0.1'),
+    ('friction', np.inf, 'friction must be 0 or more'),
+    ('acceleration', (0, 0, 0), 'acceleration must have a length'),
+    ('acceleration', (0, 0, np.nan), 'acceleration must have a length'),
+    ('acceleration', 9.81, r'acceleration must be a vector \(3,\)'),
+    ('bears', 'edges', "bears must be 'faces' or 'corners', not 'edges'"),
+    ('sides', 1, 'sides must be True or False, not 1')])
+def test_bad_input_is_refused_with_field_and_value(field, value, words):
+    arguments = {'plan': plan_of([box(0, 0.5)], [10]), field: value}
+    with pytest.raises(ValueError, match=f'^{words}'):
+        inspect_plan(**arguments)
+
+
+def test_geometry_alone_needs_no_solver():
+    """And with masses, its lack is one line that names the extra."""
+    program = ('import sys\n'
+               'sys.modules.update(clarabel=None, scipy=None, tqdm=None)\n'
+               'from box_contact_ros import Plan, inspect_plan\n'
+               'at = [(0, 0, 0, 0, 0, 0, 1), (0, 0, 1, 0, 0, 0, 1)]\n'
+               'print(inspect_plan(Plan((1, 1, 1), at, ground=0)))\n'
+               'inspect_plan(Plan((1, 1, 1), at, 1, ground=0))')
+    done = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True,
+                          timeout=PATIENCE)
+    assert done.stdout == '1 box: sound\n' and done.returncode == 1
+    assert "'.[plans]'" in done.stderr and 'Traceback' not in done.stderr
+
+
+def test_the_picture_has_a_colour_for_each_cause():
+    pytest.importorskip('matplotlib')
+    found = inspect_plan(plan_of([box(0, 0.5), box(0.6, 1.5)], [10, 10]))
+    figure = found.plot()
+    words = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert words == ['sound', 'unsupported']
+    labels = [text.get_text() for text in figure.axes[0].texts]
+    assert labels == [f'{found.load[1] / 1e3:.3g}']
