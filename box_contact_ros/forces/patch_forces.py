@@ -156,9 +156,11 @@ class Loads(NamedTuple):
     centre: np.ndarray
     """(k, 3) of pressure [m]."""
     corners: np.ndarray
-    """(k, 4, 3) of the rectangle that stands for the patch, in turn [m]."""
+    """(k, 4, 3) of a rectangle, in turn [m]. With `set_boxes` it is around the patch of the faces
+    that are within 0.1 mm. Without, it has the moments of the overlap, which at rest is a wedge: it
+    may reach beyond the rim."""
     corner_loads: np.ndarray
-    """(k, 4) the part of `pressing` at each corner, never below 0 [N]."""
+    """(k, 4) the part of `pressing` at each corner, never below 0 [N]: bilinear about `centre`."""
 
 
 class PatchForces:

@@ -13,6 +13,7 @@ It prints:
     4 s: slower than 1 mm/s: True, less than 1 mm deep: True
     6 s: slower than 1 mm/s: True, less than 1 mm deep: True
     8 s: slower than 1 mm/s: True, less than 1 mm deep: True
+    corners on the ground: 24.7 24.7 25.3 25.3 % of the weight
 """
 from itertools import combinations
 
@@ -57,6 +58,7 @@ def main() -> None:
     solver = ContactSolver(SIZE, SIZE, model='exact')
     bodies = [Body(mass=0.0, inertia=np.zeros(3)), *[Body.of_box(SIZE, MASS)] * COUNT]
     forces = PatchForces(bodies)
+    forces.set_boxes(SIZES)  # then corners of loads are those of the faces
     weights = np.zeros((COUNT + 1, 6))
     weights[1:, 2] = -9.81 * MASS
     ticks, late = round(1 / (RATE * STEP)), round(LATENCY / STEP)
@@ -73,6 +75,9 @@ def main() -> None:
             deepest = -contacts.separation.min()
             print(f'{data.time:.0f} s: slower than 1 mm/s: {fastest < 1e-3}, '
                   f'less than 1 mm deep: {deepest < 1e-3}')
+    shares = forces.loads().corner_loads[0] / (9.81 * MASS * COUNT)
+    print('corners on the ground:', *(f'{100.0 * share:.1f}' for share in shares),
+          '% of the weight')
 
 
 if __name__ == '__main__':

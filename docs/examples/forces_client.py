@@ -15,6 +15,7 @@ It prints:
     500 ms: 0.03 mm deep, 0.0 mm/s
     2000 ms: 0.03 mm deep, 0.0 mm/s
     force / weight 1.0000, slid 20 mm
+    corner loads 49.05 49.05 49.05 49.05 kN
 """
 import numpy as np
 import rclpy
@@ -36,6 +37,7 @@ def main() -> None:
     places = {'box_a': 0, 'box_b': 1}  # of the bodies, by the names of their boxes
     forces = PatchForces([Body(mass=MASS, inertia=[WIDE] * 3),
                           Body(mass=0.0, inertia=np.zeros(3))])
+    forces.set_boxes([SIZE, SIZE])  # then corners of loads are those of the faces
     poses = np.array([[0.0, 0.0, 2.611, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
     velocities, weights = np.zeros((2, 6)), np.zeros((2, 6))
     velocities[0, 0], weights[0, 2] = 0.3, -GRAVITY * MASS
@@ -52,6 +54,7 @@ def main() -> None:
                   f'{1e3 * np.linalg.norm(velocities):.1f} mm/s')
     print(f'force / weight {wrenches[0, 2] / (GRAVITY * MASS):.4f}, '
           f'slid {1e3 * poses[0, 0]:.0f} mm')
+    print('corner loads', *(f'{1e-3 * load:.2f}' for load in forces.loads().corner_loads[0]), 'kN')
     rclpy.shutdown()
 
 

@@ -106,7 +106,10 @@ typedef struct bc_load {
   double friction[3];     /* [N] */
   double torsion;         /* of friction, along the normal [N m] */
   double centre[3];       /* of pressure [m] */
-  double corners[4][3];   /* of the patch's rectangle: ++, +-, --, -+ along its axes 1 and 2 [m] */
+  double corners[4][3];   /* of the patch's rectangle: ++, +-, --, -+ along its axes 1 and 2 [m]. With
+                             bc_patch_forces_set_boxes it is around the patch of the faces that are
+                             within 0.1 mm; else it has the moments of the overlap, which at rest is a
+                             wedge, and may reach beyond the rim */
   double corner_loads[4]; /* the part of `pressing` at each corner; never below 0 [N] */
 } bc_load;
 

@@ -19,6 +19,9 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
+// The largest gap within the patch of a load [m]: a simulation at rest errs by 1 to 250 µm.
+constexpr double face_tolerance = 1e-4;
+
 struct Point {
   double x, y;
 };
@@ -110,6 +113,7 @@ struct FacePatch {
   double area;                                 // across the normal [m²]
   Point centroid;
 
+  Point flat(const Vec<double>& v) const { return {dot(v, axis_1), dot(v, axis_2)}; }
   Vec<double> in_common_frame(const Point& at) const {
     double along = height + dot(slope, at);
     return origin + ((at.x * axis_1 + at.y * axis_2) + along * normal);
@@ -143,9 +147,7 @@ inline FacePatch patch_of_faces(const bc_pose& pose_a, const bc_size& size_a, co
   Vec<double> level = edge - dot(edge, normal) * normal;
   patch.axis_1 = (1.0 / length(level)) * level;
   patch.axis_2 = cross(normal, patch.axis_1);
-  auto flat = [&](const Vec<double>& v) {
-    return Point{dot(v, patch.axis_1), dot(v, patch.axis_2)};
-  };
+  auto flat = [&](const Vec<double>& v) { return patch.flat(v); };
 
   Point middle = flat(a.centre), u = flat(a.half_1), v = flat(a.half_2);
   if (cross(u, v) < 0.0) v = -1.0 * v;

@@ -26,6 +26,7 @@
 #include <vector>
 
 #include "../../include/box_contact/force.h"
+#include "faces.hpp"
 #include "island_step.hpp"
 #include "own_contacts.hpp"
 
@@ -45,14 +46,30 @@ class PatchForces {
   enum class Held { all, pair_twice, no_patch };
 
   PatchForces(std::vector<Body> bodies, const Options& options)
-      : bodies_(std::move(bodies)), options_(options), ended_(bodies_.size()) {
+      : bodies_(std::move(bodies)), options_(options), ended_(bodies_.size()), poses_(bodies_.size()) {
     make_room(0);
   }
 
   const std::vector<Body>& bodies() const { return bodies_; }
   const std::vector<bc_body_box>& boxes() const { return own_.boxes(); }
-  const std::vector<Load>& loads() const { return loads_; }
-  double load_time() const { return clock_.advance(); }
+  size_t load_count() const { return loads_.size(); }
+  // What a pair carried in the last advance. With boxes, its corners are those of the faces.
+  bc_load load(size_t k) const {
+    bc_load load = loads_[k].over(clock_.advance());
+    if (boxes().empty() || !(load.pressing > 0.0)) return load;
+    const bc_body_box &a = boxes()[size_t(load.box_a)], &b = boxes()[size_t(load.box_b)];
+    FacePatch patch = patch_of_faces(in_common_frame(poses_[size_t(a.body)], a.box.pose), a.box.size,
+                                     in_common_frame(poses_[size_t(b.body)], b.box.pose), b.box.size,
+                                     loads_[k].normal, face_tolerance);
+    if (patch.polygon.count == 0) return load;
+    auto corners = patch.rectangle();
+    auto shares = corner_shares(corners, patch.flat(vector(load.centre) - patch.origin));
+    for (size_t c = 0; c < 4; ++c) {
+      load.corner_loads[c] = shares[c] * load.pressing;
+      std::copy_n(patch.level(corners[c]).v, 3, load.corners[c]);
+    }
+    return load;
+  }
   int threads() const { return options_.threads; }
   int64_t box_count() const { return int64_t(boxes().empty() ? bodies_.size() : boxes().size()); }
   int64_t body_of(int64_t box) const { return boxes().empty() ? box : boxes()[size_t(box)].body; }
@@ -61,6 +78,7 @@ class PatchForces {
   void set_bodies(std::vector<Body> bodies) {
     bodies_ = std::move(bodies);
     ended_.resize(bodies_.size());
+    poses_.resize(bodies_.size());
     auto count = int32_t(bodies_.size());
     make_room(patches_.size());
     drop([this, count](const Patch& patch) {
@@ -130,11 +148,13 @@ class PatchForces {
   template <class InThreads>
   int64_t advance(double dt, const bc_pose* poses, const bc_velocity* velocities,
                   const bc_wrench* outside, const bc_motion& motion, const InThreads& in_threads) {
+    bc_motion all = motion;
+    if (!all.poses) all.poses = poses_.data();
     Advance step{clock_.begin(dt, options_.substeps),
                  poses,
                  velocities,
                  outside,
-                 motion,
+                 all,
                  moves_by_wrenches_};
     if (!is_grouped_) islands_.group(bodies_, patches_);
     is_grouped_ = true;
@@ -151,6 +171,7 @@ class PatchForces {
     islands.write_ends();
     for (size_t k = 0; k < bodies_.size(); ++k)
       if (!bodies_[k].is_free()) islands.move_alone(k);
+    if (motion.poses) std::copy_n(motion.poses, bodies_.size(), poses_.data());
     clock_.end(dt);
     moves_by_wrenches_ = motion.wrenches && !motion.poses && !motion.velocities;
     return -1;
@@ -316,6 +337,7 @@ class PatchForces {
   OwnContacts own_;
   std::vector<Ended> ended_;           // of the bodies
   bool moves_by_wrenches_ = false;     // whether the caller does so since the last advance
+  std::vector<bc_pose> poses_;         // of the bodies at the end of the last advance
   std::vector<Patch> patches_, next_;  // by pair
   std::vector<Load> loads_;            // of the last advance, by pair
   // Memory that calls use again.

@@ -15,7 +15,6 @@ namespace box_contact::detail {
 namespace {
 
 using force::Body;
-using force::Load;
 using force::PatchForces;
 
 PatchForces& forces_of(bc_patch_forces* forces) { return *reinterpret_cast<PatchForces*>(forces); }
@@ -355,9 +354,9 @@ bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, const bc_p
 int64_t bc_patch_forces_loads(const bc_patch_forces* forces, bc_load* loads, int64_t capacity) {
   if (!forces) return 0;
   const PatchForces& self = forces_of(forces);
-  auto count = int64_t(self.loads().size());
+  auto count = int64_t(self.load_count());
   if (!loads || capacity < count) return count;
-  for (const Load& load : self.loads()) *loads++ = load.over(self.load_time());
+  for (int64_t k = 0; k < count; ++k) loads[k] = self.load(size_t(k));
   return count;
 }
 
