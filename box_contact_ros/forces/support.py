@@ -92,9 +92,11 @@ def support(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike, contacts: Cont
 
 
 def base_areas(sizes: np.ndarray, poses: np.ndarray, up: np.ndarray) -> np.ndarray:
-    """Return the areas (n,) of the faces most across `up` [m²]."""
+    """Return the areas (n,) of the faces most across `up`, as seen along it [m²]."""
     turned = np.abs(up @ rotation_matrix(poses[:, 3:]))
-    return sizes.prod(axis=1) / sizes[np.arange(len(sizes)), turned.argmax(axis=1)]
+    face = turned.argmax(axis=1)
+    rows = np.arange(len(sizes))
+    return sizes.prod(axis=1) / sizes[rows, face] * turned[rows, face]
 
 
 def across_of(direction: np.ndarray) -> np.ndarray:
