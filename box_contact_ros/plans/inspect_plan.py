@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from ..core import native
 from ..extras import require
-from ..scene.contacts_of import contacts_of
-from ..scene.support import across_of, base_areas, deepest, hull_margins, standing
+from ..forces.support import across_of, base_areas, deepest, hull_margins, standing
 from ..solver.checks import as_floats, as_number, short_repr
+from ..solver.contacts_of import contacts_of
 from ..solver.faces import TOLERANCE, FacePatches, as_tolerance, corner_shares, face_patches
 from ..solver.pose import rotation_matrix
 from .bearings import NEGLIGIBLE, Bearings, on_corners, on_faces

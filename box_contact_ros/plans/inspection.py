@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 UNSOUND_FAULTS = ('gap', 'twice')
 """Faults of a file with which a plan is not sound. The others are told."""
-CAUSES = ('hangs', 'unsupported', 'goes with what falls', 'tips under its load', 'slides',
+CAUSES = ('hangs', 'unsupported', 'tips under its load', 'slides', 'goes with what falls',
           'overloaded')
-"""What may be wrong with a box."""
+"""What may be wrong with a box, the worst first."""
 
 
 @dataclass(frozen=True, eq=False)

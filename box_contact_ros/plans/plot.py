@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 SOUND, GROUND, DEEP = '#8fa8bf', '#d9d9d9', '#003049'
 """Colours of boxes that are sound, of the ground, and of those that overlap."""
-COLOURS = dict(zip(CAUSES, ('#9d0208', '#e63946', '#f4a261', '#c77dff', '#5a189a', '#ffd166')))
+COLOURS = dict(zip(CAUSES, ('#9d0208', '#e63946', '#c77dff', '#5a189a', '#f4a261', '#ffd166')))
 MOST_LABELS = 80
 """More boxes get no figures: nobody could read them."""
 _FACES = np.array([[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4],

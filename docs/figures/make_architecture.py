@@ -17,9 +17,10 @@ PACKAGE = Path(__file__).resolve().parents[2] / 'box_contact_ros'
 PLACES = {  # column and row of a folder's box, and what it is for
     'bench': (0, 0, 'A/B latency'), 'demo': (1, 0, 'the crane, the demo'),
     'view': (2, 0, 'live page, markers'), 'node': (1, 1, 'all rclpy of the product'),
-    'stream': (1, 2, 'poses → ticks, bytes'), 'models': (0, 3, 'networks, polygon soup'),
-    'scene': (1, 3, 'boxes, pairs, one tick'), 'forces': (2, 3, 'what contacts carry'),
-    'solver': (1, 4, 'boxes without a scene'), 'core': (1, 5, 'poses → contact, C++17')}
+    'stream': (1, 2, 'poses → ticks, bytes'), 'plans': (2, 2, 'is this plan sound?'),
+    'models': (0, 3, 'networks, polygon soup'), 'scene': (1, 3, 'boxes, pairs, one tick'),
+    'forces': (2, 3, 'what contacts carry'), 'solver': (1, 4, 'boxes without a scene'),
+    'core': (1, 5, 'poses → contact, C++17')}
 WIDTH, HEIGHT, COLUMN, ROW = 190, 50, 240, 90
 
 

@@ -1,0 +1,149 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Real pallets, a real ship and random plans: an independent linear programme, and a simulation."""
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from box_contact_ros import Body, PatchForces, Plan, contacts_of, inspect_plan
+
+pytest.importorskip('clarabel')
+from upright_statics import Upright
+
+ROOT = Path(__file__).parents[2]
+PALLETS = json.loads((ROOT / 'docs/examples/pallets/packing_plans.json').read_bytes())
+G = 9.81
+
+
+def upright(places):
+    return np.hstack((places, np.tile([0.0, 0, 0, 1], (len(places), 1))))
+
+
+def pallet(order):
+    """Return the plan of an order; its floor is box 0."""
+    items = PALLETS[order]
+    size = np.array([[entry['item'][f'{side}/mm'] for side in ('length', 'width', 'height')]
+                     for entry in items]) / 1000.0
+    turned = [entry['orientation'] == 1 for entry in items]
+    size[turned] = size[turned][:, [1, 0, 2]]
+    place = np.array([entry['flb_coordinates'] for entry in items]) / 1000.0 + size / 2.0
+    masses = [0.0, *(entry['item']['weight/kg'] for entry in items)]
+    return Plan(np.vstack(((4, 4, 1), size)), upright(np.vstack(((0, 0, -0.5), place))), masses,
+                ground=0)
+
+
+def statics(plan):
+    return Upright(plan.sizes, plan.poses, plan.masses, np.isin(np.arange(len(plan)), plan.ground))
+
+
+def assert_agrees(plan):
+    """Assert that groups stand where loads exist; return how many there are, and boxes that fall."""
+    found, independent = inspect_plan(plan), statics(plan)
+    groups = independent.groups()
+    for boxes in groups:
+        missing = independent.missing(boxes)
+        if 0.0 < np.abs(found.loaded_margin[boxes]).min() < 1e-4:
+            continue  # on the rim: loads exist, and a breath takes them away
+        assert found.stands[boxes].all() == (missing < 1e-6), (boxes, missing)
+    return len(groups), len(plan) - found.stands.sum()
+
+
+@pytest.mark.parametrize('order, falls, beside', [
+    ('00100408', 1, 1), ('00100001', 33, 38), ('00100002', 26, 26), ('00100003', 13, 13),
+    ('00100004', 35, 29)])
+def test_what_falls_on_real_pallets(order, falls, beside):
+    """Without neighbours that hold it, as a linear programme finds; and with them."""
+    plan = pallet(order)
+    assert assert_agrees(plan)[1] == falls
+    assert (~inspect_plan(plan, sides=True).stands).sum() == beside
+
+
+@pytest.mark.parametrize('seed', range(40))
+def test_what_falls_in_random_plans(seed):
+    """Piles of boxes of any size, and layers in which each box has many carriers."""
+    rng = np.random.default_rng(seed)
+    count, width = rng.integers(3, 25), rng.uniform(0.4, 1.5)
+    size = rng.integers(100, 900, (count, 3)) / 1e3
+    if seed % 2:
+        size[:, 2] = 0.2
+    place = rng.integers(-int(600 * width), int(600 * width), (count, 3)) / 1e3
+    for n in range(count):  # let it down
+        meets = (np.abs(place[:n, :2] - place[n, :2])
+                 < (size[:n, :2] + size[n, :2]) / 2 - 1e-9).all(axis=1)
+        top = (place[:n, 2] + size[:n, 2] / 2)[meets].max(initial=0.0)
+        place[n, 2] = top + size[n, 2] / 2
+    groups, _ = assert_agrees(Plan(
+        np.vstack(((6, 6, 1), size)), upright(np.vstack(((0, 0, -0.5), place))),
+        [0, *rng.uniform(1, 40, count)], ground=0))
+    assert groups > 0
+
+
+@pytest.mark.parametrize('order', ['00100408', '00100003'])
+def test_unique_loads_are_those_of_a_simulation(order):
+    """Of what stands, after a second of PatchForces; and loads are within their ranges."""
+    plan = pallet(order)
+    kept = np.flatnonzero(inspect_plan(plan).stands)
+    plan = Plan(plan.sizes[kept], plan.poses[kept], plan.masses[kept], ground=0)
+    found = inspect_plan(plan)
+    assert found.sound
+    loads = dict(zip(map(tuple, found.carried_by.tolist()), found.loads / G))
+    independent = statics(plan)
+    ranges = {pair: ends for boxes in independent.groups()
+              for pair, ends in independent.ranges(boxes).items()}
+    assert all(low - 0.01 <= loads[pair] <= high + 0.01 for pair, (low, high) in ranges.items())
+
+    forces = PatchForces([Body(mass=0, inertia=np.zeros(3)), *(
+        Body.of_box(size, mass) for size, mass in zip(plan.sizes[1:], plan.masses[1:]))])
+    forces.set_boxes(plan.sizes)
+    forces.hold(contacts_of(plan.sizes, plan.poses)[0])
+    poses, velocities, weights = plan.poses, np.zeros((len(plan), 6)), np.zeros((len(plan), 6))
+    weights[:, 2] = -G * plan.masses
+    for _ in range(1000):
+        poses, velocities, _ = forces.advance(1e-3, poses, velocities, weights)[:3]
+    simulated = forces.loads()
+    unique = 0
+    for pair, force in zip(simulated.pairs.tolist(), simulated.pressing):
+        pair = tuple(pair) if tuple(pair) in loads else tuple(pair[::-1])
+        low, high = ranges.get(pair, (0.0, np.inf))
+        if high - low < 0.01:
+            unique += 1
+            assert force / G == pytest.approx(loads[pair], abs=0.1)
+    assert unique >= 10
+
+
+@pytest.fixture(scope='module')
+def ship():
+    """Return 1,936 containers of 20 t, with a slab under each that has none below it.
+
+    Where the containers of a real ship stand: msayyes-app/Baplie-Dual-Viewer (8537654).
+    """
+    with np.load(Path(__file__).with_name('ship.npz')) as file:  # in half millimetres
+        size, place = file['sizes'] / 2000.0, file['places'] / 2000.0
+    pairs, contacts = contacts_of(size, upright(place), tolerance=1e-4)
+    upper = pairs[np.arange(len(pairs)), np.where(contacts.normal[:, 2] > 0, 1, 0)]
+    lowest = np.setdiff1d(np.arange(len(size)), upper[np.abs(contacts.normal[:, 2]) > 0.9])
+    below = place[lowest] - [0, 0, 0.05] - size[lowest] * [0, 0, 0.5]
+    slab = np.column_stack((size[lowest, :2], np.full(len(lowest), 0.1)))
+    return Plan(np.vstack((size, slab)), upright(np.vstack((place, below))),
+                np.repeat((20e3, 0.0), (len(size), len(slab))),
+                ground=len(size) + np.arange(len(slab)), limits=np.repeat(
+                    (192e3, np.inf), (len(size), len(slab))))
+
+
+@pytest.mark.parametrize('bears', ['faces', 'corners'])
+def test_what_falls_on_a_real_ship(ship, bears):
+    """18 forty-footers on one twenty-footer, whose centre is 38 mm outside, and 65 above them."""
+    found = inspect_plan(ship, bears=bears)
+    causes = dict(zip(*map(np.ndarray.tolist, np.unique(found.cause, return_counts=True))))
+    assert causes.pop('') == len(ship) - 83
+    assert causes == {'unsupported': 18, 'goes with what falls': 65}
+    outside = found.cause == 'unsupported'
+    if bears == 'faces':
+        assert found.margin[outside] == pytest.approx(-0.038, abs=1e-6)
+    assert found.load[ship.ground].sum() == pytest.approx(
+        G * 20e3 * 1936, rel=0.05)  # but for what begins to fall
