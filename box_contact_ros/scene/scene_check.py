@@ -181,6 +181,8 @@ class SceneCheck:
             if any(size):
                 raise ValueError('is a body of the scene, whose boxes have their sizes there')
             known = A_BODY
+        elif known is None and not name:
+            raise ValueError('is an empty name: a guest needs one')
         elif known is None and not any(size):
             raise ValueError('has no size, and is no box of the scene'
                              f'{nearest_name(name, self._scene.row_of)}')
@@ -206,12 +208,13 @@ class SceneCheck:
         def boxes_of(name: str, field: str) -> list[int]:
             if name in rows and name not in scene.bodies:
                 return [rows[name]]
-            known = name in rows or name in self._fixed or (
-                name in scene.boxes and scene.boxes[name].body in rows)
-            if not known:
+            mover = scene.mover(name) if name in scene.boxes else name
+            if not (mover in rows or mover in self._fixed):
+                if name in scene.row_of:
+                    raise ValueError(f'{field}: {short_repr(name)} moves, and its pose is not in '
+                                     f'the request: add {short_repr(mover)} to boxes')
                 raise ValueError(f'{field}: {short_repr(name)} is neither a box of the request nor '
-                                 f'a fixed box of the scene'
-                                 f'{nearest_name(name, {*rows, *scene.row_of})}')
+                                 f'of the scene{nearest_name(name, {*rows, *scene.row_of})}')
             if name in scene.bodies:
                 body = list(scene.bodies).index(name)
                 return [int(row) for row in MOST_BOXES + np.flatnonzero(scene.body_of == body)]
