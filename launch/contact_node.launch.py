@@ -5,7 +5,7 @@
 
     ros2 launch box_contact_ros contact_node.launch.py scene:=/path/to/yard.yaml model:=exact
 
-The parameters of the node come from params_file; an argument replaces the one of its name.
+Each parameter of the node is an argument. params_file has the values of those that are not given.
 """
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
@@ -14,20 +14,27 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
+from box_contact_ros.node.contact_node import PARAMETERS
+from box_contact_ros.node.parameters import Setting, flag
+
 ARGUMENTS = {
     'namespace': ('', 'namespace of the node'),
     'use_respawn': ('false', 'whether a node that has ended is started anew'),
     'log_level': ('info', 'lowest level that is logged'),
 }
-PARAMETERS = {'scene': str, 'model': str, 'pairing': str, 'use_sim_time': bool, 'autostart': bool}
-"""Types of the parameters that most users set; the others are set in params_file."""
+SETTINGS = {**PARAMETERS, 'use_sim_time': Setting(False, 'whether /clock tells the time', flag)}
+
+
+def type_of(setting: Setting) -> type | None:
+    """Return the type of a parameter; None for a list, whose numbers YAML tells apart."""
+    return None if isinstance(setting.default, tuple) else type(setting.default)
 
 
 def contact_node(context: LaunchContext) -> list[Node]:
     """Return the node with what was given."""
-    given = {name: LaunchConfiguration(name) for name in (*ARGUMENTS, *PARAMETERS, 'params_file')}
-    values = {name: ParameterValue(given[name], value_type=kind)
-              for name, kind in PARAMETERS.items() if given[name].perform(context)}
+    given = {name: LaunchConfiguration(name) for name in (*ARGUMENTS, *SETTINGS, 'params_file')}
+    values = {name: ParameterValue(given[name], value_type=type_of(setting))
+              for name, setting in SETTINGS.items() if given[name].perform(context)}
     return [Node(
         package='box_contact_ros', executable='contact_node', output='screen',
         namespace=given['namespace'], ros_arguments=['--log-level', given['log_level']],
@@ -42,7 +49,7 @@ def generate_launch_description() -> LaunchDescription:
             FindPackageShare('box_contact_ros'), '/config/contact_node.yaml']),
         *(DeclareLaunchArgument(name, default_value=default, description=description)
           for name, (default, description) in ARGUMENTS.items()),
-        *(DeclareLaunchArgument(name, default_value='', description=f'parameter {name}')
-          for name in PARAMETERS),
+        *(DeclareLaunchArgument(name, default_value='', description=setting.description)
+          for name, setting in SETTINGS.items()),
         OpaqueFunction(function=contact_node),
     ])

@@ -12,11 +12,15 @@ from unittest.mock import Mock
 
 import pytest
 
+from box_contact_ros.node.contact_node import PARAMETERS
+
 LAUNCH = Path(__file__).resolve().parents[2] / 'launch'
 
 
 @pytest.mark.parametrize('given, kinds', [
-    ({}, {}), ({'autostart': 'false', 'scene': 'yard.yaml'}, {'scene': str, 'autostart': bool})])
+    ({}, {}), ({'autostart': 'false', 'scene': 'yard.yaml'}, {'scene': str, 'autostart': bool}),
+    ({'pair_topics': 'false', 'margin': '1', 'size_a': '[2, 2, 2]', 'use_sim_time': 'true'},
+     {'pair_topics': bool, 'margin': float, 'size_a': None, 'use_sim_time': bool})])
 def test_an_argument_that_nobody_gives_leaves_the_file_alone(
         monkeypatch: pytest.MonkeyPatch, given: dict[str, str], kinds: dict[str, type]) -> None:
     """Parameters after the file replace those in it: only what was typed is among them."""
@@ -32,7 +36,7 @@ def test_an_argument_that_nobody_gives_leaves_the_file_alone(
         defaults.update({name: default_value}))
     names = runpy.run_path(str(LAUNCH / 'contact_node.launch.py'))
     names['generate_launch_description']()
-    assert {'use_sim_time', 'autostart', 'scene', 'model', 'pairing'} <= defaults.keys()
+    assert {'use_sim_time', *PARAMETERS} <= defaults.keys()
     names['contact_node'](defaults | given)
     _, values = names['Node'].call_args.kwargs['parameters']
     assert values == kinds
