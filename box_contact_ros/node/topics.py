@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from geometry_msgs.msg import PointStamped, PoseArray, PoseStamped, Vector3Stamped
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -30,7 +31,6 @@ DEEP_RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 CONTACT_DEPTH = 10
 POSE_DEPTH = 100
 """Poses that wait: 100 ms at 1 kHz, longer than any collection of garbage."""
-QOS_OVERRIDES = QoSOverridingOptions.with_default_policies()  # of poses and of `contacts`
 ARRAY_DEPTH = 5
 """Arrays that wait: a node that cannot keep up is late by a few ticks, never by seconds."""
 
@@ -50,6 +50,17 @@ def pose_qos(source: str) -> QoSProfile:
 def contact_qos() -> QoSProfile:
     """Return the quality of service of contacts."""
     return QoSProfile(depth=CONTACT_DEPTH, reliability=ReliabilityPolicy.RELIABLE)
+
+
+def _check_depth(qos: QoSProfile) -> SetParametersResult:
+    """Raise RuntimeError, as rclpy does for other policies, for a depth that keeps no message."""
+    if qos.depth < 1:
+        raise RuntimeError(f'depth must be at least 1, not {qos.depth}')
+    return SetParametersResult(successful=True)
+
+
+QOS_OVERRIDES = QoSOverridingOptions.with_default_policies(callback=_check_depth)
+"""Of poses and of `contacts`."""
 
 
 class SceneTopics:

@@ -237,6 +237,10 @@ def test_a_bad_start_is_one_clear_line(tmp_path):
          'qos_overrides of /box_a/pose: Unexpected QoS override for policy `reliability`'),
         ({'qos_overrides./contacts.publisher.reliability': 'relyable'},
          'qos_overrides of /contacts: Unexpected QoS override'),
+        ({'qos_overrides./box_a/pose.subscription.depth': 0},
+         'qos_overrides of /box_a/pose: depth must be at least 1, not 0'),
+        ({'qos_overrides./contacts.publisher.depth': -1},
+         'qos_overrides of /contacts: depth must be at least 1, not -1'),
         ({'size_a': '{2.0'}, "Couldn't parse"))
     starts = [arguments(**CUBES | given) for given in values]
     done = subprocess.run(
