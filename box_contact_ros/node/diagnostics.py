@@ -188,7 +188,8 @@ class Diagnostics:
         logger = self._node.get_logger()
         rejections, pairing.rejections = pairing.rejections, {}
         for line in (*self._monitor.take_refusals(),
-                     *(rejection.line(reason) for reason, rejection in rejections.items())):
+                     *(rejection.line(reason, topics.publisher_count(rejection.box))
+                       for reason, rejection in rejections.items())):
             logger.warning(line)
         new = self._counts - self._reported
         self._reported = Counter(self._counts)
@@ -206,7 +207,8 @@ class Diagnostics:
         sent = (new['poses'] + load.lost) / len(streams_of(scene))
         if state == ACTIVE:
             findings += _lateness(load, sent, new[OVERTAKEN])
-            findings += _rivals(self._monitor.shared, topics)
+            findings += _rivals(self._monitor.shared, topics,
+                                self._node.get_fully_qualified_name())
         self._log(findings)
         times = {CHECK_TIME: f'{1e3 * np.percentile(checks, 99):.1f}'} if len(checks) else {}
         self.publish(findings, state=state, load=load, came=new['poses'] > 0, values=times | {
@@ -272,16 +274,23 @@ def _lateness(load: Load, sent: float, overtaken: int) -> Iterator[Finding]:
                       'evenly, or raise the depth by qos_overrides')
 
 
-def _rivals(shared: Sequence[str], topics: SceneTopics) -> Iterator[Finding]:
-    """Yield what is published twice; shared: boxes whose publishers take turns."""
+def _rivals(shared: Sequence[str], topics: SceneTopics, name: str) -> Iterator[Finding]:
+    """Yield what is published twice.
+
+    shared: boxes whose publishers take turns. name: the node's own.
+    """
     if shared:
         yield Finding('shared', f'several publishers: {_some(shared)}',
                       f'the poses of all are used; leave one that publishes '
                       f'{topics.pose_topic(shared[0])}')
     if rivals := topics.rivals():
+        same_name, each = '', 'a topic of its own by -r contacts:=NAME'
+        if name in rivals:  # services are named after the node
+            same_name = f', and either one answers {name}/check'
+            each = 'a namespace of its own by -r __ns:=/NAME'
         yield Finding('rivals', f'others publish {topics.contacts.topic_name}: {_some(rivals)}',
-                      'their answers are mixed with those of this node; stop all but one, or give '
-                      'each a topic of its own by -r contacts:=NAME')
+                      f'their answers are mixed with those of this node{same_name}; stop all but '
+                      f'one, or give each {each}')
 
 
 def _findings(summary: Summary, refused: Sequence[str], unseen: Sequence[str],

@@ -103,8 +103,11 @@ class RejectedPose(NamedTuple):
     newest: int  # newest stamp of the box so far [ns]
     stamps: int = 0  # how many stamps of the box are remembered
 
-    def line(self, reason: str) -> str:
-        """Return the log line of what was done to the pose, with its remedy."""
+    def line(self, reason: str, publishers: int = 1) -> str:
+        """Return the log line of what was done to the pose, with its remedy.
+
+        publishers: how many publish poses of the box.
+        """
         box = self.box
         stamp, newest = (f'{1e-9 * value:.12g} s' for value in (self.stamp, self.newest))
         if reason == RESETS:
@@ -121,8 +124,10 @@ class RejectedPose(NamedTuple):
         if self.stamps == 1:
             return (f'{box}: stamp {stamp} does not advance; refused: set header.stamp (`ros2 '
                     'topic pub` does for `stamp: now`), or start with pairing:=latest')
-        return (f'{box}: stamp {stamp} has come before; refused: its tick is answered once; wait '
-                'longer for the answer, call ~/reset before an episode begins anew, or ask ~/check')
+        return (f'{box}: stamp {stamp} has come before; refused: its tick is answered once; ' + (
+            f'{publishers} publish poses of {box}, leave one' if publishers > 1 else
+            'wait longer for the answer, call ~/reset before an episode begins anew, or ask '
+            '~/check'))
 
 
 TickPoses = list['StampedPose | None']

@@ -91,6 +91,8 @@ def test_two_nodes_on_the_same_topics(node, client):
     with serving(ContactNode, size_a=[3.0, 2.0, 2.0]):
         assert are_told() == {True}
     assert are_told() == {False}
+    told = capfd.readouterr().err
+    assert 'either one answers /contact_node/check; stop all but one, or give each a names' in told
 
 
 def test_two_publishers_of_a_box(node, client):

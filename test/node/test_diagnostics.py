@@ -33,7 +33,8 @@ def node(monkeypatch):
     monitor = TickMonitor()
     reporter = Diagnostics(node, counts, monitor)
     pairing = StampPairing(SOLVER.scene, max_age=MAX_AGE, counts=counts)
-    topics = Mock(why_silent=lambda box: f'nobody publishes {box}', rivals=list)
+    topics = Mock(why_silent=lambda box: f'nobody publishes {box}', rivals=list,
+                  publisher_count=lambda box: 1)
 
     def report(seconds, *checks, age=None, lost=0):
         """Report after so long, with times of requests [s]; age: of an answer [ns]."""
@@ -195,3 +196,5 @@ def test_who_sends_a_stamp_again_is_told_why(stamps, words):
     (reason, rejection), = pairing.rejections.items()
     line = rejection.line(reason)
     assert words in line and ('latest' in line) == (len(stamps) == 2)
+    shared = rejection.line(reason, publishers=2)
+    assert (line == shared) == (len(stamps) == 2) and 'wait longer' not in shared
