@@ -319,6 +319,10 @@ def run(node_type: type[ContactNode], doc: str | None, args: Sequence[str] | Non
         try:
             if node.autostart:
                 node.start()
+            else:
+                node.get_logger().info(
+                    'autostart is false: the node waits for the transitions configure and '
+                    f'activate; `ros2 lifecycle set {node.get_fully_qualified_name()} configure`')
         except Exception:  # whoever holds it would destroy it later, and without a guard
             with ends_within(END_SECONDS):
                 node.destroy_node()

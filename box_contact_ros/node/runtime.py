@@ -178,13 +178,32 @@ def _note_interrupts() -> list[int]:
     return interrupts
 
 
+def _hang_up_as_terminated() -> None:
+    """Let SIGHUP, which a terminal sends as it is closed, end the process as SIGTERM does.
+
+    Not from a handler of Python's: it would run once EventsExecutor returns, seconds later.
+    """
+    if signal.getsignal(signal.SIGHUP) != signal.SIG_DFL:  # as `nohup` has it ignored
+        return
+    numbers, wakeup = os.pipe()
+    os.set_blocking(wakeup, False)
+    signal.set_wakeup_fd(wakeup, warn_on_full_buffer=False)
+    signal.signal(signal.SIGHUP, lambda number, frame: None)
+
+    def pass_on() -> None:
+        while signal.SIGHUP not in os.read(numbers, 64):
+            pass
+        os.kill(os.getpid(), signal.SIGTERM)
+    threading.Thread(target=pass_on, daemon=True).start()
+
+
 def _ignore_signals() -> None:
     """Let no signal disturb the interpreter's end.
 
     It takes its handlers back, and so does rclpy: the next signal would kill the process. rclpy's
     thread for signals would use what the end destroys.
     """
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     rclpy.signals.uninstall_signal_handlers()
 
@@ -197,12 +216,16 @@ def running_node(make_node: Callable[[Context], NodeKind], args: Sequence[str] |
 
     signals: which handlers of rclpy's are installed; none where the caller has its own. They shut
     the context down. Whatever then fails is raised as KeyboardInterrupt after Ctrl-C, and as
-    ExternalShutdownException after SIGTERM. Ctrl-C itself raises nothing any more in this process.
+    ExternalShutdownException after SIGTERM or SIGHUP. Ctrl-C itself raises nothing any more in this
+    process.
     """
     context = Context()
     node = executor = None
     # Handlers have to be asked for where the context is not the default one.
-    interrupts = [] if signals is SignalHandlerOptions.NO else _note_interrupts()
+    interrupts: list[int] = []
+    if signals is not SignalHandlerOptions.NO:
+        interrupts = _note_interrupts()
+        _hang_up_as_terminated()
     try:
         rclpy.init(args=None if args is None else list(args), context=context,
                    signal_handler_options=signals)

@@ -79,7 +79,7 @@ def test_poses_pair_by_stamp_in_any_order(node, client):
         assert -contact.separation == pytest.approx(2 - heights[stamp], abs=1e-14)
 
 
-def test_two_nodes_on_the_same_topics(node, client):
+def test_two_nodes_on_the_same_topics(node, client, capfd):
     """Both are told, also where they have the same name; one that is alone is not."""
     def are_told():
         client.diagnostics.clear()
@@ -270,7 +270,7 @@ print(run(Node, None, ['--ros-args', '-p', 'size_a:=[0.0, 1.0, 1.0]']))
 
 @pytest.mark.parametrize(('number', 'pauses'), [
     (signal.SIGINT, ()), (signal.SIGTERM, ()), (signal.SIGINT, (0.0,)), (signal.SIGTERM, (0.02,)),
-    (signal.SIGINT, (0.12,))], ids=str)
+    (signal.SIGINT, (0.12,)), (signal.SIGHUP, ()), (signal.SIGHUP, (0.02,))], ids=str)
 def test_ends_cleanly(program, number, pauses):
     """Also under a second signal, at once or while the node leaves the network."""
     running = program('contact_node', *arguments(**CUBES))
@@ -281,6 +281,12 @@ def test_ends_cleanly(program, number, pauses):
         running.signal(number)
     assert running.wait() == 0, running.output
     assert 'Traceback' not in running.output
+
+
+def test_without_autostart_it_says_what_it_waits_for(program):
+    """In one line, as it would stay silent for ever."""
+    running = program('contact_node', *arguments(**CUBES, autostart='false'))
+    assert '`ros2 lifecycle set /contact_node configure`' in running.wait_for_output('autostart')
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])

@@ -171,6 +171,7 @@ signal.raise_signal(number)
 @pytest.mark.parametrize('number, when, words', [
     (signal.SIGINT, 'within', 'not here\nKeyboardInterrupt\n'),
     (signal.SIGTERM, 'within', 'not here\nExternalShutdownException\n'),
+    (signal.SIGHUP, 'within', 'not here\nExternalShutdownException\n'),
     (signal.SIGINT, 'before', 'KeyboardInterrupt\n')])
 def test_a_signal_falls_nowhere(number, when, words):
     """It shuts the context down, and what fails at that tells which signal it was."""
