@@ -32,6 +32,8 @@ PAUSE = 5.0
 MOST_WAITING = 16
 """Costly requests that wait for the end of a pause."""
 KEPT_TIMES = 4096  # of requests, for a report
+KEPT_KINDS = 256
+Kind = tuple[bool, float]  # of requests: whether pairs are listed, and the margin
 
 
 class Checker:
@@ -85,7 +87,8 @@ class CheckService:
 
     After a costly request that took T, costly requests wait for PAUSE · T. A client that waits asks
     nothing: a refusal would bring its request again, and ROS takes a millisecond to read it.
-    Whether a request is costly is judged by the time per box and pair of the last costly one.
+    Whether a request is costly is judged by its kind, and by its number of boxes and pairs. The
+    margin makes the kind, and whether pairs are listed: both decide how many pairs a box has.
     """
 
     def __init__(self, node: GuardedNode, counts: Counter[str],
@@ -93,7 +96,8 @@ class CheckService:
         """Serve ~/check of a node; `answer` fills in a response."""
         self._counts = counts
         self._until = 0.0  # end of the pause, by the steady clock [s]
-        self._cheap = 0  # number of boxes and pairs that are not costly
+        self._cheap: dict[Kind, int] = {}
+        """Number of boxes and pairs that are not costly, of the kinds that came last."""
         self._waiting: deque[tuple[float, Check.Request, Check.Response, Send]] = deque()
         """When each came [s], and what `_answer` takes."""
         self._times: deque[float] = deque(maxlen=KEPT_TIMES)  # from taking to answering [s]
@@ -112,7 +116,8 @@ class CheckService:
     def _take(self, request: Check.Request, response: Check.Response, send: Send) -> None:
         """Answer a request now or, if it is costly in a pause, later."""
         now = time.monotonic()
-        is_costly = len(request.boxes) + len(request.pairs) > self._cheap
+        kind, count = _kind_and_count(request)
+        is_costly = count > self._cheap.get(kind, 0)
         if not is_costly or not (self._waiting or now < self._until):
             self._answer(now, request, response, send)
         elif len(self._waiting) < MOST_WAITING:
@@ -146,9 +151,20 @@ class CheckService:
         ended = time.monotonic()
         self._counts['checks answered' if response.success else 'checks refused'] += 1
         self._times.append(ended - came)
+        kind, count = _kind_and_count(request)
+        cheap = max(self._cheap.pop(kind, 0), count)
         if ended - began > COSTLY and (cost := time.thread_time() - used) > COSTLY:
             self._until = ended + PAUSE * (ended - began)
-            self._cheap = int((len(request.boxes) + len(request.pairs)) * COSTLY / cost)
+            cheap = int(count * COSTLY / cost)
+        self._cheap[kind] = cheap  # the newest comes last
+        if len(self._cheap) > KEPT_KINDS:
+            del self._cheap[next(iter(self._cheap))]
+
+
+def _kind_and_count(request: Check.Request) -> tuple[Kind, int]:
+    """Return the kind of a request, and its number of boxes and pairs."""
+    pairs = len(request.pairs)
+    return (pairs > 0, request.margin), len(request.boxes) + pairs
 
 
 def _pose(box: Any) -> Row:

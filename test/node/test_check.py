@@ -376,12 +376,12 @@ class Bench:
         response.success = request.name != 'bad'
         return response
 
-    def ask(self, name: str, boxes: int, seconds: float) -> None:
+    def ask(self, name: str, boxes: int, seconds: float, margin: float = 0.0) -> None:
         """Take a request whose answer is sent after so long."""
         def send(response: Check.Response) -> None:
             self.now += seconds
             self.sent.append(name if response.success else f'{name}: {response.message[:4]}')
-        request = SimpleNamespace(name=name, boxes=range(boxes), pairs=())
+        request = SimpleNamespace(name=name, boxes=range(boxes), pairs=(), margin=margin)
         self.service._take(request, Check.Response(), send)
 
 
@@ -412,6 +412,26 @@ def test_a_pause_is_five_times_as_long_as_its_request(monkeypatch: pytest.Monkey
     assert bench.counts == {'checks answered': 20, 'checks refused': 2}
     times = bench.service.take_times()
     assert len(times) == 21 and max(times) > 1.0 and not bench.service.take_times()
+
+
+def test_what_one_client_asks_makes_no_other_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A box with a large margin has thousands of pairs, the same box without one has few.
+
+    Hundreds of other margins are forgotten again.
+    """
+    bench = Bench(monkeypatch)
+    bench.ask('cheap', 1, 0.001)
+    for number in range(5):
+        bench.ask('greedy', 1, 0.04, margin=1000.0)
+        bench.ask(f'cheap {number}', 1, 0.001)
+    assert bench.sent == ['cheap', 'greedy', *(f'cheap {number}' for number in range(5))]
+    bench.now += 1.0
+    for _ in range(4):
+        bench.end_of_pause()
+        bench.now += 1.0
+    for number in range(300):
+        bench.ask('other', 1, 0.001, margin=1.0 + number)
+    assert len(bench.service._cheap) == check_module.KEPT_KINDS
 
 
 @pytest.mark.parametrize('by_topics', [False, True])
