@@ -8,9 +8,12 @@ one drawn at random. The bench sends pairs of poses of equal stamp: a container 
 another one. Blocks of half a second go to one node after the other, in an order that is drawn for
 each block.
 
+The nodes run alone, or beside loops that do nothing but take time: one of low priority on each of
+the nodes' cores (nice), or one on each core of the machine (busy).
+
 The first line of the report says how many times as long a node takes as the one before it, with
 95 % intervals. A table has latencies, and answers that are lost or differ from the exact contacts.
-With --out, a picture of the latencies stands before them.
+With --out, a picture of the latencies stands before them, those of the first surroundings.
 
 The exit status is 0 only if contact and echo node lost nothing, no answer was wrong, and the run is
 not void. It is void if the bench itself was late by more than a period in over 1 % of the pairs.
@@ -25,7 +28,7 @@ import platform
 import re
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from importlib.metadata import version
 from importlib.util import find_spec
@@ -42,6 +45,8 @@ from .poses import swaying_containers
 from .report import comparison, draw, figures, table, void_reason
 
 RATE, SECONDS, LONGEST = 200.0, 60.0, 3600.0  # [Hz], [s], [s]
+QUIET, NICE, BUSY = SURROUNDINGS = ('quiet', 'nice', 'busy')
+NICENESS = {NICE: 10, BUSY: 0}  # of loops
 
 
 @exit_on_refusal
@@ -70,22 +75,38 @@ def main(args: Sequence[str] | None = None) -> int:
         os.sched_setaffinity(0, own)  # before rclpy starts its threads
         bench, executor = ending.enter_context(running_node(partial(
             BenchNode, nodes=nodes, poses=poses, rate=options.rate, signals=signals), args))
-        logs = bench.run(executor)
+        logs = {}
+        for surroundings in options.beside:
+            with loops(surroundings, theirs if surroundings == NICE else cores):
+                logs[surroundings] = bench.run(executor)
         faults = [f'the {name} node ended early, status {node.returncode}'
                   for name, node in nodes.items() if node.poll() is not None]
-    rows, compared = figures(logs), comparison(logs, block=bench.block)
+    rows = [{'beside': beside, **row} for beside in logs for row in figures(logs[beside])]
+    compared = '\n'.join(f'{beside}: {comparison(logs[beside], block=bench.block)}'
+                         for beside in logs)
     void = void_reason(rows, options.rate)
     stopped = 'interrupted: figures are of what was sent before' if signals else ''
     results = '\n\n'.join(filter(None, (void, compared, table(rows), *faults, stopped)))
     print(f'\n{results}', flush=True)
     if options.out:
         name = f'bench_{options.model}'
-        draw(options.out / f'{name}.png', logs, block=bench.block)
+        draw(options.out / f'{name}.png', logs[options.beside[0]], block=bench.block)
         (options.out / f'{name}.md').write_text(
             f'# Bench of `{options.model}`\n\n![Latencies of each node]({name}.png)\n\n'
             f'{about}\n\n{results}\n', 'utf-8')
     faulty = any(row['wrong'] or row['lost'] and row['node'] != 'soup' for row in rows)
     return 128 + signals[0] if signals else int(faulty or bool(faults) or bool(void))
+
+
+@contextlib.contextmanager
+def loops(surroundings: str, cores: set[int]) -> Iterator[None]:
+    """Keep a loop running on each of some cores, of the priority that the surroundings have."""
+    with contextlib.ExitStack() as ending:
+        for core in () if surroundings == QUIET else cores:
+            loop = ending.enter_context(running(['-c', 'while True: pass']))
+            os.sched_setaffinity(loop.pid, {core})
+            os.setpriority(os.PRIO_PROCESS, loop.pid, NICENESS[surroundings])
+        yield
 
 
 def _options(args: Sequence[str]) -> argparse.Namespace:
@@ -97,6 +118,9 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
                              '%(default)g)')
     parser.add_argument('--model', type=model_name, default='exact', metavar='NAME',
                         help=f'of the contact node: {", ".join(MODELS)} (default: %(default)s)')
+    parser.add_argument('--beside', nargs='+', choices=SURROUNDINGS, default=[QUIET],
+                        metavar='NAME', help=f'surroundings, one after the other, each for the '
+                        f'whole time: {", ".join(SURROUNDINGS)} (default: {QUIET})')
     parser.add_argument('--out', type=Path, metavar='DIR',
                         help='folder for the report, bench_NAME.md, and its picture, which needs '
                              'the extra report (default: none)')

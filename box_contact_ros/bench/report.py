@@ -84,11 +84,17 @@ def ratio(log: AnswerLog, baseline: AnswerLog, *, block: int) -> tuple[float, fl
 
 
 def comparison(logs: Sequence[AnswerLog], *, block: int) -> str:
-    """Return the ratio of each node to the one before it: `contact / echo 1.18 [1.15, 1.22]`."""
-    ratios = [(log, before, ratio(log, before, block=block))
-              for before, log in zip(logs, logs[1:])]
-    return ', '.join(f'{log.node} / {before.node} {middle:.2f} [{low:.2f}, {high:.2f}]'
-                     for log, before, (middle, low, high) in ratios)
+    """Return the ratios of each node to the one before it: those of `ratio`, and that of the p99.
+
+    Such as `contact / echo 1.18 [1.15, 1.22], p99 1.30`.
+    """
+    texts = []
+    for before, log in zip(logs, logs[1:]):
+        middle, low, high = ratio(log, before, block=block)
+        tails = _percentile(log.latencies, 99) / _percentile(before.latencies, 99)
+        texts.append(f'{log.node} / {before.node} {middle:.2f} [{low:.2f}, {high:.2f}], '
+                     f'p99 {tails:.2f}')
+    return '; '.join(texts)
 
 
 def figures(logs: Sequence[AnswerLog]) -> list[dict[str, Any]]:

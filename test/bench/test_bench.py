@@ -20,6 +20,7 @@ from rclpy.qos import QoSProfile
 from box_contact_msgs.msg import Contacts
 from box_contact_ros import extras
 from box_contact_ros.bench import drive
+from box_contact_ros.bench.bench import loops
 from box_contact_ros.bench.bench import main as bench_main
 from box_contact_ros.node.runtime import GuardedNode, running_node, spin_for
 
@@ -58,10 +59,36 @@ def test_a_short_run(program, tmp_path):
         assert 0.0 < p50 <= p99 <= most
     assert rows[1]['point error [mm]'] == '0'  # the exact model, bit by bit
     number = r'(\d+\.\d\d)'
-    compared = re.search(f'contact / echo {number} \\[{number}, {number}\\], soup / contact ', page)
-    middle, low, high = map(float, compared.groups())
+    compared = re.search(f'quiet: contact / echo {number} \\[{number}, {number}\\], p99 {number}; '
+                         'soup / contact ', page)
+    middle, low, high, _ = map(float, compared.groups())
     assert low <= middle <= high
     assert all(line in running.output for line in page.splitlines() if line.startswith('|'))
+
+
+def test_loops_are_where_they_are_asked_for():
+    """One on each core, of its priority, while the block lasts; none where all is quiet."""
+    cores = os.sched_getaffinity(0)
+    for surroundings, niceness in (('quiet', None), ('nice', 10), ('busy', 0)):
+        with loops(surroundings, cores):
+            found = [pid for pid in children(os.getpid())
+                     if b'while True' in Path(f'/proc/{pid}/cmdline').read_bytes()]
+            assert [os.getpriority(os.PRIO_PROCESS, pid) for pid in found] == (
+                [] if niceness is None else [niceness] * len(cores))
+            assert sorted(core for pid in found for core in os.sched_getaffinity(pid)) == (
+                sorted(cores) if found else [])
+        assert not any(Path(f'/proc/{pid}').exists() for pid in found)
+
+
+def test_a_row_for_each_surroundings(program):
+    running = bench(program, '--rate 50 --duration 2 --beside quiet nice')
+    running.wait()
+    rows = [row for row in rows_of(running.output) if row['node'] != 'soup']
+    assert [(row['beside'], row['node']) for row in rows] == [
+        (beside, node) for beside in ('quiet', 'nice') for node in ('echo', 'contact')]
+    assert all(int(row['sent']) > 0 and row['wrong'] == '0' for row in rows)
+    for beside in ('quiet', 'nice'):
+        assert re.search(rf'^{beside}: contact / echo \d', running.output, re.M)
 
 
 class FaultyRelay(GuardedNode):
@@ -158,6 +185,7 @@ def test_a_report_without_matplotlib_names_the_extra(monkeypatch, tmp_path):
 @pytest.mark.parametrize('arguments, words', [
     ('--rate 0', 'argument --rate: must lie in 1 to 4000'),
     ('--model exakt', "argument --model: model 'exakt' is not one of"),
+    ('--beside loud', "argument --beside: invalid choice: 'loud'"),
     ('--out /proc/nowhere', 'cannot write to /proc/nowhere'),
 ])
 def test_bad_options(arguments, words, capsys):

@@ -105,7 +105,7 @@ def test_ratios_are_paired_by_pose():
     soup = played('soup', delay=3 * MS)
     soup.received['normal'][:] = soup.stamps + 6 * MS * (1 + np.arange(PAIRS))
     assert comparison([echo, contact, soup], block=BLOCK) == (
-        'contact / echo 1.50 [1.50, 1.50], soup / contact 2.00 [2.00, 2.00]')
+        'contact / echo 1.50 [1.50, 1.50], p99 1.50; soup / contact 2.00 [2.00, 2.00], p99 2.00')
 
 
 def test_the_interval_of_a_ratio_spans_its_blocks():
@@ -135,7 +135,7 @@ def test_a_dead_node_has_a_report():
     assert (rows[1]['lost'], rows[1]['wrong']) == (PAIRS, 0)
     lines = table(rows).splitlines()
     assert len({len(line) for line in lines}) == 1 and 'nan' not in lines[3]
-    assert comparison(logs, block=BLOCK) == 'contact / echo nan [nan, nan]'
+    assert comparison(logs, block=BLOCK) == 'contact / echo nan [nan, nan], p99 nan'
 
 
 def test_the_picture_is_as_wide_as_a_page(tmp_path):
