@@ -17,6 +17,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Any, TypeVar
 
 import rclpy
@@ -45,6 +46,7 @@ SPIN_SECONDS = 10.0
 Each leaves some 32 bytes behind in rclpy (7.1): of slices this long, 0.3 MB a day."""
 END_SECONDS = 8.0  # for a clean end; launch kills after ten
 NodeKind = TypeVar('NodeKind', bound=Node)
+EVENT_THREAD = 'dds.ev'  # begins the names of Fast DDS's threads for timed events
 LONG = 86_400.0  # period of a timer that stands still [s]
 LOG_SECONDS = 1.0  # the same complaint is logged at most this often
 
@@ -150,18 +152,18 @@ def _complaints_of(node: Node) -> Iterator[None]:
                                     throttle_duration_sec=LOG_SECONDS)
 
 
-def deprioritise_other_threads() -> None:
-    """Keep this process's other threads from interrupting the one that calls this (Linux).
+def keep_events_from_interrupting() -> None:
+    """Keep the middleware's threads for timed events from interrupting this process (Linux).
 
-    Every reliable publish wakes two or three threads of the middleware. As batch threads they wait
-    until this one is idle: docs/contributing/decisions/contact-node.md.
+    Every reliable publish wakes one. As a batch thread it waits until its core is idle, or until
+    its turn comes. Nothing that a tick needs comes through it; the threads that receive stay as
+    they are: docs/contributing/decisions/contact-node.md.
     """
     try:
-        mine = threading.get_native_id()
-        for name in os.listdir('/proc/self/task'):
-            if int(name) != mine:
-                with contextlib.suppress(ProcessLookupError):
-                    os.sched_setscheduler(int(name), os.SCHED_BATCH, os.sched_param(0))
+        for task in Path('/proc/self/task').iterdir():
+            with contextlib.suppress(ProcessLookupError, FileNotFoundError):
+                if (task / 'comm').read_text().startswith(EVENT_THREAD):
+                    os.sched_setscheduler(int(task.name), os.SCHED_BATCH, os.sched_param(0))
     except (AttributeError, OSError):  # another system, or it is not permitted: slower, no more
         pass
 
@@ -281,12 +283,12 @@ def run_node(make_node: Callable[[Context], Node], args: Sequence[str] | None, *
              undisturbed: bool = True) -> int:
     """Start a node and `spin`; return 0 after a clean end, 1 (and print why) if it cannot start.
 
-    undisturbed: `deprioritise_other_threads`.
+    undisturbed: `keep_events_from_interrupting`.
     """
     try:
         with running_node(make_node, args, signals=SignalHandlerOptions.ALL) as (node, executor):
             if undisturbed:
-                deprioritise_other_threads()
+                keep_events_from_interrupting()
             spin(node, executor)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass

@@ -11,7 +11,6 @@ import subprocess
 import sys
 import time
 from functools import partial
-from threading import Event, Thread, get_native_id
 from types import SimpleNamespace
 
 import pytest
@@ -118,23 +117,38 @@ def test_a_node_that_cannot_start_says_why(run, capsys):
     assert not capsys.readouterr().err
 
 
-def test_other_threads_become_batch_threads(monkeypatch):
-    """All of the process but the caller's; where that is not permitted, none."""
-    changed, done = {}, Event()
-    monkeypatch.setattr(os, 'sched_setscheduler', lambda number, policy, _: changed.update(
-        {number: policy}))
-    other = Thread(target=done.wait)
-    other.start()
-    runtime.deprioritise_other_threads()
-    done.set()
-    other.join()
-    assert changed[other.native_id] == os.SCHED_BATCH and get_native_id() not in changed
+EVENTS = """
+import os
+from pathlib import Path
+from rclpy.node import Node
+from box_contact_ros.node import runtime
 
+with runtime.running_node(lambda context: Node('events', context=context)):
+    runtime.keep_events_from_interrupting()
+    for task in Path('/proc/self/task').iterdir():
+        print((task / 'comm').read_text().strip(), os.sched_getscheduler(int(task.name)))
+"""
+
+
+def test_threads_for_events_alone_become_batch_threads():
+    """Of a batch thread that receives poses, each pose waits beside whatever uses its core."""
+    done = subprocess.run([sys.executable, '-c', EVENTS], capture_output=True, text=True,
+                          timeout=PATIENCE)
+    policies = [line.rsplit(' ', 1) for line in done.stdout.splitlines()]
+    assert {int(policy) for name, policy in policies if name.startswith('dds.ev')} == {
+        os.SCHED_BATCH}, done.stderr
+    assert {int(policy) for name, policy in policies if not name.startswith('dds.ev')} == {
+        os.SCHED_OTHER}
+    assert {name[:7] for name, _ in policies} >= {'dds.udp', 'dds.shm'}
+
+
+def test_where_threads_may_not_be_changed_they_stay(monkeypatch):
+    """And nothing is raised."""
     def forbidden(path):
         raise PermissionError(path)
 
-    monkeypatch.setattr(os, 'listdir', forbidden)
-    runtime.deprioritise_other_threads()
+    monkeypatch.setattr(runtime.Path, 'iterdir', forbidden)
+    runtime.keep_events_from_interrupting()
 
 
 SIGNALLED = """
