@@ -13,8 +13,9 @@ import fnmatch
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
+from itertools import count
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -197,6 +198,51 @@ class Scene:
         return np.array([is_alike(name) is not None or box.body in bodies
                          for name, box in self.boxes.items()])
 
+    def changed(self, changes: Mapping[str, Box | None]) -> Scene:
+        """Return the scene in which boxes are new, or replaced where they are, or gone (None).
+
+        New ones come last. Patterns may match no box then. Raises SceneError for a listed pair that
+        lacks a box, or whose boxes no longer move against each other. The time goes into copies:
+        only what changes is looked at.
+        """
+        given = {name: box for name, box in changes.items() if box is not None}
+        boxes = {**self.boxes, **given}
+        gone = [self.index_of[name] for name in changes.keys() - given.keys()]
+        for name in changes.keys() - given.keys():
+            del boxes[name]
+        scene, part = self._with(boxes), self._with(given)
+        is_new = np.array([name not in self.boxes for name in given], bool)
+        replaced = [self.index_of[name] for name in given if name in self.boxes]
+
+        def merged(rows: np.ndarray, values: np.ndarray) -> np.ndarray:
+            rows = rows.copy()
+            rows[replaced] = values[~is_new]
+            return np.concatenate((np.delete(rows, gone, axis=0), values[is_new]))
+
+        for key in ('sizes', 'box_poses', 'body_of', 'is_fixed'):
+            vars(scene)[key] = merged(getattr(self, key), getattr(part, key))
+        kinds, kind = self._kinds
+        number_of = {row.tobytes(): number for number, row in enumerate(kinds)}
+        numbers = [number_of.setdefault(row.tobytes(), len(number_of)) for row in part.sides]
+        if self.patterns and len(number_of) <= len(boxes):  # else kinds of no box any more go
+            kinds = np.frombuffer(b''.join(number_of), bool).reshape(-1, kinds.shape[1])
+            vars(scene)['_kinds'] = kinds, merged(kind, np.array(numbers, np.int32))
+        if not gone:
+            added = [name for name in given if name not in self.boxes]
+            vars(scene)['index_of'] = {**self.index_of, **dict(zip(added, count(len(self.boxes))))}
+            vars(scene)['rows'] = self.rows
+        vars(scene)['listed_names'] = self.listed_names
+        if not self.listed_names.isdisjoint(changes):
+            _check_pairs(scene)
+        return scene
+
+    def _with(self, boxes: Mapping[str, Box]) -> Scene:
+        """Return an unchecked scene of other boxes."""
+        scene = object.__new__(Scene)
+        vars(scene).update({part.name: getattr(self, part.name) for part in fields(self)},
+                           boxes=boxes)
+        return scene
+
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the boxes by index."""
@@ -215,7 +261,22 @@ class Scene:
     @cached_property
     def row_of(self) -> Mapping[str, int]:
         """Return by name the rows of poses (n + m, 7): those of boxes, then those of bodies."""
-        return {name: row for row, name in enumerate(self._parts)}
+        return {**self.index_of, **dict(zip(self.bodies, count(len(self.boxes))))}
+
+    @cached_property
+    def sizes(self) -> np.ndarray:
+        """Return full extents (n, 3) [m]."""
+        return np.array([box.size for box in self.boxes.values()]).reshape(-1, 3)
+
+    @cached_property
+    def box_poses(self) -> np.ndarray:
+        """Return the poses (n, 7) that boxes have in the scene, NaN where they have none."""
+        return _poses_of(self.boxes)
+
+    @cached_property
+    def listed_names(self) -> frozenset[str]:
+        """Return the names of the boxes of listed pairs."""
+        return frozenset(name for pair in self.pairs for name in (pair.a, pair.b))
 
     def mover(self, box: str) -> str:
         """Return whose pose moves a box: the name of its body, else its own."""
@@ -231,7 +292,7 @@ class Scene:
     def is_fixed(self) -> np.ndarray:
         """Return which boxes (n,) never move."""
         return np.array([(self.bodies[box.body] if box.body else box).pose is not None
-                         for box in self.boxes.values()])
+                         for box in self.boxes.values()], bool)
 
     @cached_property
     def rigid(self) -> np.ndarray:
@@ -246,14 +307,14 @@ class Scene:
     def _placement(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the row of each box's body (n,) or -1, and its pose (n, 7) in the body's frame."""
         of_body = self.body_of >= 0
-        local = np.array([box.pose if box.body else AT_FRAME for box in self.boxes.values()])
+        local = np.where(of_body[:, None], self.box_poses, AT_FRAME)
         return np.where(of_body, len(self.boxes) + self.body_of, -1).astype(np.int64), local
 
     def fixed_poses(self) -> np.ndarray:
         """Return new poses (n + m, 7) of boxes and bodies, by `row_of`: NaN for what moves."""
-        poses = np.array([NOWHERE if part.pose is None else part.pose
-                          for part in self._parts.values()])
-        self.place_boxes(poses)
+        poses = np.concatenate((self.box_poses, _poses_of(self.bodies)))
+        if self.bodies:
+            self.place_boxes(poses)
         return poses
 
     def place_boxes(self, poses: np.ndarray) -> None:
@@ -280,15 +341,28 @@ class Scene:
         The rows of the latter are the group of the box that comes first in the scene. 1: it is
         box a. 2: it is box b. Boxes of a group match the same sides of the same patterns.
         """
+        kinds, group = self._kinds
         if not self.patterns:
-            return np.zeros(len(self.boxes), np.int32), np.zeros((0, 0), np.uint8)
-        sides = np.array([self.matching(side) for pattern in self.patterns for side in pattern])
-        kinds, group = np.unique(sides, axis=1, return_inverse=True)
-        allowed = np.zeros((kinds.shape[1], kinds.shape[1]), np.uint8)
-        for a, b in zip(kinds[::2], kinds[1::2]):
+            return group, np.zeros((0, 0), np.uint8)
+        allowed = np.zeros((len(kinds), len(kinds)), np.uint8)
+        for a, b in zip(kinds.T[::2], kinds.T[1::2]):
             asked = a[:, None] & b
             allowed = np.where(allowed, allowed, np.where(asked, 1, 2 * asked.T))
-        return group.ravel().astype(np.int32), allowed.astype(np.uint8)
+        return group, allowed.astype(np.uint8)
+
+    @cached_property
+    def sides(self) -> np.ndarray:
+        """Return which sides (n, 2 p) of p patterns each box matches."""
+        sides = [self.matching(side) for pattern in self.patterns for side in pattern]
+        return np.array(sides, bool).reshape(len(sides), len(self.boxes)).T
+
+    @cached_property
+    def _kinds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the kinds (g, 2 p) of boxes by the sides that they match, and each box's (n,)."""
+        if not self.patterns:
+            return self.sides[:1], np.zeros(len(self.boxes), np.int32)
+        kinds, kind = np.unique(self.sides, axis=0, return_inverse=True)
+        return kinds, kind.ravel().astype(np.int32)
 
     @cached_property
     def _listed(self) -> Mapping[tuple[int, int], Pair]:
@@ -341,17 +415,18 @@ class Scene:
         """How many pairs the scene has."""
         if not self.patterns:
             return len(self.pairs)
-        # By how many boxes each group has, of all and of those that are rigid with each other: one
-        # by one, as `every_pair` goes, takes the square of the number of boxes.
         group, allowed = self.groups
         meet = (allowed > 0).astype(np.int64)
-        _, rigid = np.unique(self.rigid, return_inverse=True)
-        boxes = np.zeros((rigid.max() + 1, len(meet)), np.int64)
-        np.add.at(boxes, (rigid, group), 1)
-        total = boxes.sum(axis=0)
-        ordered = total @ meet @ total - ((boxes @ meet) * boxes).sum()
-        both = int(meet[group[self.rows[:, 0]], group[self.rows[:, 1]]].sum())
-        return len(self.pairs) + int(ordered) // 2 - both
+
+        def pairs_among(boxes: np.ndarray) -> int:
+            """Return how many pairs are within sets, by their numbers (..., g) of boxes a group."""
+            return int(((boxes @ meet) * boxes - boxes * meet.diagonal()).sum() // 2)
+
+        shape = self.rigid.max() + 1, len(meet)
+        rigid = np.bincount(self.rigid * len(meet) + group, minlength=shape[0] * shape[1])
+        listed = meet[tuple(group[self.rows].T)].sum()
+        return len(self.pairs) + pairs_among(np.bincount(group, minlength=len(meet))) - (
+            pairs_among(rigid.reshape(shape))) - int(listed)
 
     @cached_property
     def moving(self) -> tuple[str, ...]:
@@ -361,6 +436,12 @@ class Scene:
         movers = {self.mover(self.names[box]) for box in np.flatnonzero(asked & ~self.is_fixed)}
         return tuple(name for name in self._parts if name in movers)
 
+
+
+def _poses_of(parts: Mapping[str, Box] | Mapping[str, Frame]) -> np.ndarray:
+    """Return the poses (n, 7) of boxes or bodies, NaN for those that have none."""
+    return np.array([NOWHERE if part.pose is None else part.pose
+                     for part in parts.values()]).reshape(-1, 7)
 
 
 def two_boxes(size_a: Sequence[float], size_b: Sequence[float]) -> Scene:

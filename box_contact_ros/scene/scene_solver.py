@@ -10,9 +10,8 @@ somebody asks for them.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
-from functools import partial
-from typing import NamedTuple
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +22,8 @@ from ..solver.contact import Contact, Contacts
 from ..solver.contact_solver import ContactSolver
 from ..solver.contacts_of import find_contacts, in_contact
 from ..solver.model import Model
-from .scene import NOWHERE, Pair, Scene
+from .changes import checked_changes
+from .scene import NOWHERE, Box, Pair, Scene
 
 
 class Answer(NamedTuple):
@@ -39,6 +39,7 @@ class Answer(NamedTuple):
     """(m, 2) boxes of the listed pairs that could not be evaluated, because one has no pose that is
     recent enough. (box, ALONE): all pairs of a box that patterns ask for."""
     scene: Scene
+    revision: int = 0  # of the scene, as of `SceneSolver.set_boxes`
 
     @property
     def touching(self) -> int:
@@ -71,38 +72,79 @@ class SceneSolver:
         """
         if not isinstance(scene, Scene):
             raise ValueError(f'scene must be a Scene, not {short_repr(scene)}')
-        margin = as_margin(margin)
-        most_near = as_whole(most_near, 'most_near', 0, sys.maxsize)
-        self.scene = scene
+        self.margin = as_margin(margin)
+        self._most_near = as_whole(most_near, 'most_near', 0, sys.maxsize)
         self.model = model
-        self.margin = margin
-        self._most_near = most_near
-        boxes = list(scene.boxes.values())
-        self._size = np.array([box.size for box in boxes], dtype=float)
-        self._rows = scene.fixed_poses()
-        """Poses of boxes and, behind them, of bodies."""
-        self._poses = self._rows[:len(boxes)]
-        self._moving = np.array([scene.row_of[name] for name in scene.moving])
-        self._broad_phase = native.BroadPhase(self._size, scene.is_fixed, margin, scene.rows,
+        self._solver = ContactSolver(model=model, margin=self.margin)
+        self._take(scene, scene.moving, 0)
+        self._refuse_sizes(scene.sizes)
+        self([None] * len(self.moving))
+
+    def _take(self, scene: Scene, moving: Sequence[str], revision: int) -> None:
+        """Begin anew with a scene. moving: whose poses a tick has, in their order."""
+        self.scene = scene
+        self.revision = revision
+        """How often the scene has been changed."""
+        self.moving = tuple(moving)
+        """Whose poses a call takes, in their order. What moves no more has a row still, which is
+        not read."""
+        self._rows = np.concatenate((scene.fixed_poses(), [NOWHERE]))
+        """Poses of boxes, of bodies, and of what moves no more."""
+        self._poses = self._rows[:len(scene.boxes)]
+        is_moving = set(scene.moving)
+        self._moving = np.array([scene.row_of[name] if name in is_moving else len(self._rows) - 1
+                                 for name in self.moving], np.int64)
+        self._broad_phase = native.BroadPhase(scene.sizes, scene.is_fixed, self.margin, scene.rows,
                                               *scene.groups, scene.body_of)
-        self._solver = ContactSolver(model=model, margin=margin)
-        self._again = partial(SceneSolver, model=model, margin=margin, most_near=most_near)
-        self._warm_up()
 
-    def __reduce__(self) -> tuple[Callable[..., SceneSolver], tuple[Scene]]:
-        """Pickle the arguments."""
-        return self._again, (self.scene,)
+    def __reduce__(self) -> tuple[Callable[..., SceneSolver], tuple[Any, ...]]:
+        """Pickle what makes the solver."""
+        return _made_again, (self.scene, self.model, self.margin, self._most_near, self.moving,
+                             self.revision)
 
-    def _warm_up(self) -> None:
-        """Let the model refuse sizes that it has no answer for.
+    def changed(self, *, fixed: Mapping[str, Box] | None = None,
+                moving: Mapping[str, Box] | None = None, absent: Collection[str] = (),
+                ) -> SceneSolver:
+        """Return the solver of the scene that `set_boxes` makes; this one stays as it is."""
+        changes = checked_changes(self.scene, fixed or {}, moving or {}, absent)
+        # A box that moves again has its former row.
+        scene = self.scene.changed(changes)
+        rows = (*self.moving, *(name for name in moving or {} if name not in self.moving))
+        solver = object.__new__(SceneSolver)
+        vars(solver).update(vars(self))
+        solver._take(scene, rows, self.revision + 1)
+        solver._refuse_sizes(np.array([box.size for box in changes.values() if box is not None]))
+        return solver
+
+    def with_model(self, model: str | Model, most_near: int = sys.maxsize) -> SceneSolver:
+        """Return a solver of the same scene by another model."""
+        return _made_again(self.scene, model, self.margin, most_near, self.moving, self.revision)
+
+    def set_boxes(self, *, fixed: Mapping[str, Box] | None = None,
+                  moving: Mapping[str, Box] | None = None, absent: Collection[str] = ()) -> int:
+        """Change boxes of the scene, all or none; return the new `revision`.
+
+        fixed: boxes with poses, by name: new ones, or ones that replace those of the scene.
+        moving: boxes without poses, which move from now on, in a scene with `pose_array`. Those of
+        the scene that moved before keep their places in `moving`; others come last.
+        absent: names of boxes that are there no more.
+
+        Listed pairs, patterns and bodies stay; new boxes are in the pairs whose patterns match.
+        Raises SceneError, a ValueError with field and value.
+        """
+        vars(self).update(vars(self.changed(fixed=fixed, moving=moving, absent=absent)))
+        return self.revision
+
+    def _refuse_sizes(self, sizes: np.ndarray) -> None:
+        """Let the model refuse sizes (n, 3) that it has no answer for.
 
         Only a corner overlaps: where faces coincide, a soup takes seconds.
         """
-        kinds = np.unique(self._size, axis=0)
-        listed = np.unique(self._size[self.scene.rows].reshape(-1, 6), axis=0)
+        listed = np.unique(self.scene.sizes[self.scene.rows].reshape(-1, 6), axis=0)
         both = [listed]
-        if self.scene.patterns:
-            first = np.broadcast_to(kinds[0], kinds.shape)
+        if self.scene.patterns and len(sizes):
+            kinds = np.unique(sizes, axis=0)
+            first = np.broadcast_to(self.scene.sizes[0], kinds.shape)
             both += [np.hstack((first, kinds)), np.hstack((kinds, first))]
         size_a, size_b = np.split(np.concatenate(both), 2, axis=1)
         a, b = np.zeros((2, len(size_a), 7))
@@ -110,22 +152,21 @@ class SceneSolver:
         b[:, :3] = 0.5 * (size_a + size_b) - 0.02 * np.minimum(size_a, size_b)
         self._solver.batch(a, b, size_a=np.ascontiguousarray(size_a),
                            size_b=np.ascontiguousarray(size_b))
-        self([None] * len(self.scene.moving))
 
     def __call__(self, poses: Sequence[np.ndarray | None] | ArrayLike) -> Answer:
-        """Return the answer to one tick: a pose (7,) or None for each of `scene.moving`.
+        """Return the answer to one tick: a pose (7,) or None for each of `moving`.
 
         Or an array (n, 7) with a row for each, all NaN for None.
         Raises ValueError for numbers that are no pose, and for more or fewer poses than that.
         """
         self._set_poses(poses)
         if self.scene.bodies:
-            self.scene.place_boxes(self._rows)
+            self.scene.place_boxes(self._rows[:-1])
         near, contacts, stale = find_contacts(
-            self._broad_phase, self._solver, self._size, self._poses,
+            self._broad_phase, self._solver, self.scene.sizes, self._poses,
             lambda box: f'pose of {self.scene.names[box]}:', most_near=self._most_near)
         pairs, contacts = in_contact(near, contacts, self.margin)
-        return Answer(pairs, contacts, len(near), stale, self.scene)
+        return Answer(pairs, contacts, len(near), stale, self.scene, self.revision)
 
     def _set_poses(self, poses: Sequence[np.ndarray | None] | ArrayLike) -> None:
         """Take the poses of the boxes and bodies that move."""
@@ -136,11 +177,19 @@ class SceneSolver:
                               'moves, or an array (n, 7)', (None, 7))
         if len(poses) != len(self._moving):
             raise ValueError(f'{len(poses)} poses, but {len(self._moving)} boxes and bodies move: '
-                             f'{short_repr(list(self.scene.moving))}; give a list of a pose or '
+                             f'{short_repr(list(self.moving))}; give a list of a pose or '
                              'None for each')
         if isinstance(poses, np.ndarray):
             self._rows[self._moving] = poses
             return
-        for name, index, pose in zip(self.scene.moving, self._moving, poses):
+        for name, index, pose in zip(self.moving, self._moving, poses):
             self._rows[index] = NOWHERE if pose is None else as_floats(
                 pose, f'pose of {name}', 'a pose (x y z qx qy qz qw)', (7,))
+
+
+def _made_again(scene: Scene, model: str | Model, margin: float, most_near: int,
+                moving: tuple[str, ...], revision: int) -> SceneSolver:
+    """Return a solver that was pickled."""
+    solver = SceneSolver(scene, model=model, margin=margin, most_near=most_near)
+    solver._take(scene, moving, revision)
+    return solver
