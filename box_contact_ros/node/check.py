@@ -7,7 +7,6 @@ from __future__ import annotations
 import time
 from collections import Counter, deque
 from collections.abc import Callable
-from typing import Any
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -15,11 +14,9 @@ from rclpy.clock_type import ClockType
 from box_contact_msgs.srv import Check
 
 from ..models.make_model import most_near
-from ..scene.scene_check import Row, SceneCheck
+from ..scene.scene_check import SceneCheck
 from ..scene.scene_solver import SceneSolver
-from ..solver.checks import name_fault
-from ..stream.pairing import frames_differ
-from .messages import KeptMessages
+from .messages import KeptMessages, check_frame, pose_of, size_of
 from .rclpy_workarounds import Send, answer_later
 from .runtime import LONG, GuardedNode
 
@@ -60,16 +57,11 @@ class Checker:
 
     def _answer(self, request: Check.Request, response: Check.Response) -> None:
         """Fill in contacts; raise ValueError, with field and value, for what is refused."""
-        frame_id, scene = request.header.frame_id, self.solver.scene
-        if fault := name_fault(frame_id):
-            raise ValueError(f'header.frame_id: {fault}')
-        if scene.frame_id not in ('', frame_id):
-            raise ValueError('header.frame_id: ' + frames_differ(
-                'the scene', scene.frame_id, 'the request', frame_id))
+        check_frame(request.header.frame_id, self.solver.scene)
         boxes = request.boxes
         pairs, contacts = self._check(
-            [box.name for box in boxes], [_pose(box) for box in boxes],
-            [(box.size.x, box.size.y, box.size.z) for box in boxes],
+            [box.name for box in boxes], [pose_of(box) for box in boxes],
+            [size_of(box) for box in boxes],
             [(pair.box_a, pair.box_b) for pair in request.pairs], request.margin)
         if len(pairs) > MOST_CONTACTS:
             raise ValueError(f'contacts: {len(pairs)} pairs touch or are near, and a response has '
@@ -165,9 +157,3 @@ def _kind_and_count(request: Check.Request) -> tuple[Kind, int]:
     """Return the kind of a request, and its number of boxes and pairs."""
     pairs = len(request.pairs)
     return (pairs > 0, request.margin), len(request.boxes) + pairs
-
-
-def _pose(box: Any) -> Row:
-    """Return `x y z qx qy qz qw` of a box."""
-    p, q = box.pose.position, box.pose.orientation
-    return p.x, p.y, p.z, q.x, q.y, q.z, q.w

@@ -31,7 +31,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
-from box_contact_msgs.srv import Check
+from box_contact_msgs.srv import Check, SetBoxes
 
 from ..arguments import parse_command_line
 from ..core import LENGTH_MAX
@@ -59,6 +59,7 @@ from .parameters import (
 )
 from .rclpy_workarounds import ends_within, lifecycle_state
 from .runtime import END_SECONDS, LOG_SECONDS, GuardedNode, run_node
+from .set_boxes import changed
 from .tick import TickAnswerer
 from .topics import SceneTopics
 
@@ -150,6 +151,7 @@ class ContactNode(GuardedNode, LifecycleNode):
         self._checker: Checker | None = None  # of the solver's scene and model
         self.add_on_set_parameters_callback(self._set_live)
         self._checks = CheckService(self, self.counts, self._check)
+        self.create_service(SetBoxes, '~/set_boxes', self.answered(self._set_boxes, '~/set_boxes'))
         self.create_service(Trigger, '~/reset', self.answered(self._reset, '~/reset'))
         # On a clock of its own: simulated time may stand still.
         self.create_timer(DIAGNOSTICS_SECONDS, self._report, clock=Clock(
@@ -250,7 +252,9 @@ class ContactNode(GuardedNode, LifecycleNode):
             values = {**self._values, **given}
             if self._answerer is not None and given:
                 if 'model' in given and given['model'] != self._values['model']:
-                    self._answerer.solver = self._make_solver(values, self._answerer.solver.scene)
+                    name = given['model']
+                    self._answerer.set_solver(self._answerer.solver.with_model(
+                        make_model(name), most_near(name)))
                 self._answerer.set_times(values)
         except Exception as error:  # the client would wait for ever
             return SetParametersResult(successful=False, reason=reason_of(error))
@@ -278,6 +282,24 @@ class ContactNode(GuardedNode, LifecycleNode):
         if self._checker is None or self._checker.solver is not self._answerer.solver:
             self._checker = Checker(self._answerer.solver, self.model_of(self._values))
         return self._checker.answer(request, response)
+
+    def _set_boxes(self, request: SetBoxes.Request, response: SetBoxes.Response,
+                   ) -> SetBoxes.Response:
+        """Change boxes of the scene, all or none; the next poses are answered by the new scene."""
+        if self._answerer is None:
+            response.message = NOT_CONFIGURED
+            return response
+        solver = self._answerer.solver
+        try:
+            solver = changed(solver, request)
+        except ValueError as error:
+            response.message = str(error)
+        else:
+            self._answerer.set_solver(solver)
+            self._monitor.watch(watched_of(solver.scene))
+            response.success = True
+        response.revision = solver.revision
+        return response
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Forget all poses and stamps: a simulation begins anew."""

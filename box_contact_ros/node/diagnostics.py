@@ -92,6 +92,10 @@ class TickMonitor:
         self._pairs, self._open = pairs, None
         self._since.clear()
 
+    def watch(self, pairs: Sequence[Pair]) -> None:
+        """Ask for other pairs from the next report on."""
+        self._pairs, self._open = pairs, None
+
     def evaluated(self, took: int, age: int, stale: list[Pair]) -> None:
         """Note a tick: its time in the solver and the age of its answer [ns], the pairs left out.
 

@@ -15,11 +15,16 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped
 from std_msgs.msg import Header
 
+from box_contact_msgs.msg import Box
 from box_contact_msgs.msg import Contact as ContactMessage
 
 from ..core import native
+from ..scene.scene import Scene
+from ..scene.scene_check import Row
+from ..solver.checks import name_fault
 from ..solver.contact import Contacts
 from ..stream.cdr import NANOSECONDS
+from ..stream.pairing import frames_differ
 
 
 def make_header(stamp: int, frame_id: str) -> Header:
@@ -38,6 +43,26 @@ def pose_message(header: Header, pose: np.ndarray) -> PoseStamped:
     message = PoseStamped(header=header)
     set_pose(message.pose, pose)
     return message
+
+
+def pose_of(box: Box) -> Row:
+    """Return `x y z qx qy qz qw` of a box."""
+    p, q = box.pose.position, box.pose.orientation
+    return p.x, p.y, p.z, q.x, q.y, q.z, q.w
+
+
+def size_of(box: Box) -> Row:
+    """Return the full extents of a box [m]; zeros: those of the scene's box of its name."""
+    return box.size.x, box.size.y, box.size.z
+
+
+def check_frame(frame_id: str, scene: Scene) -> None:
+    """Raise ValueError for the frame of a request that is not that of the scene."""
+    if fault := name_fault(frame_id):
+        raise ValueError(f'header.frame_id: {fault}')
+    if scene.frame_id not in ('', frame_id):
+        raise ValueError('header.frame_id: ' + frames_differ(
+            'the scene', scene.frame_id, 'the request', frame_id))
 
 
 def set_pose(pose: Any, numbers: np.ndarray) -> None:

@@ -15,17 +15,21 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from rclpy.publisher import Publisher
 
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import absent_poses, are_poses, pose_fault
 from ..stream.cdr import NANOSECONDS, MessageError
 from ..stream.pairing import OVERTAKEN, PAIRINGS, Pairing, StampedPose, Tick
 from ..stream.read_poses import PoseReader
-from ..stream.streams import ALL_BOXES, streams_of
+from ..stream.streams import ALL_BOXES
 from ..stream.write_contacts import VECTOR_BYTES, ContactWriter, aligned, header_bytes
 from .diagnostics import TickMonitor
 from .parameters import reason_of
 from .topics import PoseCallback, SceneTopics
+
+FORMER_LENGTHS = 16
+"""Of arrays of poses that are answered while boxes come that move."""
 
 
 class PoseQueue:
@@ -89,6 +93,24 @@ class PoseQueue:
         return self._turns > 1
 
 
+class Revision:
+    """What answers the ticks of one scene.
+
+    of_pair: by the indices of the boxes of a pair that has topics: its publishers of point and
+    normal, and the places in a tick of what moves its boxes.
+    """
+
+    def __init__(self, solver: SceneSolver, topics: SceneTopics) -> None:
+        """Take what solves the scene, and the topics of the node."""
+        self.solver, self.writer, scene = solver, ContactWriter(solver.scene), solver.scene
+        place = {name: number for number, name in enumerate(solver.moving)}
+        self.of_pair: dict[tuple[int, int], tuple[Publisher, Publisher, list[int]]] = {}
+        for (a, b), publishers in topics.of_pair.items():
+            if a in scene.boxes and b in scene.boxes:
+                sides = [place[mover] for mover in map(scene.mover, (a, b)) if mover in place]
+                self.of_pair[scene.index_of[a], scene.index_of[b]] = (*publishers, sides)
+
+
 class TickAnswerer:
     """Answers ticks of poses; every pose that is refused is counted and noted, never answered.
 
@@ -98,18 +120,32 @@ class TickAnswerer:
     def __init__(self, solver: SceneSolver, topics: SceneTopics, settings: Mapping[str, Any],
                  counts: Counter[str], monitor: TickMonitor) -> None:
         """Begin without poses; `settings` are the checked parameters."""
-        self.solver, self._topics, self._monitor, self._counts = solver, topics, monitor, counts
+        self._topics, self._monitor, self._counts = topics, monitor, counts
+        self._revisions: dict[int, Revision] = {}
+        """The last ones by the number of poses in an array. The newest comes last."""
+        self._revision = Revision(solver, topics)  # of the next tick
         self.pairing: Pairing = PAIRINGS[settings['pairing']](solver.scene, counts=counts)
+        self.set_solver(solver)
         self.set_times(settings)
         self._queues: dict[str, PoseQueue] = {}  # by box
-        scene = solver.scene
-        self._reader, self._writer = PoseReader(), ContactWriter(scene)
-        place = {name: number for number, name in enumerate(streams_of(scene))}
-        movers = [scene.mover(box) for box in scene.names]
-        self._sides = {pair: [place[movers[box]] for box in pair if movers[box] in place]
-                       for pair in topics.of_pair}
-        """Places in a tick of what moves the boxes of a pair that has topics."""
+        self._reader = PoseReader()
         self.active = False
+
+    @property
+    def solver(self) -> SceneSolver:
+        """Return the solver of the newest scene."""
+        return next(reversed(self._revisions.values())).solver
+
+    def set_solver(self, solver: SceneSolver) -> None:
+        """Answer by another solver, whose scene may have other boxes.
+
+        Arrays of former lengths, which may be on their way, are answered by former ones.
+        """
+        self._revision = Revision(solver, self._topics)
+        self._revisions[len(solver.moving)] = self._revision
+        if len(self._revisions) > FORMER_LENGTHS:
+            del self._revisions[next(iter(self._revisions))]
+        self.pairing.set_partners(solver.scene)
 
     def set_times(self, settings: Mapping[str, Any]) -> None:
         """Take `tolerance` and `max_age` of checked parameters [s]."""
@@ -139,7 +175,7 @@ class TickAnswerer:
                 return
             for tick in ticks:
                 try:
-                    self._answer(Tick.of(self.solver.scene, tick), arrived)
+                    self._answer(Tick.of(self.pairing.scene, tick), arrived)
                 except Exception as error:  # one tick that is refused keeps back no other
                     self._refuse(error, topic)
         return callback
@@ -152,11 +188,16 @@ class TickAnswerer:
 
     def _read_all(self, data: bytes) -> StampedPose:
         """Return the poses of all that moves; a bad one is counted, and its name absent."""
-        poses, moving = self._reader.read_poses(data), self.solver.scene.moving
-        if len(poses.numbers) != len(moving):
+        poses = self._reader.read_poses(data)
+        count = len(poses.numbers)
+        if count not in self._revisions:
             raise MessageError('wrong number of poses',
-                               f'{len(poses.numbers)} poses, but {len(moving)} boxes and '
-                               'bodies move')
+                               f'{count} poses, but {len(self.solver.moving)} boxes and bodies '
+                               'move')
+        while count != next(iter(self._revisions)):  # whoever sends them knows of the change
+            del self._revisions[next(iter(self._revisions))]
+        self._revision = self._revisions[count]
+        moving = self._revision.solver.moving
         bad = ~are_poses(poses.numbers) & ~absent_poses(poses.numbers)
         for row in np.flatnonzero(bad):
             self._refuse(MessageError('bad pose', f'{pose_fault(poses.numbers[row])}'), moving[row])
@@ -171,25 +212,28 @@ class TickAnswerer:
         arrived: when the pose came that completes the tick, by the wall clock [ns]; 0: unknown.
         """
         started = time.perf_counter_ns()
-        answer = self.solver(tick.poses)
+        revision = self._revision
+        answer = revision.solver(tick.poses)
         took = time.perf_counter_ns() - started
         header = header_bytes(tick.stamp, tick.frame_id)
         head, end = aligned(header), 0
-        touching, of_pair = answer.touching, self._topics.of_pair
+        touching, of_pair = answer.touching, revision.of_pair
         points, normals = answer.contacts.point.tobytes(), answer.contacts.normal.tobytes()
         for a, b in answer.pairs.tolist()[:touching] if of_pair else ():
-            if self._stamps_differ:
-                newest = max([tick.stamps[side] for side in self._sides[a, b]])
-                head = aligned(header_bytes(newest, tick.frame_id))
             begin, end = end, end + VECTOR_BYTES
-            point, normal = of_pair[a, b]
+            if (a, b) not in of_pair:  # of a box that came later
+                continue
+            point, normal, sides = of_pair[a, b]
+            if self._stamps_differ:
+                newest = max([tick.stamps[side] for side in sides])
+                head = aligned(header_bytes(newest, tick.frame_id))
             point.publish(head + points[begin:end])
             normal.publish(head + normals[begin:end])
-        self._topics.contacts.publish(self._writer.contacts(header, answer))
+        self._topics.contacts.publish(revision.writer.contacts(header, answer))
         # What nobody waits for comes last. A box that an array leaves out is not there: nobody
         # asks for its pairs.
         age = time.time_ns() - arrived if arrived else 0
-        is_array = self.solver.scene.pose_array
+        is_array = answer.scene.pose_array
         self._monitor.evaluated(took, age, [] if is_array else answer.named_stale())
         counts = self._counts
         counts['contacts'] += touching

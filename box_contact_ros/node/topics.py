@@ -66,8 +66,8 @@ QOS_OVERRIDES = QoSOverridingOptions.with_default_policies(callback=_check_depth
 class SceneTopics:
     """The topics of a node from configure to cleanup.
 
-    contacts: the publisher of all contacts. of_pair: those of point and normal, by the indices of
-    the boxes of a pair. Empty without topics of their own.
+    contacts: the publisher of all contacts. of_pair: those of point and normal, by the names of the
+    boxes of a pair. Empty without topics of their own.
     """
 
     def __init__(self, node: Node, prefix: str, scene: Scene, *, pair_topics: bool) -> None:
@@ -91,14 +91,13 @@ class SceneTopics:
             except RCLError as error:
                 raise ValueError(f'topic {short_repr(topic)}: {error}') from error
         self._subscriptions: dict[str, Subscription] = {}
-        self.of_pair: dict[tuple[int, int], tuple[Publisher, Publisher]] = {}
+        self.of_pair: dict[tuple[str, str], tuple[Publisher, Publisher]] = {}
         self.contacts = self._publisher(Contacts, f'{prefix}contacts',
                                         qos_overriding_options=QOS_OVERRIDES)
         for pair in pairs:
             point, normal = self._topics_of(pair)
-            boxes = scene.index_of[pair.a], scene.index_of[pair.b]
-            self.of_pair[boxes] = (self._publisher(PointStamped, point),
-                                   self._publisher(Vector3Stamped, normal))
+            self.of_pair[pair.a, pair.b] = (self._publisher(PointStamped, point),
+                                            self._publisher(Vector3Stamped, normal))
 
     def subscribe(self, scene: Scene, callback_of: Callable[[str, str], PoseCallback]) -> None:
         """Subscribe to all poses, with the callback for the bytes of a name and its topic."""

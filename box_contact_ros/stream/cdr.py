@@ -23,6 +23,7 @@ PADDING = 3
 """Most bytes after the body, of any value: RTPS pads a message to a multiple of four."""
 HEAD = struct.Struct('<2s2xiI')  # encapsulation and stamp
 COUNT = struct.Struct('<I')
+REVISION = struct.Struct('<Q')
 FRAME_AT = HEAD.size + 4
 """Where frame_id's characters are: behind stamp and length."""
 CONTACT_BYTES = 8 * 15

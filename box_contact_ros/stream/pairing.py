@@ -227,10 +227,14 @@ class Pairing(ABC):
         self.counts: Counter[str] = Counter() if counts is None else counts
         self.rejections: dict[str, RejectedPose] = {}
         """The last pose of each kind that is counted. Whoever logs them clears them."""
-        self._scene, self._streams = scene, streams_of(scene)
+        self.scene, self._streams = scene, streams_of(scene)
         self._boxes = {box: BoxState() for box in self._streams}
-        self._partners = {box: partners_of(scene, box) for box in self._boxes}
+        self.set_partners(scene)
         self._behind: set[str] = set()  # boxes that have begun anew behind the others
+
+    def set_partners(self, scene: Scene) -> None:
+        """Take the pairs of the scene, or of one with other boxes and the same streams."""
+        self._partners = {stream: partners_of(scene, stream) for stream in self._boxes}
 
     @abstractmethod
     def add(self, box: str, pose: StampedPose) -> list[TickPoses]:
@@ -266,7 +270,7 @@ class Pairing(ABC):
 
     def stamps(self, box: str) -> np.ndarray:
         """Return an array (n,) of the stamps [ns] of a box or its body, as far as remembered."""
-        state = self._boxes.get(self._scene.mover(box))
+        state = self._boxes.get(self.scene.mover(box))
         return np.array(state.taken if state else (), dtype=np.int64)
 
     def _state_at(self, box: str, stamp: int) -> BoxState:

@@ -42,6 +42,7 @@ class ReadContacts(NamedTuple):
     """(k,) those of pairs in contact, then those of pairs that are near; `axis` is -1."""
     touching: int  # how many are in contact: the first rows
     stale: list[str]  # names of the pairs, or boxes, that could not be answered
+    revision: int  # of the node's scene
 
 
 def read_contacts(data: bytes) -> ReadContacts:
@@ -53,7 +54,9 @@ def read_contacts(data: bytes) -> ReadContacts:
     names: list[Any] = []  # of three each
     starts, touching = [], 0
     at = FRAME_AT + length
+    at += (ENCAPSULATION - at) % 8
     try:
+        (revision,), at = struct.unpack_from(f'{order}Q', data, at), at + 8
         for number_of_list in range(2):  # `contacts` and `near`
             at += -at % 4
             (count,), at = count_at(data, at), at + 4
@@ -87,7 +90,8 @@ def read_contacts(data: bytes) -> ReadContacts:
     point, normal = rows[:, :3].copy(), rows[:, 3:6].copy()
     contacts = Contacts(~np.isnan(point[:, 0]), -rows[:, 6], normal, point, rows[:, 7].copy(),
                         covariance, np.full(len(rows), -1, np.int32))
-    return ReadContacts(sec * NANOSECONDS + nanosec, frame_id, names, contacts, touching, stale)
+    return ReadContacts(sec * NANOSECONDS + nanosec, frame_id, names, contacts, touching, stale,
+                        revision)
 
 
 @lru_cache(MOST_NAMES)  # the same in each message

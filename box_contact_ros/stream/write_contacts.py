@@ -9,7 +9,16 @@ from functools import lru_cache
 from ..core import native
 from ..scene.scene import Pair, Scene
 from ..scene.scene_solver import Answer
-from .cdr import CONTACT_BYTES, COUNT, ENCAPSULATION, HEAD, LITTLE, MOST_NAMES, NANOSECONDS
+from .cdr import (
+    CONTACT_BYTES,
+    COUNT,
+    ENCAPSULATION,
+    HEAD,
+    LITTLE,
+    MOST_NAMES,
+    NANOSECONDS,
+    REVISION,
+)
 
 VECTOR_BYTES = 8 * 3
 
@@ -27,7 +36,7 @@ class ContactWriter:
         numbers = native.message_numbers(contacts.point, contacts.normal, contacts.separation,
                                          contacts.volume, contacts.covariance).tobytes()
         pairs, touching = answer.pairs.tolist(), answer.touching
-        parts, at, end = [header], (len(header) - ENCAPSULATION) % 8, 0
+        parts, at, end = [aligned(header), REVISION.pack(answer.revision)], 0, 0
         for listed in (pairs[:touching], pairs[touching:]):  # `contacts` and `near`
             parts.append(COUNT.pack(len(listed)))
             at = (at + COUNT.size) % 8
@@ -49,7 +58,7 @@ def header_bytes(stamp: int, frame_id: str) -> bytes:
 def aligned(data: bytes) -> bytes:
     """Return the start of a message, padded so that doubles may follow.
 
-    Behind a header, three make a PointStamped or a Vector3Stamped.
+    Behind a header, three make a PointStamped or a Vector3Stamped. So does a revision follow.
     """
     return data + b'\0' * ((ENCAPSULATION - len(data)) % 8)
 

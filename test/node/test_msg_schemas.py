@@ -26,7 +26,7 @@ from referencing import Registry, Resource
 from ros_client import CUBES, Client, serving
 from typed_messages import a_box, a_pair, make_contacts, pose_array
 
-from box_contact_msgs.srv import Check
+from box_contact_msgs.srv import Check, SetBoxes
 from box_contact_ros.core import LENGTH_MAX, QUATERNION_MAX
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
@@ -41,11 +41,11 @@ DOCUMENT = yaml.safe_load((FOLDER / 'asyncapi.yaml').read_text(encoding='utf-8')
 SCHEMAS = {path.name: json.loads(path.read_text('utf-8')) for path in sorted(FOLDER.glob('*.json'))}
 REGISTRY = Registry().with_resources(
     (name, Resource.from_contents(schema)) for name, schema in SCHEMAS.items())
-SERVICE = 'answerCheck'
+SERVICES = ('answerCheck', 'answerSetBoxes')
 OPERATIONS = {name: operation for name, operation in DOCUMENT['operations'].items()
-              if name != SERVICE}  # on topics
+              if name not in SERVICES}  # on topics
 ADDRESSES = {name: channel['address'] for name, channel in DOCUMENT['channels'].items()
-             if name not in ('check', 'reset')}
+             if name not in ('check', 'reset', 'setBoxes')}
 ORIGIN = (0, 0, 0, 0, 0, 0, 1)
 TOUCHING = (0.5, 0.25, 1.875, 0.1, 0.2, 0, 1)
 CLOSE = (0.5, 0.25, 2.0625, 0, 0, 0, 1)
@@ -164,10 +164,9 @@ def test_limits_are_the_codes():
     assert shared['coordinate']['maximum'] == -shared['coordinate']['minimum'] == LENGTH_MAX
     component = shared['quaternion_component']
     assert component['maximum'] == -component['minimum'] == QUATERNION_MAX
-    boxes = SCHEMAS['check_request.json']['properties']['boxes']
     for text in (scene['$defs']['name'], scene['$defs']['pattern'],
                  scene['properties']['frame_id'], shared['header']['properties']['frame_id'],
-                 boxes['items']['properties']['name']):
+                 shared['box']['properties']['name']):
         assert text['maxLength'] == MOST_NAME_BYTES
 
 
@@ -244,6 +243,21 @@ def test_requests_and_responses_validate(node, client, boxes, success):
     assert answer.success == success and request.is_valid(plain(asked)) == bool(boxes)
     assert not [error.message for error in response.iter_errors(plain(answer))]
     assert len(answer.contacts.contacts) == len(answer.contacts.near) == success
+    answer.success = not success
+    assert not response.is_valid(plain(answer))
+
+
+@pytest.mark.parametrize('size, absent, success', [
+    ((2, 2, 2), [], True), ((2, 2, 2), ['nobody'], False), ((2, 2, 1e51), [], False)])
+def test_changes_of_boxes_validate(node, client, size, absent, success):
+    """A box that comes, with one that was never there, and one that is too large."""
+    channel = DOCUMENT['channels']['setBoxes']
+    request, response = (validator_of(follow(message['$ref']))
+                         for message in channel['messages'].values())
+    asked = SetBoxes.Request(fixed=[a_box('stand', ORIGIN, size)], absent=absent)
+    answer = client.call(SetBoxes, channel['address'], asked)
+    assert answer.success == success and request.is_valid(plain(asked)) == (size[2] < 1e50)
+    assert not [error.message for error in response.iter_errors(plain(answer))]
     answer.success = not success
     assert not response.is_valid(plain(answer))
 

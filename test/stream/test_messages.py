@@ -207,11 +207,12 @@ def test_answers_are_written_alike(data, stamp, frame_id, touching, close, stale
     contacts = [*(a_contact(data.draw) for _ in range(touching)), *[APART] * close]
     rows = np.array([(row, 0) for row in range(len(pairs))], np.int64).reshape(-1, 2)
     listed, stale_rows = np.split(rows, [len(contacts)])
-    answer = Answer(listed, Contacts.of(contacts), 0, stale_rows, names)
+    answer = Answer(listed, Contacts.of(contacts), 0, stale_rows, names, stamp % 2**64)
     writer, header, typed_header = (
         ContactWriter(names), header_bytes(stamp, frame_id), make_header(stamp, frame_id))
     wanted = make_contacts(typed_header, zip(pairs, contacts),
                            [pair.label for pair in pairs[len(contacts):]])
+    wanted.revision = answer.revision
     for _ in range(2):  # the second time the writer knows the names
         written = deserialize_message(writer.contacts(header, answer), ContactsMessage)
         assert str(written) == str(wanted)  # as text, where NaN is NaN
@@ -254,12 +255,13 @@ def test_contacts_in_the_other_order_of_bytes_are_read():
     """As a big-endian middleware sends them; what is no message of contacts is refused."""
     message = make_contacts(make_header(5 * 10**9 + 7, 'map'), [
         (Pair('p', 'a', 'bcd'), APART)], ['stale'])
+    message.revision = 258
     little = serialize_message(message)
     big = bytearray(little)
     big[1] = 0
-    for size, at in ((4, 4), (4, 8), (4, 12), (4, 20), (4, 24), (4, 28), (4, 36), (4, 44)):
+    for size, at in ((4, 4), (4, 8), (4, 12), (8, 20), (4, 28), (4, 32), (4, 36), (4, 44), (4, 52)):
         big[at:at + size] = little[at:at + size][::-1]
-    at = 52
+    at = 60
     assert little[at:at + 8] == np.array([APART.point[0]]).tobytes()
     for start in range(at, at + 120, 8):
         big[start:start + 8] = little[start:start + 8][::-1]
@@ -267,7 +269,8 @@ def test_contacts_in_the_other_order_of_bytes_are_read():
         big[start:start + 4] = little[start:start + 4][::-1]
     for one, other in zip(read_contacts(bytes(big)), read_contacts(little)):
         assert str(one) == str(other)
-    for bad in (little[:-8], little + b'\0' * 8, GOOD, b'', little[:20] + b'\xff' * 4 + little[24:],
+    assert read_contacts(bytes(big)).revision == 258
+    for bad in (little[:-8], little + b'\0' * 8, GOOD, b'', little[:28] + b'\xff' * 4 + little[32:],
                 little.replace(b'bcd', b'\xff\xff\xff')):
         with pytest.raises(MessageError):
             read_contacts(bad)
