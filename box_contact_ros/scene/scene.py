@@ -215,9 +215,9 @@ class Scene:
         replaced = [self.index_of[name] for name in given if name in self.boxes]
 
         def merged(rows: np.ndarray, values: np.ndarray) -> np.ndarray:
-            rows = rows.copy()
+            rows = np.concatenate((rows, values[is_new]))
             rows[replaced] = values[~is_new]
-            return np.concatenate((np.delete(rows, gone, axis=0), values[is_new]))
+            return np.delete(rows, gone, axis=0) if gone else rows
 
         for key in ('sizes', 'box_poses', 'body_of', 'is_fixed'):
             vars(scene)[key] = merged(getattr(self, key), getattr(part, key))
@@ -433,8 +433,11 @@ class Scene:
         """Names of boxes, then of bodies that move; without an array, only of those in a pair."""
         asked = self.is_asked | self.pose_array
         asked[self.rows.ravel()] = True
-        movers = {self.mover(self.names[box]) for box in np.flatnonzero(asked & ~self.is_fixed)}
-        return tuple(name for name in self._parts if name in movers)
+        names = self.names
+        movers = [names[box] for box in np.flatnonzero(asked & ~self.is_fixed).tolist()]
+        bodies = {self.mover(name) for name in movers} if self.bodies else set()
+        return (*(name for name in movers if not self.boxes[name].body),
+                *(name for name in self.bodies if name in bodies))
 
 
 

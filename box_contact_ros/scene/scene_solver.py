@@ -77,7 +77,8 @@ class SceneSolver:
         self.model = model
         self._solver = ContactSolver(model=model, margin=self.margin)
         self._take(scene, scene.moving, 0)
-        self._refuse_sizes(scene.sizes)
+        self._refuse_sizes(*(np.unique(sizes, axis=0)
+                             for sizes in (scene.sizes, scene.sizes[scene.rows].reshape(-1, 6))))
         self([None] * len(self.moving))
 
     def _take(self, scene: Scene, moving: Sequence[str], revision: int) -> None:
@@ -113,7 +114,9 @@ class SceneSolver:
         solver = object.__new__(SceneSolver)
         vars(solver).update(vars(self))
         solver._take(scene, rows, self.revision + 1)
-        solver._refuse_sizes(np.array([box.size for box in changes.values() if box is not None]))
+        sizes = np.array([box.size for box in changes.values() if box is not None]).reshape(-1, 3)
+        listed = [] if scene.listed_names.isdisjoint(changes) else scene.sizes[scene.rows]
+        solver._refuse_sizes(sizes, np.reshape(listed, (-1, 6)))
         return solver
 
     def with_model(self, model: str | Model, most_near: int = sys.maxsize) -> SceneSolver:
@@ -135,17 +138,15 @@ class SceneSolver:
         vars(self).update(vars(self.changed(fixed=fixed, moving=moving, absent=absent)))
         return self.revision
 
-    def _refuse_sizes(self, sizes: np.ndarray) -> None:
-        """Let the model refuse sizes (n, 3) that it has no answer for.
+    def _refuse_sizes(self, sizes: np.ndarray, listed: np.ndarray) -> None:
+        """Let the model refuse sizes (n, 3), and those of pairs (m, 6), that it cannot answer.
 
         Only a corner overlaps: where faces coincide, a soup takes seconds.
         """
-        listed = np.unique(self.scene.sizes[self.scene.rows].reshape(-1, 6), axis=0)
         both = [listed]
-        if self.scene.patterns and len(sizes):
-            kinds = np.unique(sizes, axis=0)
-            first = np.broadcast_to(self.scene.sizes[0], kinds.shape)
-            both += [np.hstack((first, kinds)), np.hstack((kinds, first))]
+        if self.scene.patterns:
+            first = np.broadcast_to(self.scene.sizes[0], sizes.shape)
+            both += [np.hstack((first, sizes)), np.hstack((sizes, first))]
         size_a, size_b = np.split(np.concatenate(both), 2, axis=1)
         a, b = np.zeros((2, len(size_a), 7))
         a[:, 6] = b[:, 6] = 1.0
