@@ -43,8 +43,9 @@ from ..solver.checks import short_repr
 from ..solver.model import NATIVE
 from ..stream.pairing import PAIRINGS, RESETS
 from ..stream.streams import watched_of
-from .check import Checker, CheckService
+from .check import Checker
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
+from .paced_service import CheckService
 from .parameters import (
     Setting,
     declare,

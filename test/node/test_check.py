@@ -26,9 +26,10 @@ from typed_messages import TOLD, a_box, a_pair, contacts_by_pair
 
 from box_contact_msgs.srv import Check
 from box_contact_ros import ContactSolver, SceneSolver, make_model
-from box_contact_ros.node import check as check_module
-from box_contact_ros.node.check import MOST_CONTACTS, Checker, CheckService
+from box_contact_ros.node import paced_service
+from box_contact_ros.node.check import MOST_CONTACTS, Checker
 from box_contact_ros.node.contact_node import ContactNode
+from box_contact_ros.node.paced_service import CheckService
 from box_contact_ros.scene.scene import Box, Frame, Pair, Scene
 from box_contact_ros.scene.scene_check import MOST_BOXES, MOST_PAIRS
 
@@ -362,9 +363,9 @@ class Bench:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now, self.sent = 0.0, []
-        monkeypatch.setattr(check_module, 'time', SimpleNamespace(
+        monkeypatch.setattr(paced_service, 'time', SimpleNamespace(
             monotonic=lambda: self.now, thread_time=lambda: self.now))
-        monkeypatch.setattr(check_module, 'answer_later', lambda service, take: None)
+        monkeypatch.setattr(paced_service, 'answer_later', lambda service, take: None)
         self.timer = Mock()
         node = Mock(create_timer=Mock(return_value=self.timer),
                     answered=lambda callback, name: callback)
@@ -431,7 +432,7 @@ def test_what_one_client_asks_makes_no_other_wait(monkeypatch: pytest.MonkeyPatc
         bench.now += 1.0
     for number in range(300):
         bench.ask('other', 1, 0.001, margin=1.0 + number)
-    assert len(bench.service._cheap) == check_module.KEPT_KINDS
+    assert len(bench.service._cheap) == paced_service.KEPT_KINDS
 
 
 @pytest.mark.parametrize('by_topics', [False, True])
