@@ -16,7 +16,7 @@ import logging
 import math
 import socket
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from http import HTTPStatus
 from ipaddress import ip_address
 from typing import Any
@@ -37,8 +37,9 @@ HISTORY = 12.0  # length [s] of the charts
 ROOM = 0.1  # above the values of a chart, as a share of them
 LEAST_DEPTH, LEAST_FORCE = 1.0, 1.0
 """[mm], [kN]: what charts show at least, not to magnify noise."""
-MESSAGE_LIMIT = 1 << 20
-"""Longest message [bytes] of a browser; the page sends a few hundred."""
+MESSAGE_LIMIT, CONNECTION_LIMIT = 8 << 10, 32
+"""Longest message [bytes] of a browser, which sends a few hundred; most pages open at a time."""
+NAMES_SHOWN = 3  # of boxes of one colour, in the legend
 PANEL_WIDTH, CHART_HEIGHT, TIMES_HEIGHT = 300, 110, 45  # pixels; the last is that of the axis
 GROUND, LINES, SECTIONS, ROPE = (236, 238, 241), (206, 211, 217), (176, 183, 191), (70, 70, 80)
 SKYLIGHT = 2.6  # intensity
@@ -56,8 +57,6 @@ CUBE_EDGES = np.concatenate([CUBE[_ENDS], 1.0001 * CUBE[_ENDS[:, :1]]], axis=1)
 """Corners (12, 3, 3) of a triangle an edge, so thin that its wireframe is the edge."""
 TITLE = b'<title>Contacts of boxes: box_contact_ros</title>'
 GAMMA = 2.2  # of the colours of screens
-LEGEND = ''.join(f'<span style="white-space:nowrap;color:rgb{colour}">■</span> {text} &ensp;'
-                 for colour, text in style.LEGEND)
 
 
 class Server(viser.ViserServer):
@@ -82,18 +81,22 @@ class Server(viser.ViserServer):
 
 @contextlib.contextmanager
 def closed_to_other_sites(host: str) -> Iterator[None]:
-    """Let a server that viser starts refuse requests of other sites' pages, and large messages.
+    """Let a server that viser starts refuse other sites' pages, large messages and many pages.
 
-    viser has no option for either, so its way to serve is wrapped while it starts. Raises
+    viser has no option for these, so its way to serve is wrapped while it starts. Raises
     RuntimeError if it serves in another way.
     """
     serve, wrapped = websockets.asyncio.server.serve, False
 
     def serve_own_page(*arguments: Any, process_request: Any, **options: Any) -> Any:
         def answer(connection: Any, request: Any) -> Any:
-            if names_own_page(request.headers, host):
-                return with_title(process_request(connection, request))
-            return connection.respond(HTTPStatus.FORBIDDEN, 'Origin or Host is not of this page\n')
+            if not names_own_page(request.headers, host):
+                return connection.respond(HTTPStatus.FORBIDDEN,
+                                          'Origin or Host is not of this page\n')
+            if len(connection.server.connections) >= CONNECTION_LIMIT:
+                return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE,
+                                          f'{CONNECTION_LIMIT} pages are open: close one\n')
+            return with_title(process_request(connection, request))
 
         nonlocal wrapped
         wrapped = True
@@ -157,7 +160,7 @@ class Page:
         self._history: deque[tuple[float, float, float]] = deque()  # time [s], depth, force
         self._charts: dict[str, Any] = {}
         gui.add_html('<div id="legend" style="padding:0 0.7em 0.6em;font-size:0.78em">'
-                     f'{LEGEND}</div>', order=1.0)
+                     f'{legend(rows)}</div>', order=1.0)
         self._seen = 0  # boxes; each that joins brings all of them into view
         self._origin = np.zeros(3)
         self._add_drawing(rows)
@@ -267,12 +270,14 @@ class Page:
 
     # --- figures and charts -----------------------------------------------------------------------
 
-    def show(self, tick: DrawnTick | None, force: float, *, model: str) -> None:
-        """Show figures and charts of a tick; without a tick, that the page waits for poses.
+    def show(self, tick: DrawnTick | None, force: float, *, model: str,
+             lands_again: bool = False) -> None:
+        """Show figures and charts of a tick; without a tick, what the page waits for.
 
         The charts then stay as they are until the next tick begins them anew.
 
         force: upward part of the force on the crane's load [N], NaN where none is known.
+        lands_again: whether the next poses will be those of a crane's next landing.
         """
         if tick is None:
             self._history.clear()
@@ -284,7 +289,7 @@ class Page:
             while time - self._history[0][0] > HISTORY:
                 self._history.popleft()
         with self._server.atomic():
-            self._figures.content = figures(tick, force, model=model)
+            self._figures.content = figures(tick, force, model=model, lands_again=lands_again)
             if self._history:
                 times, depths, forces = np.array(self._history).T
                 times -= times[-1]
@@ -319,9 +324,25 @@ class Page:
             height=CHART_HEIGHT + (0 if above else TIMES_HEIGHT), order=3.0 - above)
 
 
-def figures(tick: DrawnTick | None, force: float, *, model: str) -> str:
+def legend(rows: SceneRows) -> str:
+    """Return which colour stands for what, as HTML: boxes by their first names."""
+    names = np.array(list(rows.scene.boxes), dtype=object)
+    parts = [(style.BOX_A, names[rows.is_a]), (style.BOX_B, names[~rows.is_a]),
+             (style.CONTACT, ['contact: point, normal, patch'])]
+    return ''.join(f'<span style="white-space:nowrap;color:rgb{colour}">■</span> '
+                   f'{html.escape(_first(words))} &ensp;' for colour, words in parts if len(words))
+
+
+def _first(names: Sequence[str]) -> str:
+    """Return the first names, and how many more there are."""
+    more = len(names) - NAMES_SHOWN
+    return ', '.join(names[:NAMES_SHOWN]) + (f' and {more} more' if more > 0 else '')
+
+
+def figures(tick: DrawnTick | None, force: float, *, model: str, lands_again: bool = False) -> str:
     """Return a line in plain words and a table, as HTML; each value has its name as id."""
-    words, rows = 'waiting for poses', [('model', 'model', model or '–')]
+    words = 'next landing' if lands_again else 'waiting for poses'
+    rows = [('model', 'model', model or '–')]
     if tick is not None:
         answer, pair_count = tick.answer, tick.rows.scene.pair_count
         words = in_words(answer)

@@ -13,8 +13,6 @@ Colour = tuple[int, int, int]  # red, green, blue, 0 to 255
 BOX_A: Colour = (238, 150, 50)
 BOX_B: Colour = (70, 120, 170)
 CONTACT: Colour = (230, 20, 110)
-LEGEND = ((BOX_A, 'box a of a pair'), (BOX_B, 'box b of a pair'),
-          (CONTACT, 'contact: point, normal from a to b, patch'))
 BOX_OPACITY = 0.4  # the contact is inside the boxes, so they are translucent
 POINT_RADIUS, NORMAL_LENGTH = 0.015, 0.15
 """Lengths of what has no size of its own, as shares of the box's longest edge."""

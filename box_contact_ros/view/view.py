@@ -80,7 +80,8 @@ class ViewNode(Listener):
             self._page.draw(tick, self._ropes)
         if time.monotonic() >= self._figures_at:
             self._figures_at = time.monotonic() + FIGURES_PERIOD
-            self._page.show(tick, self.force(tick.stamp) if tick else math.nan, model=self.model)
+            self._page.show(tick, self.force(tick.stamp) if tick else math.nan, model=self.model,
+                            lands_again=len(self._ropes) > 0)
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         name = f'{self.get_namespace().rstrip("/")}/contact_node: contacts'

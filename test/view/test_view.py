@@ -10,7 +10,7 @@ import re
 import signal
 import threading
 import time
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from http.client import HTTPConnection
 
@@ -53,7 +53,7 @@ from box_contact_ros.view.listener import (
     read_touching,
 )
 from box_contact_ros.view.page import CUBE as CUBE_CORNERS
-from box_contact_ros.view.page import Page, Server, camera_position, figures
+from box_contact_ros.view.page import Page, Server, camera_position, figures, legend
 from box_contact_ros.view.style import BOX_A, BOX_B, CONTACT, patch_axes, patch_sides
 from box_contact_ros.view.view import ViewNode
 
@@ -336,6 +336,29 @@ def test_no_figure_is_made_up():
         'verdict': 'waiting for poses', 'model': '–'}
 
 
+def test_between_two_landings_the_heading_tells_what_comes(view_node, monkeypatch):
+    """A crane's ropes were seen: it lands again. Other poses may never come."""
+    headings = []
+    monkeypatch.setattr(view_node._page, 'show', lambda tick, force, *, model, lands_again:
+                        headings.append(shown(figures(tick, force, model=model,
+                                                      lands_again=lands_again))['verdict']))
+    for ends in ([], [Point(z=15.0), Point(x=1.0, z=2.0)]):
+        view_node._on_ropes(Marker(type=Marker.LINE_LIST, points=ends))
+        view_node._figures_at = 0.0
+        view_node._draw()
+    assert [headings[0], headings[-1]] == ['waiting for poses', 'next landing']
+
+
+def test_the_legend_names_the_boxes():
+    """Each in its colour, three at most; a name is text."""
+    assert [f'rgb{colour}">■</span> {name} ' in legend(ROWS)
+            for colour, name in ((BOX_A, 'box_a'), (BOX_B, 'box_b'))] == [True, True]
+    boxes = {name: Box(CUBE, pose_topic='p') for name in ('<b>', 'l1', 'l2', 'l3', 'l4', 'stack')}
+    pairs = tuple(Pair.between(name, 'stack') for name in boxes if name != 'stack')
+    text = legend(SceneRows(Scene(boxes, pairs)))
+    assert '&lt;b&gt;, l1, l2 and 2 more' in text and '> stack ' in text
+
+
 @pytest.mark.parametrize(('volume', 'words'), [
     (4e-5, '0.04 L'), (0.9994, '999 L'), (0.9996, '1 m³'), (81.24, '81.2 m³'),
     (12345.6, '12,346 m³')])
@@ -395,13 +418,15 @@ def test_charts_begin_anew_with_a_landing(page, monkeypatch):
     assert plotted == [[200.0] * 2, [125.0] * 2] * 2
 
 
+OPTIONS = {'subprotocols': [f'viser-v{viser.__version__}'], 'max_size': None, 'proxy': None}
+
+
 def test_no_browser_opens_a_public_tunnel(page, monkeypatch):
     """Nor does garbage that it sends end the page."""
     tunnels = []
     monkeypatch.setattr('viser._viser.ViserTunnel', lambda *target: tunnels.append(target))
-    options = {'subprotocols': [f'viser-v{viser.__version__}'], 'max_size': None, 'proxy': None}
     for message in (b'\xff' * 100, msgspec.msgpack.encode({'type': 'ShareUrlRequest'})):
-        with connect(page.url.replace('http', 'ws'), **options) as client:
+        with connect(page.url.replace('http', 'ws'), **OPTIONS) as client:
             client.send(message)
             bring(page, tick_of(START, TOUCHING, {PAIR: EXACT}))
             assert client.recv(PATIENCE)
@@ -440,16 +465,27 @@ def test_no_page_of_another_site_reads_the_view(page, host, origin, served):
     assert status_of(page, [*headers, ('Origin', SITE)]) == 403  # one of two
 
 
-def test_a_message_of_2_mb_ends_its_connection_alone(page):
-    options = {'subprotocols': [f'viser-v{viser.__version__}'], 'max_size': None, 'proxy': None}
-    with connect(page.url.replace('http', 'ws'), **options) as other:
-        with connect(page.url.replace('http', 'ws'), **options) as client:
-            client.send(msgspec.msgpack.encode([None] * 2_000_000))
+def test_a_message_of_9_kb_ends_its_connection_alone(page):
+    with connect(page.url.replace('http', 'ws'), **OPTIONS) as other:
+        with connect(page.url.replace('http', 'ws'), **OPTIONS) as client:
+            client.send(msgspec.msgpack.encode([None] * 9_000))
             with pytest.raises(ConnectionClosedError, match='1009'):
                 while client.recv(PATIENCE):
                     pass
         bring(page, tick_of(START, TOUCHING, {PAIR: EXACT}))
         assert other.recv(PATIENCE)
+
+
+def test_the_33rd_page_is_refused_until_one_is_closed(page):
+    headers = [('Host', page.url.removeprefix('http://'))]
+    with ExitStack() as opened:
+        pages = [opened.enter_context(connect(page.url.replace('http', 'ws'), **OPTIONS))
+                 for _ in range(32)]
+        assert status_of(page, headers) == status_of(page, headers, upgrade=()) == 503
+        pages[0].close()
+        deadline = time.monotonic() + PATIENCE
+        while status_of(page, headers, upgrade=()) != 200:
+            assert time.monotonic() < deadline
 
 
 def test_a_viser_that_serves_in_another_way_does_not_start(monkeypatch):
