@@ -5,6 +5,7 @@
 
 import hashlib
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -16,6 +17,9 @@ from setuptools.command.build_ext import build_ext
 
 NAME = 'box_contact_ros'
 CORE_EXTENSION = f'{NAME}.core._native'
+# colcon --symlink-install calls a link to this file, in a folder without README.md and package.xml.
+HERE = Path(__file__).resolve().parent
+VERSION = re.search('<version>(.+)</version>', (HERE / 'package.xml').read_text('utf-8'))[1]
 COMPILER = os.environ.get('CXX', 'c++').split()
 # A wheel of CMake may lie in an environment that is not activated.
 os.environ['PATH'] += os.pathsep + sysconfig.get_path('scripts')
@@ -68,8 +72,7 @@ class BuildCore(build_ext):
     def build_extension(self, ext):
         import numpy
 
-        # colcon --symlink-install calls a link to this file, in a folder without CMakeLists.txt.
-        sources = str(Path(__file__).resolve().parent)
+        sources = str(HERE)
         # A new folder for what CMake does not look at once it has configured one.
         compiler = subprocess.run([*COMPILER, '--version'], stdout=subprocess.PIPE).stdout
         settings = repr((sources, compiler, COMPILER, os.environ.get('CXXFLAGS')))
@@ -109,10 +112,10 @@ DOCS = ['myst-parser', 'sphinx', 'sphinx-rtd-theme']
 
 setup(
     name=NAME,
-    version='0.1.0',
+    version=VERSION,
     description='ROS 2 node that answers, for every pair of box poses, with one contact point and '
     'one normal: exact separating-axis test, then geometry and a small neural network',
-    long_description=Path(__file__).resolve().with_name('README.md').read_text('utf-8'),
+    long_description=(HERE / 'README.md').read_text('utf-8'),
     long_description_content_type='text/markdown',
     maintainer='The box_contact_ros maintainers',
     maintainer_email='maintainers@box-contact-ros.org',

@@ -20,7 +20,7 @@ ROOT = DOCS.parent
 
 project, author = 'box_contact_ros', 'The box_contact_ros maintainers'
 copyright = author  # noqa: A001
-release = re.search(r"version='(.+?)'", (ROOT / 'setup.py').read_text('utf-8'))[1]
+release = re.search('<version>(.+)</version>', (ROOT / 'package.xml').read_text('utf-8'))[1]
 
 extensions = ['myst_parser', 'sphinx.ext.autodoc']
 source_suffix = {'.md': 'markdown'}

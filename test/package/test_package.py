@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -144,18 +145,41 @@ def test_help_of_each_program(program: str, module: str, capsys: pytest.CaptureF
 # --- metadata -------------------------------------------------------------------------------------
 
 
+def test_the_version_is_that_of_the_manifest(tmp_path: Path) -> None:
+    """setup.py and CMake read package.xml, so a release changes one line."""
+    for name in ('setup.py', 'README.md', 'package.xml', 'CMakeLists.txt'):
+        shutil.copy(ROOT / name, tmp_path)
+    manifest = tmp_path / 'package.xml'
+    text = manifest.read_text('utf-8')
+    manifest.write_text(re.sub('<version>.*</version>', '<version>9.8.7</version>', text))
+    done = subprocess.run([sys.executable, 'setup.py', '--name', '--version'], cwd=tmp_path,
+                          capture_output=True, text=True)
+    assert done.stdout.split() == ['box_contact_ros', '9.8.7'], done.stderr
+    lines = (ROOT / 'CMakeLists.txt').read_text('utf-8').splitlines()
+    project = next(n for n, line in enumerate(lines) if line.startswith('project('))
+    (tmp_path / 'version.cmake').write_text('\n'.join(
+        [line for line in lines[:project] if 'VERSION' in line and 'minimum' not in line]
+        + ['message(NOTICE "${VERSION}")']))
+    done = subprocess.run(['cmake', '-P', 'version.cmake'], cwd=tmp_path, capture_output=True,
+                          text=True)
+    assert done.stderr.strip() == '9.8.7'
+
+
 def test_versions_agree() -> None:
-    """The release tools of catkin rewrite manifests and setup.py; CMake and pip read manifests."""
-    manifest = ElementTree.parse(ROOT / 'package.xml').getroot()
-    done = _run('setup.py', '--name', '--version')
-    name, version = manifest.findtext('name'), manifest.findtext('version')
-    assert done.stdout.split() == [name, version]
-    messages = ElementTree.parse(ROOT / 'box_contact_msgs' / 'package.xml').getroot()
-    assert messages.findtext('version') == version
+    """What cannot read package.xml has its version: messages, schemas, the newest change log."""
+    version = _version_of(ROOT)
+    assert _version_of(ROOT / 'box_contact_msgs') == version
     schema = (ROOT / 'msg_schemas' / 'asyncapi.yaml').read_text('utf-8')
     assert f'\n  version: {version}\n' in schema
     changelog = (ROOT / 'CHANGELOG.rst').read_text('utf-8')
-    assert re.search(rf'^{version} \(\d{{4}}-\d\d-\d\d\)\n-+\n', changelog, re.MULTILINE)
+    titles = re.findall(r'^(.+)\n-+$', changelog, re.MULTILINE)
+    released = [title for title in titles if title != 'Forthcoming']
+    assert titles[:-len(released)] in ([], ['Forthcoming'])
+    assert re.fullmatch(rf'{version} \(\d{{4}}-\d\d-\d\d\)', released[0])
+
+
+def _version_of(package: Path) -> str:
+    return ElementTree.parse(package / 'package.xml').getroot().findtext('version')
 
 
 def test_manifest_is_valid() -> None:
