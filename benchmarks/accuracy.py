@@ -26,6 +26,7 @@ import numpy as np
 
 from box_contact_ros.arguments import model_name, within
 from box_contact_ros.core import DEPTH_FLOOR
+from box_contact_ros.extras import require
 from box_contact_ros.models.weights_file import WeightsError
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.pose import rotation_matrix
@@ -230,6 +231,7 @@ def main(args: Sequence[str] | None = None) -> int:
                         help='of each set, default: %(default)s')
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
+    require('report')
     count = min(options.pairs, QUICK_PAIRS) if options.quick else options.pairs
     try:
         models = [ours(model, weights=options.weights if model == 'mlp' else None)

@@ -22,6 +22,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from box_contact_ros.core import instruction_sets, native
+from box_contact_ros.extras import require
 
 from . import output, settled
 from .accuracy import Summary
@@ -257,6 +258,7 @@ def main(args: Sequence[str] | None = None) -> int:
         out='frontier.md, .csv, .png')
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
+    require('report', 'soup')
     plan, names = (QUICK, QUICK_MODELS) if options.quick else (FULL, MODELS)
     models, (engines, missing) = [*map(ours, names), *other_networks()], installed()
     for line in missing:

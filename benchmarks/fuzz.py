@@ -32,6 +32,7 @@ import numpy as np
 
 from box_contact_ros.arguments import within
 from box_contact_ros.core import DEPTH_FLOOR, FEATURES, OUTPUTS, UNITS_MAX, native
+from box_contact_ros.extras import require
 from box_contact_ros.models.networks import core_numbers
 from box_contact_ros.models.weights_file import Network
 from box_contact_ros.solver.contact import FIELDS, Contacts
@@ -406,6 +407,7 @@ def main(args: Sequence[str] | None = None) -> int:
                         help='processes at once')
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
+    require('fuzz', 'report')
     tallies = fuzz(QUICK_PAIRS if options.quick else options.pairs, seed=options.seed,
                    models=options.models, random_weights=options.random_weights,
                    workers=options.workers).values()

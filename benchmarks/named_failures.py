@@ -19,6 +19,7 @@ import numpy as np
 import yaml
 
 from box_contact_ros import Contact, Contacts
+from box_contact_ros.extras import require
 
 from . import output
 from .contestant import Contestant, Manifold, ours, packages_of
@@ -117,14 +118,18 @@ def table(failures: Mapping[str, NamedFailure], found: Mapping[str, Mapping[str,
 
 def main(args: Sequence[str] | None = None) -> int:
     """Replay all for models and every other engine, print, write; 1 if a gated model fails one."""
+    from tqdm import tqdm
+
     parser = output.report_parser(
         'named_failures', __doc__, quick='the models alone', out='named_failures.md')
     options = parser.parse_args(args)
     folder, failures = output.results_folder(parser, options), load()
+    require('report', 'soup')
     rivals, missing = ([], []) if options.quick else installed()
     engines = [*map(ours, MODELS), *rivals]
     bounds = {name: one.lenience for name, one in failures.items()}
-    found = {engine.name: replay(engine, failures, bounds) for engine in engines}
+    found = {engine.name: replay(engine, failures, bounds)
+             for engine in tqdm(engines, desc='named failures', unit='contestant')}
     passed = '; '.join(f'{name} {sum(not fault for fault in faults.values())}'
                        for name, faults in found.items())
     print(output.write_page(

@@ -27,6 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from box_contact_ros.core import FORCE, instruction_sets
+from box_contact_ros.extras import require
 from box_contact_ros.models.networks import SHIPPED_PAPERS, PaperWeights, mlp_numbers
 from box_contact_ros.models.weights_file import load_weights
 from box_contact_ros.resources import resource_path
@@ -384,6 +385,7 @@ def main(args: Sequence[str] | None = None) -> int:
         'native', __doc__, quick='few pairs and rounds, to try it out', out='native.md, native.csv')
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
+    require('report', 'sim')
     count, pairs, rounds, calls = (
         (QUICK_COPIES, QUICK_PAIRS, QUICK_ROUNDS, QUICK_CALLS) if options.quick
         else (COPIES, PAIRS, ROUNDS, CALLS))

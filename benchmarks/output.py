@@ -10,6 +10,7 @@ import math
 import platform
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, astuple, dataclass
 from importlib import metadata
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS, QUICK_RESULTS = Path('docs/results'), Path('quick-results')
 DPI = 110  # of pictures
+BEGIN = time.monotonic()  # of the program [s]
 
 
 def report_parser(program: str, doc: str | None, *, quick: str, seed: int | None = None,
@@ -58,15 +60,26 @@ def make_folder(parser: argparse.ArgumentParser, folder: Path) -> Path:
     return folder
 
 
-def results_folder(parser: argparse.ArgumentParser, options: argparse.Namespace) -> Path:
-    """Return the folder of results; a quick run replaces a full run's only where `--out` says."""
-    return make_folder(parser, options.out or (QUICK_RESULTS if options.quick else RESULTS))
+def results_folder(parser: argparse.ArgumentParser, options: argparse.Namespace, *,
+                   part: bool = False) -> Path:
+    """Return the folder of results.
+
+    A quick run, or a part of a report, replaces a full run's results only where `--out` says.
+    """
+    whole = not (options.quick or part)
+    return make_folder(parser, options.out or (RESULTS if whole else QUICK_RESULTS))
 
 
 def command_line(program: str, args: Sequence[str] | None) -> str:
     """Return the command that a page names; `args` as `main` received them."""
     given = sys.argv[1:] if args is None else args
     return ' '.join(['python -m', program, *given])
+
+
+def took() -> str:
+    """Return how long this program has worked, as a page says it."""
+    seconds = time.monotonic() - BEGIN
+    return f'{seconds:.0f} s' if seconds < 100.0 else f'{seconds / 60.0:.0f} minutes'
 
 
 def page(template: str, **values: object) -> str:
@@ -77,10 +90,10 @@ def page(template: str, **values: object) -> str:
 def write_page(folder: Path, name: str, args: Sequence[str] | None, **values: object) -> str:
     """Write benchmarks/pages/NAME.md, its fields filled in, to a folder; return the text.
 
-    args: as `main` of benchmarks.NAME received them; the page names the command.
+    args: as `main` of benchmarks.NAME received them; the page names the command and its time.
     """
-    command = command_line(f'benchmarks.{name}', args)
-    text = page(f'benchmarks/pages/{name}', command=command, **values)
+    made = f'`{command_line(f"benchmarks.{name}", args)}` in {took()}'
+    text = page(f'benchmarks/pages/{name}', made=made, **values)
     (folder / f'{name}.md').write_text(text, encoding='utf-8')
     return text
 

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from box_contact_ros import Box, Pair, Scene, SceneSolver, read_scene
+from box_contact_ros.extras import require
 from box_contact_ros.scene.scene import EVERY_PAIR
 
 from . import output
@@ -177,6 +178,7 @@ def compare(name: str, boxes: Boxes, rounds: int) -> list[Compared]:
         for asked, solver in solvers.items():
             timed(asked, partial(solver, place))
 
+    print(f'scenes: {name}, {len(boxes.size):,} boxes', file=sys.stderr)
     with pinned({usable_cores()[-1]}):
         take_turns([round_of_all], PLACES)
         for kept in times.values():
@@ -205,8 +207,10 @@ class Grown(NamedTuple):
 
 def grow(counts: Sequence[int], rounds: int) -> list[Grown]:
     """Time ticks and reading for more and more boxes."""
+    from tqdm import tqdm
+
     rows = []
-    for count in counts:
+    for count in tqdm(counts, desc='scenes, more and more boxes', unit='scene'):
         boxes = bricks(count)
         with tempfile.TemporaryDirectory() as folder, pinned({usable_cores()[-1]}):
             path = Path(folder, 'scene.yaml')
@@ -234,6 +238,7 @@ def main(args: Sequence[str] | None = None) -> int:
         'scenes', __doc__, quick='few boxes and rounds, to try it out', out='scenes.md, scenes.csv')
     options = parser.parse_args(args)
     folder, machine = output.results_folder(parser, options), output.machine(PACKAGES)
+    require('report', 'sim')
     rounds = QUICK_ROUNDS if options.quick else ROUNDS
     grown = grow(QUICK_GROWTH if options.quick else GROWTH, rounds)  # before MuJoCo takes memory
     compared = [

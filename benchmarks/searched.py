@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from box_contact_ros.arguments import within
+from box_contact_ros.extras import require
 from box_contact_ros.solver.contact_solver import ContactSolver
 
 from . import output
@@ -103,6 +104,7 @@ def main(args: Sequence[str] | None = None) -> int:
                         help='per quantity, shared by all sets (default: %(default)g)')
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
+    require('report')
     minutes = min(options.minutes, QUICK_MINUTES) if options.quick else options.minutes
     sets = SETS | LOADS
     seconds = 60.0 * minutes / len(sets)

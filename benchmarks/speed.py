@@ -18,6 +18,8 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from box_contact_ros.extras import require
+
 from . import output
 from .contestant import CORE_MODELS, Contestant, ours
 from .engines import installed
@@ -72,9 +74,11 @@ def measure_cold(seed: int, count: int) -> list[ColdRow]:
     """
     pairs = drawn(SETS[COLD_SET], np.random.default_rng(seed), count)
     prepared = {one.name: one.prepare(pairs) for one in contestants()}
+    from tqdm import tqdm
+
     rows = []
     with pinned({usable_cores()[-1]}), no_garbage_collection():
-        for megabytes in TOUCHED:
+        for megabytes in tqdm(TOUCHED, desc='speed, other work', unit='size'):
             memory = np.zeros(int(1e6 * megabytes) // 8)
             times: dict[str, list[int]] = {name: [] for name in prepared}
             for row in range(count):
@@ -145,10 +149,12 @@ def main(args: Sequence[str] | None = None) -> int:
         out='speed.md, speed_cold.csv')
     options = parser.parse_args(args)
     folder, machine = output.results_folder(parser, options), output.machine(PACKAGES)
+    require('report')
     calls, rounds, pairs, count = (
         (QUICK_COLD_CALLS, QUICK_ROUNDS, QUICK_BATCH, QUICK_STARTS) if options.quick
         else (COLD_CALLS, ROUNDS, BATCH, STARTS))
     cold = measure_cold(options.seed, calls)
+    print('speed: threads and starts', file=sys.stderr)
     threads = {model: measure_threads(model, pairs, rounds) for model in CORE_MODELS}
     print(output.write_page(
         folder, 'speed', args, machine=machine, cold=cold_table(cold), cold_set=COLD_SET,

@@ -19,6 +19,7 @@ from functools import partial
 import numpy as np
 
 from box_contact_ros import make_model
+from box_contact_ros.extras import require
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 
@@ -129,6 +130,7 @@ def main(args: Sequence[str] | None = None) -> int:
         'stability', __doc__, quick=f'every {QUICK}th family', out='stability.md and stability.csv')
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
+    require('report', 'soup')
     cases = load()
     families = list(cases)[::QUICK] if options.quick else list(cases)
     from tqdm import tqdm

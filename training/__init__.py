@@ -5,3 +5,7 @@
 
 The data and the fit of the paper's networks are in `benchmarks.paper`.
 """
+
+from box_contact_ros.extras import expect_extras
+
+expect_extras()

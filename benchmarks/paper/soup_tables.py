@@ -197,7 +197,7 @@ def measure(written: np.ndarray, touching: np.ndarray, *, quick: bool = False) -
     soups: dict[tuple[str, int], Row] = {}
     work = len([*COARSE, *PAPER]) * sum(c.timed + c.judged for c in counts.values())
     with (pinned({usable_cores()[-1]}), no_garbage_collection(),
-          tqdm(total=work, unit='pattern', disable=None) as bar):
+          tqdm(total=work, unit='pattern', mininterval=1.0) as bar):
         for divisions in (*COARSE, *PAPER):
             for regime in REGIMES:
                 bar.set_description(f'soup, N = {divisions}, {regime}')

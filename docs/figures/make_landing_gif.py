@@ -17,13 +17,18 @@ import sys
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from box_contact_ros.extras import expect_extras
+
+expect_extras()
 import matplotlib
 
 matplotlib.use('Agg')
 
 import matplotlib.pyplot as plt
-import numpy as np
 from PIL import Image
+from tqdm import tqdm
 
 from box_contact_ros import Contact, ContactSolver
 from box_contact_ros.demo.crane import CraneScenario
@@ -34,8 +39,8 @@ from box_contact_ros.view.style import BOX_A, BOX_B, CONTACT
 
 sys.path.append(str(Path(__file__).resolve().parents[2]))  # where benchmarks/ is
 
-from benchmarks.engines.mujoco_engines import box_geoms, collision  # noqa: E402
-from benchmarks.landing_ways import land, solvers  # noqa: E402
+from benchmarks.engines.mujoco_engines import box_geoms, collision
+from benchmarks.landing_ways import land, solvers
 
 RATE = 1000.0
 PICTURES = 12  # a second
@@ -183,11 +188,12 @@ def main() -> None:
     parser.add_argument('--out', type=Path, default=Path(__file__).with_name('landing.gif'))
     parser.add_argument('--picture', type=Path, help='folder for each picture, to look at')
     options = parser.parse_args()
+    print('landing.gif: the crane lands ...', flush=True)
     scenario = CraneScenario(pitch=1.2, roll=0.4, offset=(-0.15, 0.1))
     record = land(scenario, solvers(scenario, 'exact'), rate_hz=RATE, latency=0.002)
     shots = shots_of(record, min(record.points))
     pictures = []
-    for number, shot in enumerate(shots):
+    for number, shot in enumerate(tqdm(shots, desc='landing.gif', unit='picture')):
         figure, (above, below) = plt.subplots(2, figsize=(WIDTH, HEIGHT), dpi=DPI,
                                               height_ratios=(3.65, 1.1))
         figure.subplots_adjust(left=0.01, right=0.99, bottom=0.01, top=0.93, hspace=0.02)

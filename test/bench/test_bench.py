@@ -177,7 +177,7 @@ def test_a_node_that_does_not_start_is_reported(monkeypatch, capfd):
 def test_a_report_without_matplotlib_names_the_extra(monkeypatch, tmp_path):
     """Before anything is started; without --out nobody needs it."""
     monkeypatch.setattr(sys, 'excepthook', sys.excepthook)
-    monkeypatch.setitem(extras.MODULES, 'report', 'no_such_module')
+    monkeypatch.setitem(extras.MODULES, 'report', ('no_such_module',))
     with pytest.raises(extras.MissingExtra, match=r'pip install .*\[report\]'):
         bench_main(['--out', str(tmp_path)])
 

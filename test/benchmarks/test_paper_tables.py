@@ -205,6 +205,19 @@ def test_the_share_that_the_times_suggest() -> None:
     assert soup_tables.share_as_written(result, 8) == pytest.approx(0.5)
 
 
+def test_a_part_leaves_the_whole_page_alone(tmp_path, monkeypatch, capsys):
+    """One table goes to quick-results/, and the program tells what it works on."""
+    page = tmp_path / 'docs' / 'results' / 'paper_tables.md'
+    page.parent.mkdir(parents=True)
+    page.write_text('all tables')
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(program.tables, 'sections_1_and_2', lambda numbers, step: [str(numbers)])
+    assert program.main(['--table', '1']) == 0
+    assert page.read_text() == 'all tables'
+    assert '[1]' in (tmp_path / 'quick-results' / 'paper_tables.md').read_text()
+    assert capsys.readouterr().out.startswith('paper: tables 1 and 2 ...\n')
+
+
 def test_all_is_written(small, tmp_path, capsys):
     """One command: page, pictures, CSV; the page's numbers are the CSV's."""
     out = tmp_path / 'new'

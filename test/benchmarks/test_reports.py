@@ -10,6 +10,7 @@ import os
 import re
 import shutil
 import subprocess
+import time
 from pathlib import Path
 
 import pytest
@@ -79,6 +80,16 @@ def test_a_listed_report_is_a_program(name: str, tmp_path: Path) -> None:
     with pytest.raises(SystemExit, match='2'):
         module.main(['--quick', '--out', str(tmp_path / 'file')])
     assert (tmp_path / 'file').read_text() == 'mine'
+
+
+def test_a_page_says_how_long_its_program_took(tmp_path: Path,
+                                               monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(output, 'BEGIN', time.monotonic() - 440.0)
+    text = output.write_page(tmp_path, 'stacks', ['--quick'], machine='M', rest='', both='',
+                             pushed='')
+    assert 'Made by `python -m benchmarks.stacks --quick` in 7 minutes on M' in text
+    monkeypatch.setattr(output, 'BEGIN', time.monotonic() - 12.0)
+    assert output.took() == '12 s'
 
 
 def test_numbers_are_readable() -> None:
