@@ -5,17 +5,22 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import math
+import re
 from pathlib import Path
 
-import matplotlib
 import numpy as np
+
+from box_contact_ros import ContactSolver
+from box_contact_ros.extras import expect_extras
+
+expect_extras()
+import matplotlib
 
 matplotlib.use('Agg')  # before pyplot: no display is needed
 
-from matplotlib import pyplot as plt  # noqa: E402
-
-from box_contact_ros import ContactSolver  # noqa: E402
+from matplotlib import pyplot as plt
 
 STACK, LOAD, OVERLAP, POINT, CORNER = '#8c8c8c', '#4477aa', '#ccbb44', '#222222', '#ee6677'
 CONTAINER = (12.192, 2.438, 2.591)
@@ -92,6 +97,15 @@ def slide(axes: plt.Axes) -> None:
     axes.spines[['top', 'right']].set_visible(False)
 
 
+def first_contact(folder: Path) -> None:
+    """Draw first_contact.png by the code that the tutorial shows."""
+    page = Path(__file__).parents[1].joinpath('tutorials', 'first_contact.md').read_text('utf-8')
+    code, = (block for block in re.findall(r'```python\n(.*?)```', page, re.DOTALL)
+             if 'savefig' in block)
+    with contextlib.chdir(folder):
+        exec(compile(code, 'first_contact.md', 'exec'), {})
+
+
 def main() -> None:
     """Draw all figures."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -103,6 +117,7 @@ def main() -> None:
     sketch(axes['one way'], math.radians(7.0))
     sketch(axes['other way'], math.radians(-7.0))
     slide(axes['graph'])
+    first_contact(folder)
     # No version and no date in the file: the same figure is the same bytes.
     figure.savefig(folder / 'centroid.png', metadata={'Software': None})
 
