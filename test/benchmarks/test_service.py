@@ -15,10 +15,10 @@ def test_ticks_come_first_beside_a_planner(capfd: pytest.CaptureFixture[str],
                                            monkeypatch: pytest.MonkeyPatch) -> None:
     """A planner that asks for 4,095 contacts without pause leaves a client in lockstep its ticks.
 
-    On a busy machine, times say nothing.
+    No tick is lost. On a busy machine times and shares say nothing, so they have no limit here.
     """
     monkeypatch.setattr(service, 'LIMITS', dict.fromkeys(service.QUESTIONS, math.inf))
-    monkeypatch.setattr(service, 'LEAST_SHARE', 0.02)
+    monkeypatch.setattr(service, 'LEAST_SHARE', 0.0)
     assert service.main(['--quick']) == 0, capfd.readouterr().out
     assert '50 of 50 ticks answered' in capfd.readouterr().out
 
