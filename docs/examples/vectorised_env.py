@@ -23,7 +23,7 @@ class LandingEnv:
     def __init__(self, n: int, seed: int = 0, period: float = 0.02) -> None:
         self.n, self.period = n, period
         self.random = np.random.default_rng(seed)
-        self.solver = ContactSolver(model='mlp')
+        self.solver = ContactSolver()
 
     def reset(self) -> np.ndarray:
         """Draw sizes, offsets and small tilts; return the first observation."""
