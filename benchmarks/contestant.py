@@ -21,7 +21,8 @@ from numpy.typing import ArrayLike
 
 from box_contact_ros.core import FORCE, native
 from box_contact_ros.models.make_model import make_model
-from box_contact_ros.models.networks import GROUP, INPUTS_TOGETHER, mlp_numbers
+from box_contact_ros.models.networks import GROUP, INPUTS_TOGETHER, core_numbers, mlp_numbers
+from box_contact_ros.models.weights_file import Network
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
@@ -40,6 +41,7 @@ MLP_SIZES = sorted((path.stem for path in WEIGHTS.glob('mlp-*.safetensors')),
 AT_REST = Path(__file__).with_name('paper') / 'weights' / 'paper-at-rest.safetensors'
 """Weights of `paper` for cubes that lie on each other: `python -m training paper --scene`."""
 ENDING = 5.0  # time that a subprocess has to end after its answer [s]
+LINEAR_PAIRS = 200_000  # that the linear map of `mlp` is fitted to
 MOST_CONTACTS = 16  # contacts asked for; two boxes have at most eight
 
 
@@ -140,11 +142,40 @@ def idle_mlp() -> native.Mlp:
     return native.Mlp(numbers)
 
 
+@cache
+def linear_mlp() -> native.Mlp:
+    """Return `mlp` whose network is the best linear map of its features, by least squares.
+
+    A rectified unit and its opposite pass a number on, so the two hidden layers bend nothing.
+    """
+    from training.samples import draw_samples, mixture
+
+    samples = draw_samples(mixture, [1, 0], LINEAR_PAIRS)
+    root = np.linalg.cholesky(samples.covariance)
+    wanted = np.column_stack([
+        samples.mean, np.sqrt(samples.volume), *(root[:, k, k] for k in range(3)),
+        root[:, 1, 0], root[:, 2, 0], root[:, 2, 1]])
+    known = np.column_stack([samples.features, np.ones(len(samples))])
+    # Errors of the point count by the box's extents, as in the training.
+    weight = samples.half.max(axis=1, keepdims=True)
+    fitted = np.linalg.lstsq(weight * known, weight * wanted, rcond=None)[0].T
+    slopes, bias = fitted[:, :-1], fitted[:, -1]
+    one, nothing = (np.eye(n) for n in slopes.shape[::-1]), np.zeros
+    inputs, outputs = one
+    both = np.block([[slopes, -slopes], [-slopes, slopes]])
+    layers = [(np.vstack([inputs, -inputs]), nothing(2 * len(inputs))),
+              (both, np.concatenate([bias, -bias])),
+              (np.hstack([outputs, -outputs]), nothing(len(outputs)))]
+    return native.Mlp(core_numbers(Network([(w.astype(np.float32), b.astype(np.float32))
+                                            for w, b in layers])))
+
+
 def other_networks() -> list[Contestant]:
-    """Return `mlp` by its other sizes and idle, and `paper` by weights for other scenes."""
+    """Return `mlp` by other sizes, linear and idle, and `paper` by weights for other scenes."""
     place = WEIGHTS / 'paper-12.192x2.438x2.591-place.safetensors'
     return [*(ours('mlp', weights=str(WEIGHTS / f'{name}.safetensors'), name=name)
               for name in MLP_SIZES),
+            ours(linear_mlp(), name='mlp, linear'),
             ours(idle_mlp(), name='mlp, idle'),
             ours('paper', weights=str(place), name='paper-place'),
             ours('paper', weights=str(AT_REST), name='paper-at-rest')]

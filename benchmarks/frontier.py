@@ -238,7 +238,7 @@ def draw(path: Path, table: Path) -> None:
 def traded(rows: Sequence[FrontierRow]) -> str:
     """Return what `mlp` costs in a batch and how far it is off, by size and on both panels."""
     lines = []
-    for name in ('exact', *reversed(SIZES), 'mlp, idle'):
+    for name in ('exact', *reversed(SIZES), 'mlp, linear', 'mlp, idle'):
         line: list[object] = [f'`{name}`']
         for of_set in ('settled', 'containers'):
             row = next(row for row in rows if (row.name, row.set, row.instruction_set)

@@ -182,11 +182,11 @@ def test_quick_run(tmp_path: Path) -> None:
     with (tmp_path / 'frontier.csv').open() as file:
         rows = list(csv.DictReader(file))
     engines = {engine.name for engine in installed()[0]}
-    assert {'python-fcl collide', *frontier.QUICK_MODELS, *frontier.SIZES, 'mlp, idle',
+    assert {'python-fcl collide', *frontier.QUICK_MODELS, *frontier.SIZES, 'mlp, linear',
             'paper-at-rest', *engines & set(frontier.SHOWN)} <= {row['contestant'] for row in rows}
     assert {row['set'] for row in rows} == set(frontier.TIMED_SETS)
     page = (tmp_path / 'frontier.md').read_text('utf-8')
-    assert '| `mlp, idle` |' in page.partition('![')[0]
+    assert '| `mlp, linear` |' in page.partition('![')[0]
     for of_sets in frontier.PANELS.values():
         found = frontier.shown_points(tmp_path / 'frontier.csv', of_sets, 'batch_p50')
         assert {'exact', 'paper', *frontier.SIZES} <= set(found)
