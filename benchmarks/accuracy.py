@@ -12,19 +12,17 @@ in stacks, half the winners are edge pairs although the contact is a patch.
 """
 from __future__ import annotations
 
-import argparse
 import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from box_contact_ros.arguments import model_name, within
+from box_contact_ros.arguments import within
 from box_contact_ros.core import DEPTH_FLOOR
 from box_contact_ros.extras import require
 from box_contact_ros.models.weights_file import WeightsError
@@ -32,7 +30,7 @@ from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.pose import rotation_matrix
 
 from . import output, settled
-from .contestant import Contestant, ours
+from .contestant import Contestant, model_or_class, ours
 from .errors import ContactErrors, contact_errors
 from .output import markdown_table
 from .paper.numpy_model import turned
@@ -205,18 +203,6 @@ def draw(path: Path, rows: Sequence[AccuracyRow]) -> None:
     axis.set_axisbelow(True)
     figure.legend(fontsize=9, loc='outside lower center', ncols=3, frameon=False)
     figure.savefig(path)
-
-
-def model_or_class(text: str) -> Any:
-    """Return the name of a model, or an object of `package.module:Class` that answers as one."""
-    module, colon, name = text.partition(':')
-    if not colon:
-        return model_name(text)
-    sys.path.insert(0, '')  # modules of the current folder, however the program was started
-    try:
-        return getattr(import_module(module), name)()
-    except (ImportError, AttributeError) as error:
-        raise argparse.ArgumentTypeError(f'{text}: {error}') from error
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -8,17 +8,21 @@ and models are made beforehand and are not timed. Setting both poses is timed.
 """
 from __future__ import annotations
 
+import argparse
 import multiprocessing
 import os
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from box_contact_ros.arguments import model_name
 from box_contact_ros.core import FORCE, native
 from box_contact_ros.models.make_model import make_model
 from box_contact_ros.models.networks import GROUP, INPUTS_TOGETHER, core_numbers, mlp_numbers
@@ -105,6 +109,25 @@ class Contestant:
 def packages_of(contestants: Sequence[Contestant]) -> list[str]:
     """Return the distributions whose versions a report of these contestants names."""
     return list(dict.fromkeys(['numpy', *(one.package for one in contestants if one.package)]))
+
+
+def model_or_class(text: str) -> Any:
+    """Return the name of a model, or an object of `package.module:Class` that answers as one."""
+    module, colon, name = text.partition(':')
+    if not colon:
+        return model_name(text)
+    sys.path.insert(0, '')  # modules of the current folder, however the program was started
+    try:
+        return getattr(import_module(module), name)()
+    except (ImportError, AttributeError) as error:
+        raise argparse.ArgumentTypeError(f'{text}: {error}') from error
+
+
+def add_models(parser: argparse.ArgumentParser) -> None:
+    """Add the argument that names more models than the report's."""
+    parser.add_argument('--model', nargs='+', type=model_or_class, default=[], metavar='MODEL',
+                        help='more models: names, or package.module:Class; results then go to '
+                        'quick-results')
 
 
 def ours(model: Any, *, weights: str | None = None, name: str = '') -> Contestant:

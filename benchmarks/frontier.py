@@ -17,9 +17,10 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 from box_contact_ros.core import instruction_sets, native
 from box_contact_ros.extras import require
@@ -31,12 +32,13 @@ from .contestant import (
     MLP_SIZES,
     MODELS,
     Contestant,
+    add_models,
     in_subprocess,
     other_networks,
     ours,
     packages_of,
 )
-from .engines import installed
+from .engines import add_leave_out, installed, may_miss
 from .output import markdown_table, number
 from .pose_sets import SETS, apart, landings
 from .timing import by_round, pinned, usable_cores
@@ -51,6 +53,9 @@ from .trials import (
     measure_all,
 )
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 TIMED_SETS = {**SETS, 'just apart': apart, 'landings': landings, 'settled': settled.at_rest,
               'settled cubes': settled.cubes_at_rest}
 IN_SHORT = ('exact', 'mlp', 'paper', 'paper-place', 'paper-at-rest', 'soup-1', 'soup-8', 'soup-22')
@@ -60,22 +65,40 @@ ODD_NORMAL = 10.0  # error of an engine's normal that is explained [deg]
 
 SIZES = (*MLP_SIZES, 'mlp')
 """The network of `mlp` by size; `mlp` itself has 32-32."""
-SHOWN = {'exact': ('exact', 'C0', 0), 'mlp-8-8': ('mlp, 8-8', 'C2', 4),
-         'mlp-16-16': ('16-16', 'C2', 0), 'mlp': ('32-32', 'C2', -4),
-         'mlp, idle': ('mlp, last layer zeroed', 'C8', -9),
-         'paper': ('paper', 'C4', 0), 'paper-at-rest': ('paper, for this scene', 'C4', 0),
-         'soup-1': ('soup, N = 1', 'C5', 9), 'soup-8': ('N = 8', 'C5', -5),
-         'MuJoCo mj_collision': ('MuJoCo', 'C1', 9),
-         'PyBullet getContactPoints': ('Bullet', 'C6', 0)}
-"""Contestant: how the picture calls it, its colour, and how much higher the name stands [pt]."""
+CALLS = {'exact': ('exact', 'exact', 0), 'mlp': ('mlp', 'mlp', 12),
+         'paper': ('paper', 'paper', 0), 'soup-8': ('polygon soup', 'soup', 0),
+         'MuJoCo mj_collision': ('MuJoCo', 'MuJoCo', -13),
+         'PyBullet getContactPoints': ('Bullet', 'Bullet', 0),
+         'Coal ComputeCollision, contact patch': ('Coal', 'Coal', 9),
+         'Drake hydroelastic': ('Drake', 'Drake', 0)}
+BATCHES = {'exact': ('exact', 'exact', 0), 'mlp-8-8': ('mlp, 8-8', 'mlp', 10),
+           'mlp-16-16': ('16-16', 'mlp', 2), 'mlp': ('32-32', 'mlp', -8),
+           'mlp, linear': ('linear map', 'other', 0),
+           'mlp, idle': ('last layer zeroed', 'other', 0),
+           'paper': ('paper', 'paper', 0)}
+"""Contestant: its name in a picture, whose colour it has, and how much higher the name stands [pt]."""
 PANELS = {'Goods at rest': ('settled', 'settled cubes'),
           'A 12 m container on another, swaying': ('containers',)}
 """Titles, and the sets that are drawn: of each contestant the first that it answers."""
-AXES = {'call_p50': ('time of a call from Python [µs]', 1e-3, (0.1, 3e3)),
-        'batch_p50': ('time of a pair in a batch [ns]', 1.0, (20.0, 1e3))}
-"""Times in the CSV: what they are, by which they are multiplied, and what the picture shows: names
-stand on the right of their points."""
-ERRORS = (1e-2, 3e2)
+
+
+class Picture(NamedTuple):
+    """A picture of errors over one time of the CSV."""
+
+    column: str
+    title: str
+    label: str
+    unit: float  # by which times are multiplied
+    limits: tuple[float, float]  # names stand on the right of their points
+    shown: dict[str, tuple[str, str, int]]
+
+
+PICTURES = {
+    'frontier': Picture('call_p50', 'A call from Python: exact has no error, and takes no longer',
+                        'time of a call from Python [µs]', 1e-3, (0.1, 2e4), CALLS),
+    'frontier_batches': Picture('batch_p50', 'A batch: the network buys time at rest alone',
+                                'time of a pair in a batch [ns]', 1.0, (40.0, 1e3), BATCHES)}
+ERRORS = (1e-1, 3e2)
 """Errors that are drawn to scale [%]; 0 has a band of its own below."""
 
 
@@ -192,47 +215,63 @@ def csv_rows(rows: Sequence[FrontierRow], contestants: Sequence[Contestant],
                     'instruction_set': row.instruction_set}
 
 
-def shown_points(table: Path, of_sets: Sequence[str], column: str,
+def shown_points(table: Path, of_sets: Sequence[str], picture: Picture,
                  ) -> dict[str, tuple[float, float]]:
     """Return a time of the CSV and the p99 point error [%] by contestant.
 
     An engine with several ways to make one point has the best of them. Models have the fastest
-    instruction set, whose rows come first.
+    instruction set, whose rows come first. What has no contact of a set has no error there.
     """
     points: dict[str, tuple[float, float]] = {}
     for of_set in of_sets:
         here: dict[str, tuple[float, float]] = {}
         for row in output.read_csv(table):
-            name, time = row['contestant'], float(row[column] or 'nan')
-            if (row['set'], row['class']) == (of_set, 'all') and name in SHOWN and time > 0.0:
+            name, time = row['contestant'], float(row[picture.column] or 'nan')
+            if ((row['set'], row['class']) == (of_set, 'all') and name in picture.shown
+                    and time > 0.0 and row['point_p99']):
                 before = here.get(name, (time, math.inf))
                 here[name] = before[0], min(before[1], float(row['point_p99']))
         points = here | points
     return points
 
 
-def draw(path: Path, table: Path) -> None:
-    """Draw the point errors of some contestants over both times, from the CSV."""
-    figure, axes = output.subplots(len(AXES), len(PANELS), (10.5, 8.8), sharey=True)
-    for line, (column, (label, factor, limits)) in zip(axes, AXES.items()):
-        for axis, (title, of_sets) in zip(line, PANELS.items()):
-            height = output.log_errors(axis, *ERRORS)
-            axis.set_xscale('log')
-            axis.xaxis.set_major_formatter('{x:g}')
-            axis.xaxis.set_minor_formatter('')
-            axis.set(xlim=limits, xlabel=label, title=title)
-            found = shown_points(table, of_sets, column)
-            sizes = [found[name] for name in SIZES if name in found]
-            axis.plot([factor * time for time, _ in sizes], [height(error) for _, error in sizes],
-                      color=SHOWN['mlp'][1], linewidth=1)
-            for name, (time, error) in found.items():
-                shown, colour, rise = SHOWN[name]
-                axis.plot(factor * time, height(error), 'o', color=colour, markersize=7, alpha=0.7)
-                axis.annotate(shown, (factor * time, height(error)), xytext=(9, rise), va='center',
-                              textcoords='offset points', color=colour, fontsize=10)
-    for axis in axes[:, 0]:
-        axis.set_ylabel('point error, p99 [% of the edge]')
-    figure.savefig(path, metadata={'Software': None})
+def draw(folder: Path, table: Path, models: Sequence[str] = ()) -> None:
+    """Draw the pictures from the CSV, and more models that were asked for; tell what is absent."""
+    measured = {row['contestant'] for row in output.read_csv(table)}
+    for name, picture in PICTURES.items():
+        more = {model: (model, 'new', 0) for model in models}
+        picture = picture._replace(shown=picture.shown | more)
+        absent = sorted(picture.shown.keys() - measured)
+        if absent:
+            print(f'frontier: not in {name}.png, as not measured: {", ".join(absent)}',
+                  file=sys.stderr)
+        figure, axes = output.subplots(1, len(PANELS), (10.5, 4.6), sharey=True)
+        figure.suptitle(picture.title, fontsize=13)
+        for axis, (title, of_sets) in zip(axes[0], PANELS.items()):
+            _draw_panel(axis, shown_points(table, of_sets, picture), picture)
+            axis.set(xlabel=picture.label, title=title)
+        axes[0, 0].set_ylabel("point error, p99\n[% of the smaller box's longest edge]")
+        figure.savefig(folder / f'{name}.png', metadata={'Software': None})
+
+
+def _draw_panel(axis: Axes, found: Mapping[str, tuple[float, float]], picture: Picture) -> None:
+    height = output.log_errors(axis, *ERRORS)
+    axis.set_xscale('log')
+    axis.xaxis.set_major_formatter('{x:,g}')
+    axis.xaxis.set_minor_formatter('')
+    axis.set_xlim(*picture.limits)
+    sizes = [found[name] for name in SIZES if name in found and name in picture.shown]
+    axis.plot([picture.unit * time for time, _ in sizes], [height(error) for _, error in sizes],
+              color=output.COLOURS['mlp'], linewidth=1)
+    for name, (time, error) in found.items():
+        shown, whose, rise = picture.shown[name]
+        colour = output.COLOURS[whose]
+        is_ours = name == 'exact'
+        axis.plot(picture.unit * time, height(error), '*' if is_ours else 'o', color=colour,
+                  markersize=16 if is_ours else 7)
+        axis.annotate(shown, (picture.unit * time, height(error)), xytext=(9, rise), va='center',
+                      textcoords='offset points', color=colour, fontsize=11 if is_ours else 10,
+                      weight='bold' if is_ours else 'normal')
 
 
 def traded(rows: Sequence[FrontierRow]) -> str:
@@ -255,12 +294,17 @@ def main(args: Sequence[str] | None = None) -> int:
     """Measure, print, write."""
     parser = output.report_parser(
         'frontier', __doc__, quick='few pairs and models, to try it out', seed=3,
-        out='frontier.md, .csv, .png')
+        out='frontier.md, .csv and pictures')
+    add_models(parser)
+    add_leave_out(parser)
     options = parser.parse_args(args)
-    folder = output.results_folder(parser, options)
+    folder = output.results_folder(parser, options, part=bool(options.model))
     require('report', 'soup')
     plan, names = (QUICK, QUICK_MODELS) if options.quick else (FULL, MODELS)
-    models, (engines, missing) = [*map(ours, names), *other_networks()], installed()
+    models = [*map(ours, names), *other_networks(), *map(ours, options.model)]
+    engines, missing = installed()
+    if not (options.quick or may_miss('frontier', missing, options.leave_out)):
+        return 1
     for line in missing:
         print(f'frontier: left out: {line}', file=sys.stderr)
     with pinned({usable_cores()[-1]}):
@@ -271,7 +315,7 @@ def main(args: Sequence[str] | None = None) -> int:
                                       instruction_set=name)
     output.write_csv(folder / 'frontier.csv', csv_rows(rows, [*models, *engines]))
     write_page(folder, args, rows, models, engines, missing, plan)
-    draw(folder / 'frontier.png', folder / 'frontier.csv')
+    draw(folder, folder / 'frontier.csv', [model.name for model in map(ours, options.model)])
     print(in_short(rows, engines))
     return 0
 

@@ -22,7 +22,7 @@ from box_contact_ros import Contact, Contacts
 from box_contact_ros.extras import require
 
 from . import output
-from .contestant import Contestant, Manifold, ours, packages_of
+from .contestant import Contestant, Manifold, add_models, ours, packages_of
 from .engines import installed
 from .judge import PRESSED, judge, two_touches
 from .pose_sets import Pairs
@@ -122,11 +122,13 @@ def main(args: Sequence[str] | None = None) -> int:
 
     parser = output.report_parser(
         'named_failures', __doc__, quick='the models alone', out='named_failures.md')
+    add_models(parser)
     options = parser.parse_args(args)
-    folder, failures = output.results_folder(parser, options), load()
+    folder = output.results_folder(parser, options, part=bool(options.model))
+    failures = load()
     require('report', 'soup')
     rivals, missing = ([], []) if options.quick else installed()
-    engines = [*map(ours, MODELS), *rivals]
+    engines = [*map(ours, MODELS), *map(ours, options.model), *rivals]
     bounds = {name: one.lenience for name, one in failures.items()}
     found = {engine.name: replay(engine, failures, bounds)
              for engine in tqdm(engines, desc='named failures', unit='contestant')}

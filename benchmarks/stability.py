@@ -14,16 +14,14 @@ import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
 
 import numpy as np
 
-from box_contact_ros import make_model
 from box_contact_ros.extras import require
 from box_contact_ros.solver.contact import Contacts
-from box_contact_ros.solver.contact_solver import ContactSolver
 
 from . import output
+from .contestant import add_models, ours
 from .errors import point_errors
 from .hard_poses import Cases, load
 from .judge import NOT_FINITE, NOT_UNIT, OUTSIDE, judge
@@ -128,21 +126,23 @@ def main(args: Sequence[str] | None = None) -> int:
     """Ask all, print, write; 1 if a gate is broken."""
     parser = output.report_parser(
         'stability', __doc__, quick=f'every {QUICK}th family', out='stability.md and stability.csv')
+    add_models(parser)
     options = parser.parse_args(args)
-    folder = output.results_folder(parser, options)
+    folder = output.results_folder(parser, options, part=bool(options.model))
     require('report', 'soup')
     cases = load()
     families = list(cases)[::QUICK] if options.quick else list(cases)
     from tqdm import tqdm
 
     rows = []
-    for model in MODELS:
-        solver = ContactSolver(model=make_model(model))
-        rows += [examine(model, family, cases[family], partial(Pairs.contacts, solver=solver))
+    contestants = [*map(ours, MODELS), *map(ours, options.model)]
+    for model, solve in ((one.name, one.solve) for one in contestants):
+        assert solve
+        rows += [examine(model, family, cases[family], solve)
                  for family in tqdm(families, desc=f'stability, {model}', unit='family')]
     about = output.machine(('numpy', 'python-fcl'))
     output.write_csv(folder / 'stability.csv', map(asdict, rows), digits=4, about=about)
-    by = {model: [row for row in rows if row.model == model] for model in MODELS}
+    by = {one.name: [row for row in rows if row.model == one.name] for one in contestants}
     summary = table([over_all(mine) for mine in by.values()])
     broken = gates(rows)
     output.write_page(

@@ -7,6 +7,8 @@ Each `*_engines.py` imports one library and lists its `ENGINES`, functions that 
 """
 from __future__ import annotations
 
+import argparse
+import sys
 from collections.abc import Iterable
 from importlib import import_module
 
@@ -17,6 +19,25 @@ RIVALS = {'mujoco': "extra 'sim'", 'fcl': "extra 'soup'", 'coal': "extra 'peers'
 """The engines' modules, each with what brings its library."""
 
 
+def add_leave_out(parser: argparse.ArgumentParser) -> None:
+    """Add the argument that names rivals which a full run may miss."""
+    parser.add_argument('--leave-out', nargs='+', choices=tuple(RIVALS), default=[],
+                        metavar='RIVAL', help=f'of {", ".join(RIVALS)}: rivals that a full run may '
+                        'miss; any other that is missing ends it at once')
+
+
+def may_miss(program: str, missing: Iterable[str], left_out: Iterable[str]) -> bool:
+    """Return whether all that is missing was left out on purpose; else say what to do.
+
+    missing: lines or names that begin with a rival's.
+    """
+    wrong = [line for line in missing if line.split()[0].lower() not in left_out]
+    for line in wrong:
+        print(f'{program}: {line}: install it, or add --leave-out {line.split()[0].lower()}',
+              file=sys.stderr)
+    return not wrong
+
+
 def installed(modules: Iterable[str] = tuple(RIVALS)) -> tuple[list[Contestant], list[str]]:
     """Return the rivals that can be imported, and a line about each that cannot."""
     found, missing = [], []
@@ -25,5 +46,5 @@ def installed(modules: Iterable[str] = tuple(RIVALS)) -> tuple[list[Contestant],
             makers = import_module(f'.{module}_engines', __name__).ENGINES
             found += [make() for make in makers]
         except ImportError as error:
-            missing.append(f'{error.name or module} is not installed ({RIVALS[module]})')
+            missing.append(f'{module} is not installed ({RIVALS[module]}: {error})')
     return found, missing

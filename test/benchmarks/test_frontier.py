@@ -8,6 +8,7 @@ import csv
 import dataclasses
 import math
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ import pytest
 from benchmarks import frontier, trials
 from benchmarks.contestant import APART, Contestant, Manifold, chosen, ours
 from benchmarks.engines import installed
-from benchmarks.output import read_csv
+from benchmarks.output import read_csv, write_csv
 from benchmarks.pose_sets import CONTAINER, SETS, Pairs, apart
 from benchmarks.timing import take_turns
 from box_contact_ros.solver.pose import rotation_matrix
@@ -150,19 +151,45 @@ def test_the_mean_by_depth() -> None:
 # --- the whole ------------------------------------------------------------------------------------
 
 
-def test_the_picture_is_of_the_table() -> None:
+@pytest.mark.parametrize('name', frontier.PICTURES)
+def test_the_picture_is_of_the_table(name: str) -> None:
     """All that the committed table has, each with the best of its points: a time and an error."""
-    table = ROOT / 'docs' / 'results' / 'frontier.csv'
+    table, picture = ROOT / 'docs' / 'results' / 'frontier.csv', frontier.PICTURES[name]
     for of_sets in frontier.PANELS.values():
-        measured = {row['contestant'] for row in read_csv(table) if row['set'] in of_sets}
-        for column, (_, factor, (low, high)) in frontier.AXES.items():
-            found = frontier.shown_points(table, of_sets, column)
-            engines = column == 'call_p50' or not measured
-            assert set(found) == measured & set(frontier.SHOWN) if engines else 'mlp' in found
-            for time, error in found.values():
-                assert low < factor * time < high and error <= frontier.ERRORS[1]
-            if measured:
-                assert found['exact'][1] == 0.0 < found['mlp'][1]
+        measured = {row['contestant'] for row in read_csv(table)
+                    if row['set'] in of_sets and row[picture.column]}
+        found = frontier.shown_points(table, of_sets, picture)
+        assert set(found) == measured & set(picture.shown)
+        assert len(found) >= 6 and found['exact'][1] == 0.0 < found['mlp'][1]
+        for time, error in found.values():
+            assert picture.limits[0] < picture.unit * time < picture.limits[1]
+            assert error <= frontier.ERRORS[1]
+
+
+def test_no_contestant_vanishes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """One that misses all pairs of a set is left out of its panel; a model of others is drawn."""
+    rows = [dict(contestant=name, set='containers', point='its point', point_p99=error,
+                 call_p50=400, batch_p50=100, **{'class': 'all'})
+            for name, error in (('exact', 0.0), ('MuJoCo mj_collision', None), ('Mine', 3.0))]
+    write_csv(tmp_path / 'frontier.csv', rows)
+    picture = frontier.PICTURES['frontier']
+    assert set(frontier.shown_points(tmp_path / 'frontier.csv', ['containers'], picture)) == {
+        'exact'}
+    frontier.draw(tmp_path, tmp_path / 'frontier.csv', ['Mine'])
+    said = capsys.readouterr().err
+    assert 'not in frontier.png, as not measured: ' in said and 'Drake' in said
+    assert 'Mine' not in said and (tmp_path / 'frontier_batches.png').exists()
+
+
+def test_a_missing_rival_ends_a_full_run_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                                 capsys: pytest.CaptureFixture[str]) -> None:
+    """Unless it is left out on purpose."""
+    monkeypatch.setattr(frontier, 'installed', lambda: ([], ['coal is not installed (extra)']))
+    assert frontier.main(['--out', str(tmp_path)]) == 1
+    assert 'add --leave-out coal' in capsys.readouterr().err and not list(tmp_path.iterdir())
+    monkeypatch.setattr(frontier, 'measure_all', Mock(side_effect=InterruptedError))
+    with pytest.raises(InterruptedError):
+        frontier.main(['--leave-out', 'coal', '--out', str(tmp_path)])
 
 
 def test_mlp_is_more_exact_than_mujoco() -> None:
@@ -183,13 +210,14 @@ def test_quick_run(tmp_path: Path) -> None:
         rows = list(csv.DictReader(file))
     engines = {engine.name for engine in installed()[0]}
     assert {'python-fcl collide', *frontier.QUICK_MODELS, *frontier.SIZES, 'mlp, linear',
-            'paper-at-rest', *engines & set(frontier.SHOWN)} <= {row['contestant'] for row in rows}
+            'paper-at-rest', *engines & set(frontier.CALLS)} <= {row['contestant'] for row in rows}
     assert {row['set'] for row in rows} == set(frontier.TIMED_SETS)
     page = (tmp_path / 'frontier.md').read_text('utf-8')
     assert '| `mlp, linear` |' in page.partition('![')[0]
     for of_sets in frontier.PANELS.values():
-        found = frontier.shown_points(tmp_path / 'frontier.csv', of_sets, 'batch_p50')
-        assert {'exact', 'paper', *frontier.SIZES} <= set(found)
+        found = frontier.shown_points(tmp_path / 'frontier.csv', of_sets,
+                                      frontier.PICTURES['frontier_batches'])
+        assert {'exact', 'paper', 'mlp, linear', *frontier.SIZES} <= set(found)
     core = [row for row in rows if row['contestant'] in ('exact', 'mlp')]
     for row in core:
         assert (row['missed'], row['invented']) == ('0', '0')

@@ -20,7 +20,8 @@ PYTHON = """#!/bin/bash
 case "$0 $*" in
     *'-m venv'*) mkdir -p .venv/bin; for name in python uv; do cp "$0" .venv/bin/$name; done ;;
     *uv*compile*) echo "$*" >compiled; touch .venv/roots.txt; exit ;;
-    *' -e '*) echo built >box_contact_ros/core.so ;;
+    *' -e '*) echo built >box_contact_ros/core.so
+        if [ -e saved ]; then mv saved box_contact_ros/core.hpp; fi ;;
 esac
 case "$*" in *install*|*'-m venv'*) echo "$*" >>calls; sleep "${SLOW:-0}" ;; esac
 """
@@ -100,6 +101,13 @@ def test_a_second_call_does_what_is_missing_alone(clone: Path) -> None:
     (clone / '.ci' / 'lock.txt').write_text('# an older lock')
     assert set_up(clone) == ['tools', 'roots', 'box-contact-ros']
     assert set_up(clone, 'test') == ['tools', 'roots']
+
+
+def test_what_is_saved_during_a_build_is_built_next(clone: Path) -> None:
+    (clone / 'saved').write_text('a header that was saved while the compiler ran')
+    assert set_up(clone) == NEW
+    assert set_up(clone) == ['box-contact-ros']
+    assert set_up(clone) == []
 
 
 def test_pytorch_is_for_training_alone(clone: Path) -> None:
