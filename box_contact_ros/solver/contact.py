@@ -4,22 +4,20 @@
 """What a solver returns: one contact, or the contacts of many pairs as arrays."""
 from __future__ import annotations
 
-import operator
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
-from typing import overload
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..core import native
 from .checks import short_repr
+from .rows import Rows
 
 Contact = native.Contact
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Contacts(Sequence[Contact]):
+class Contacts(Rows[Contact]):
     """The contacts of n pairs: a sequence of `Contact`, and the fields of all as arrays.
 
     `contacts[3]` is a Contact. A slice, a mask (n,) or numbers of rows give Contacts.
@@ -57,22 +55,11 @@ class Contacts(Sequence[Contact]):
                    column('volume', float), column('covariance', float, 3, 3),
                    column('axis', np.int32))
 
-    def __len__(self) -> int:
-        return len(self.colliding)
-
-    @overload
-    def __getitem__(self, rows: int | np.integer) -> Contact: ...
-    @overload
-    def __getitem__(self, rows: slice | ArrayLike) -> Contacts: ...
-
-    def __getitem__(self, rows: int | np.integer | slice | ArrayLike) -> Contact | Contacts:
-        try:
-            row = operator.index(rows)  # type: ignore[arg-type]
-        except TypeError:
-            return Contacts(*(getattr(self, name)[rows] for name in FIELDS))
-        return Contact(bool(self.colliding[row]), float(self.separation[row]), self.normal[row],
-                       self.point[row], float(self.volume[row]), self.covariance[row],
-                       int(self.axis[row]))
+    def _one(self, colliding: np.bool_, separation: np.float64, normal: np.ndarray,
+             point: np.ndarray, volume: np.float64, covariance: np.ndarray, axis: np.int32,
+             ) -> Contact:
+        return Contact(bool(colliding), float(separation), normal, point, float(volume),
+                       covariance, int(axis))
 
 
 FIELDS = tuple(field.name for field in fields(Contacts))

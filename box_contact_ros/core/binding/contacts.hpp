@@ -6,12 +6,10 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <iterator>
 #include <limits>
 
 #include "../src/kernel.hpp"
-#include "arrays.hpp"  // Python.h
-#include <structmember.h>
+#include "rows_class.hpp"
 
 namespace box_contact::binding {
 
@@ -21,12 +19,6 @@ inline PyTypeObject* contact_type = nullptr;
 
 using Contact = Holder<bc_contact>;
 
-template <class... Lengths>
-PyObject* array_of(const double* numbers, Lengths... lengths) {
-  auto array = make<double>({lengths...});
-  std::copy_n(numbers, (lengths * ...), array.numbers);
-  return array.object.release();
-}
 inline PyObject* contact_normal(PyObject* self, void*) {
   return array_of(Contact::of(self).normal, 3);
 }
@@ -123,37 +115,10 @@ inline PyType_Spec contact_spec = {"box_contact_ros.Contact", sizeof(Contact), 0
 
 // --- Contacts -----------------------------------------------------------------------------------
 
-// Python's class `Contacts`, set by `use_contacts`, and where its objects have the slots of their
-// fields.
-inline PyTypeObject* contacts_type = nullptr;
-inline const char* contacts_fields[] = {"colliding", "separation", "normal", "point",
-                                        "volume",    "covariance", "axis"};
-inline Py_ssize_t contacts_places[std::size(contacts_fields)];
+inline RowsClass<7> contacts_class{
+    {"colliding", "separation", "normal", "point", "volume", "covariance", "axis"}};
 
-inline PyObject* use_contacts(PyObject*, PyObject* type) {
-  if (!PyType_Check(type)) fail(PyExc_TypeError, "a class is needed");
-  for (size_t k = 0; k < std::size(contacts_fields); ++k) {
-    Owned slot(made(PyObject_GetAttrString(type, contacts_fields[k])));
-    if (!Py_IS_TYPE(slot.get(), &PyMemberDescr_Type)) fail(PyExc_TypeError, "slots are needed");
-    contacts_places[k] = reinterpret_cast<PyMemberDescrObject*>(slot.get())->d_member->offset;
-  }
-  Owned before(reinterpret_cast<PyObject*>(contacts_type));
-  contacts_type = reinterpret_cast<PyTypeObject*>(Py_NewRef(type));
-  Py_RETURN_NONE;
-}
-
-// An object of that class. Its own constructor would take as long as a small batch.
-template <class... Arrays>
-PyObject* make_contacts(Arrays&... arrays) {
-  static_assert(sizeof...(arrays) == std::size(contacts_fields));
-  if (!contacts_type) fail(PyExc_RuntimeError, "use_contacts was not called");
-  PyObject* contacts = made(contacts_type->tp_alloc(contacts_type, 0));
-  const Py_ssize_t* place = contacts_places;
-  ((*reinterpret_cast<PyObject**>(reinterpret_cast<char*>(contacts) + *place++) =
-        arrays.object.release()),
-   ...);
-  return contacts;
-}
+inline PyObject* use_contacts(PyObject*, PyObject* type) { return contacts_class.use(type); }
 
 // Arrays of a row for each pair.
 struct ContactArrays {
@@ -179,7 +144,7 @@ struct ContactArrays {
     // Without a patch, the volume of pairs in contact is unknown.
     for (npy_intp row = 0; !patch && row < count; ++row)
       volume.numbers[row] = colliding.numbers[row] ? unknown : 0.0;
-    return make_contacts(colliding, separation, normal, point, volume, covariance, axis);
+    return contacts_class.make(colliding, separation, normal, point, volume, covariance, axis);
   }
 
  private:
