@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from .solver.contact import Contact, Contacts, patch_area, patch_areas
 from .solver.contact_solver import ContactSolver
+from .solver.nearest import Nearest, Nearests
 
 if TYPE_CHECKING:
     from .forces.patch_forces import Body, PatchForces
@@ -25,9 +26,10 @@ if TYPE_CHECKING:
     from .solver.contacts_of import contacts_of
     from .stream.read_contacts import ReadContacts, read_contacts
 
-__all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Frame', 'Pair', 'PatchForces',
-           'Plan', 'ReadContacts', 'Scene', 'SceneSolver', 'contacts_of', 'inspect_plan',
-           'make_model', 'patch_area', 'patch_areas', 'read_contacts', 'read_scene', 'support']
+__all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Frame', 'Nearest', 'Nearests',
+           'Pair', 'PatchForces', 'Plan', 'ReadContacts', 'Scene', 'SceneSolver', 'contacts_of',
+           'inspect_plan', 'make_model', 'patch_area', 'patch_areas', 'read_contacts', 'read_scene',
+           'support']
 # `ContactNode` needs ROS, and `import *` does without.
 
 _LOADED_WHEN_USED = {

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,11 +25,24 @@ from .checks import (
 )
 from .contact import Contact, Contacts, without_patch
 from .model import NATIVE_TYPES, Model, as_model
+from .nearest import Nearest, Nearests
 
 Names = tuple[str, str, str, str]  # of poses and sizes of A and B, in a refusal
 _SINGLE: Names = ('pose_a', 'pose_b', 'size_a', 'size_b')
 _MANY: Names = ('poses_a', 'poses_b', 'size_a', 'size_b')
 _BY_PLACE: Names = ('poses', 'poses', 'sizes', 'sizes')
+
+
+class _Asked(NamedTuple):
+    """Rows of pairs as the core takes them, and the names of the arguments in a refusal."""
+
+    a: np.ndarray
+    b: np.ndarray
+    size_a: np.ndarray
+    size_b: np.ndarray
+    names: Names
+    threads: int = 1
+    places: np.ndarray | None = None
 
 
 class ContactSolver(native.PairSolver):
@@ -39,6 +52,7 @@ class ContactSolver(native.PairSolver):
     solver = ContactSolver(size_a=(12.192, 2.438, 2.591), size_b=(12.192, 2.438, 2.591))
     contact = solver(pose_a, pose_b)
     contacts = solver.batch(poses_a, poses_b)
+    nearest = solver.distance(pose_a, pose_b)
     ```
 
     Sizes are three full extents [m]. Without them, each batch brings its own. Poses are
@@ -79,8 +93,18 @@ class ContactSolver(native.PairSolver):
                   size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
                   sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
                   threads: int = 1, patch: bool = True) -> Contacts: ...
+
+        def distance(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Nearest: ...  # noqa: D102
+
+        def distance_batch(  # noqa: D102
+                self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,
+                size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
+                sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
+                threads: int = 1) -> Nearests: ...
     else:
         batch = native.PairSolver.batch
+        distance = native.PairSolver.distance
+        distance_batch = native.PairSolver.distance_batch
 
     def __reduce__(self) -> tuple[Callable[..., ContactSolver], tuple[Any, ...]]:
         """Pickle the arguments."""
@@ -92,10 +116,7 @@ class ContactSolver(native.PairSolver):
 
         Raises ValueError, with field and value, for poses that are refused.
         """
-        a = as_floats(pose_a, 'pose_a', 'a pose (x y z qx qy qz qw)', (7,)).reshape(1, 7)
-        b = as_floats(pose_b, 'pose_b', 'a pose (x y z qx qy qz qw)', (7,)).reshape(1, 7)
-        return self._solve(a, b, _known(self._size_a, 'size_a'), _known(self._size_b, 'size_b'),
-                           _SINGLE)[0]
+        return self._solve(self._pair(pose_a, pose_b))[0]
 
     def _batch_general(self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,
                        size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
@@ -105,30 +126,53 @@ class ContactSolver(native.PairSolver):
 
         Raises ValueError, with field and value, for what is refused.
         """
-        threads = as_whole(threads, 'threads', 1, THREADS_MAX)
         if not isinstance(patch, (bool, np.bool_)):
             raise ValueError(f'patch must be True or False, not {short_repr(patch)}')
+        return self._solve(self._rows(poses_a, poses_b, size_a, size_b, sizes, pairs, threads),
+                           bool(patch))
+
+    def _distance_general(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Nearest:
+        """Return what `distance` does, for poses of any kind; ValueError as of a call."""
+        return self._find_distances(self._pair(pose_a, pose_b))[0]
+
+    def _distance_batch_general(self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,
+                                size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
+                                sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
+                                threads: int = 1) -> Nearests:
+        """Return what `distance_batch` does, for arguments of any kind; ValueError likewise."""
+        return self._find_distances(
+            self._rows(poses_a, poses_b, size_a, size_b, sizes, pairs, threads))
+
+    def _pair(self, pose_a: ArrayLike, pose_b: ArrayLike) -> _Asked:
+        """Return one pair of poses of any kind of numbers."""
+        a = as_floats(pose_a, 'pose_a', 'a pose (x y z qx qy qz qw)', (7,)).reshape(1, 7)
+        b = as_floats(pose_b, 'pose_b', 'a pose (x y z qx qy qz qw)', (7,)).reshape(1, 7)
+        return _Asked(a, b, _known(self._size_a, 'size_a'), _known(self._size_b, 'size_b'),
+                      _SINGLE)
+
+    def _rows(self, poses_a: ArrayLike, poses_b: ArrayLike | None, size_a: ArrayLike | None,
+              size_b: ArrayLike | None, sizes: ArrayLike | None, pairs: ArrayLike | None,
+              threads: int) -> _Asked:
+        """Return the rows of a batch whose arguments are of any kind of numbers."""
+        threads = as_whole(threads, 'threads', 1, THREADS_MAX)
         if pairs is not None:
             if poses_b is not None or size_a is not None or size_b is not None:
                 raise ValueError('pairs are places in poses and sizes: batch(poses, sizes=…, '
                                  'pairs=…) has neither poses_b nor size_a nor size_b')
-            plain = as_pairs(pairs, 'pairs')
-            if plain is not pairs:  # often all that C++ could not read
-                return self.batch(poses_a, sizes=sizes, pairs=plain, threads=threads, patch=patch)
+            pairs = as_pairs(pairs, 'pairs')
             poses = as_floats(poses_a, 'poses', 'poses (m, 7) of rows x y z qx qy qz qw', (None, 7))
             rows_a = self._sizes(sizes, 'sizes', self._size_a, len(poses))
             rows_b = self._sizes(sizes, 'sizes', self._size_b, len(poses))
-            places = as_places(pairs, 'pairs', len(poses))
-            return self._solve(poses, poses, rows_a, rows_b, _BY_PLACE, threads, patch, places)
+            return _Asked(poses, poses, rows_a, rows_b, _BY_PLACE, threads,
+                          as_places(pairs, 'pairs', len(poses)))
         if sizes is not None or poses_b is None:
             raise ValueError('batch takes (poses_a, poses_b), or (poses, sizes=…, pairs=…)')
         a = as_floats(poses_a, 'poses_a', 'poses (n, 7) of rows x y z qx qy qz qw', (None, 7))
         b = as_floats(poses_b, 'poses_b', 'poses (n, 7) of rows x y z qx qy qz qw', (None, 7))
         if len(a) != len(b):
             raise ValueError(f'poses_a and poses_b must be equally many, not {len(a)} and {len(b)}')
-        return self._solve(a, b, self._sizes(size_a, 'size_a', self._size_a, len(a)),
-                           self._sizes(size_b, 'size_b', self._size_b, len(a)), _MANY, threads,
-                           patch)
+        return _Asked(a, b, self._sizes(size_a, 'size_a', self._size_a, len(a)),
+                      self._sizes(size_b, 'size_b', self._size_b, len(a)), _MANY, threads)
 
     @staticmethod
     def _sizes(size: ArrayLike | None, name: str, default: np.ndarray | None, count: int,
@@ -139,38 +183,44 @@ class ContactSolver(native.PairSolver):
         array = as_floats(size, name, f'full extents (3,) or ({count}, 3)', (3,), (count, 3))
         return as_size(array, name) if array.ndim == 1 else array
 
-    def _solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
-               names: Names, threads: int = 1, patch: bool = True,
-               places: np.ndarray | None = None) -> Contacts:
+    def _solve(self, asked: _Asked, patch: bool = True) -> Contacts:
+        a, b, size_a, size_b, _, threads, places = asked
         if self._native is not None:
-            contacts, refused = self._native.solve(a, b, size_a, size_b, threads, bool(patch),
-                                                   places, self._margin)
+            contacts, refused = self._native.solve(a, b, size_a, size_b, threads, patch, places,
+                                                   self._margin)
         else:
             if places is not None:
                 first, second = places.T
                 size_a = size_a if len(size_a) == 1 else size_a[first]
                 size_b = size_b if len(size_b) == 1 else size_b[second]
-                a, b, places = a[first], b[second], None
+                a, b = a[first], b[second]
             contacts, refused = self._model.solve(a, b, size_a, size_b, threads)
             contacts = contacts if patch else without_patch(contacts)
         if refused >= 0:
-            at = (refused, refused) if places is None else tuple(places[refused])
-            raise ValueError(self._refusal(a, b, size_a, size_b, at, names))
+            raise ValueError(self._refusal(asked, refused))
         return contacts
 
-    def _refusal(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
-                 at: tuple[int, int], names: Names) -> str:
-        """Return why a pair is refused, by anyone or by the model; at: places of A and of B."""
-        for values, name, fault_of, row in ((a, names[0], pose_fault, at[0]),
-                                            (b, names[1], pose_fault, at[1]),
-                                            (size_a, names[2], size_fault, at[0]),
-                                            (size_b, names[3], size_fault, at[1])):
-            if fault := fault_of(values[row % len(values)]):
-                numbered = name.startswith('poses') or len(a) > 1
+    def _find_distances(self, asked: _Asked) -> Nearests:
+        a, b, size_a, size_b, _, threads, places = asked
+        nearests, refused = native.distances(a, b, size_a, size_b, threads, places)
+        if refused >= 0:
+            raise ValueError(self._refusal(asked, refused))
+        return nearests
+
+    def _refusal(self, asked: _Asked, row: int) -> str:
+        """Return why a row is refused, by anyone or by the model."""
+        of_a, of_b = (row, row) if asked.places is None else asked.places[row]
+        for values, name, fault_of, place in ((asked.a, asked.names[0], pose_fault, of_a),
+                                              (asked.b, asked.names[1], pose_fault, of_b),
+                                              (asked.size_a, asked.names[2], size_fault, of_a),
+                                              (asked.size_b, asked.names[3], size_fault, of_b)):
+            if fault := fault_of(values[place % len(values)]):
+                numbered = name.startswith('poses') or len(asked.a) > 1
                 order = '; a pose is x y z qx qy qz qw' if fault_of is pose_fault else ''
-                return f'{name}[{row}] {fault}{order}' if numbered else f'{name} {fault}{order}'
-        fault = self._size_fault(size_a[at[0] % len(size_a)], size_b[at[1] % len(size_b)])
-        return fault or f'model {short_repr(self.model)} refuses row {at[0]}'
+                return f'{name}[{place}] {fault}{order}' if numbered else f'{name} {fault}{order}'
+        fault = self._size_fault(asked.size_a[of_a % len(asked.size_a)],
+                                 asked.size_b[of_b % len(asked.size_b)])
+        return fault or f'model {short_repr(self.model)} refuses row {of_a}'
 
 
 def _known(size: np.ndarray | None, name: str) -> np.ndarray:

@@ -1,7 +1,7 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-/* The C interface as a C program uses it: contacts, rows, refusals. The exit status is 1 if a check
+/* The C interface as a C program uses it: contacts, rows, distances, refusals. The exit status is 1 if a check
  * failed. */
 #include <math.h>
 #include <stdio.h>
@@ -92,6 +92,48 @@ static void check_rows(void) {
   check(bc_collide_rows(NULL, NULL, &results, 1, NULL) == BC_BAD_ARGUMENT, "no rows");
 }
 
+static void check_distances(void) {
+  bc_box a = cube_at(0.0), b = cube_at(4.0);
+  b.pose.position[0] = 5.0;
+  bc_nearest nearest = {.size = sizeof nearest};
+  check(bc_distance(&a, &b, &nearest) == BC_OK && !nearest.colliding, "distance");
+  check(fabs(nearest.distance - sqrt(13.0)) < 1e-15, "edge to edge");
+  check(nearest.point_a[0] == 1.0 && nearest.point_a[1] == 0.0 && nearest.point_a[2] == 1.0 &&
+            nearest.point_b[0] == 4.0 && nearest.point_b[1] == 0.0 && nearest.point_b[2] == 3.0,
+        "the middles of the edges");
+  check(fabs(nearest.normal[0] - 3.0 / sqrt(13.0)) < 1e-15, "the way between them");
+  b = cube_at(1.5);
+  check(bc_distance(&a, &b, &nearest) == BC_OK && nearest.colliding, "in contact");
+  check(nearest.distance == 0.0 && nearest.normal[2] == 1.0, "no distance");
+  check(fabs(nearest.point_a[2] - 0.75) < 1e-9 && nearest.point_a[2] == nearest.point_b[2],
+        "the contact point twice");
+  b.size.extent[0] = 0.0;
+  check(bc_distance(&a, &b, &nearest) == BC_BAD_SIZE && nearest.colliding, "a flat box");
+  b.size.extent[0] = 2.0;
+  nearest.size = 8;
+  check(bc_distance(&a, &b, &nearest) == BC_BAD_ABI, "another struct");
+
+  bc_pose poses[3] = {cube_at(0.0).pose, cube_at(1.5).pose, cube_at(4.0).pose};
+  int64_t pairs[6] = {0, 1, 1, 2, 2, 0}, refused = 7;
+  bc_rows rows = {sizeof rows, 3, 3, poses, poses, &a.size, &a.size, 1, 1, pairs};
+  bool colliding[3];
+  double distance[3], point_a[9];
+  bc_nearest_results results = {sizeof results, colliding, distance, NULL, point_a, NULL};
+  check(bc_distance_rows(&rows, &results, 2, &refused) == BC_OK && refused == -1, "rows");
+  check(distance[0] == 0.0 && distance[1] == 0.5 && distance[2] == 2.0, "by place");
+  check(colliding[0] && !colliding[1] && point_a[5] == 2.5 && point_a[8] == 3.0, "fields");
+  poses[0].quaternion[3] = 0.0;
+  check(bc_distance_rows(&rows, &results, 1, &refused) == BC_BAD_ROWS && refused == 0,
+        "a bad pose");
+  check(strstr(bc_error_text(), "row 0: pose_a quaternion (0, 0, 0, 0) has no length"),
+        "its words");
+  check(isnan(distance[0]) && !colliding[0] && distance[1] == 0.5, "the others are solved");
+  check(bc_distance_rows(&rows, NULL, 1, NULL) == BC_BAD_ARGUMENT, "no results");
+  check(bc_distance_rows(&rows, &results, 0, NULL) == BC_BAD_ARGUMENT, "no threads");
+  rows.count = INT64_C(1) << 57;
+  check(bc_distance_rows(&rows, &results, 1, NULL) == BC_BAD_ARGUMENT, "more rows than memory");
+}
+
 static void check_refusals(void) {
   bc_box a = cube_at(0.0), flat = cube_at(1.0), nowhere = cube_at(NAN);
   bc_contact contact = {0};
@@ -170,6 +212,7 @@ int main(void) {
   check(bc_abi() == BC_ABI, "ABI");
   check_contacts();
   check_rows();
+  check_distances();
   check_broad_phase();
   check_refusals();
   printf("%s, %s: %d failures\n", bc_version(), bc_instruction_set(), failures);

@@ -74,6 +74,9 @@ for model in ('exact', 'mlp'):
     solver = ContactSolver(model=model)
     many = solver.batch(*columns[:2], size_a=columns[2], size_b=columns[3])
     found |= {f'{model} {name}': getattr(many, name) for name in FIELDS}
+nearest = solver.distance_batch(*columns[:2], size_a=columns[2], size_b=columns[3])
+for name in ('distance', 'normal', 'point_a', 'point_b'):
+    found[f'nearest {name}'] = getattr(nearest, name)
 strange = native.Mlp(pairs['network'])
 contacts = strange.solve(*columns, 1)[0]
 found |= {f'strange {name}': getattr(contacts, name) for name in FIELDS}
@@ -88,7 +91,7 @@ np.savez(sys.argv[2], **found)
 
 
 def test_every_instruction_set_gives_the_same_bits(tmp_path: Path) -> None:
-    """All answers of both models and of a random network, 70,000 pairs and the hard poses."""
+    """All answers of both models and of a random network, distances; 70,000 pairs, hard poses."""
     if len(SETS_HERE) == 1:
         pytest.skip('this machine has one instruction set only')
     pairs = poses.joined(poses.of_all_kinds(10_000, 1), poses.hard_pairs())
@@ -387,10 +390,14 @@ def everything_once(solver: ContactSolver, pairs: Pairs) -> None:
     solver(poses.IDENTITY, ABOVE)
     solver(poses.IDENTITY, ABOVE + (0, 0, 99, 0, 0, 0, 0))
     solver(list(poses.IDENTITY), ABOVE)
+    solver.distance(poses.IDENTITY, ABOVE + (0, 0, 99, 0, 0, 0, 0))
+    solver.distance(pose_a=list(poses.IDENTITY), pose_b=ABOVE)
+    solver.distance_batch(pairs.pose_a, pairs.pose_b, size_a=pairs.size_a, size_b=pairs.size_b)
     solve(solver, pairs, 2)
     for bad in (np.zeros(7), np.zeros(6), None):
-        with pytest.raises(ValueError):
-            solver(poses.IDENTITY, bad)
+        for call in (solver, solver.distance):
+            with pytest.raises(ValueError):
+                call(poses.IDENTITY, bad)
     with pytest.raises(ValueError):
         solve(solver, pairs._replace(pose_b=0.0 * pairs.pose_b), 2)
     native.PairSolver(None)

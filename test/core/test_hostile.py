@@ -84,6 +84,7 @@ def test_null_pointers(library: CLibrary) -> None:
     """In the place of each argument that must not be one."""
     pose, contact, rows = (c_double * 7)(0, 0, 0, 0, 0, 0, 1), (c_double * 64)(), Rows()
     rows.size, results = ctypes.sizeof(Rows), Results(ctypes.sizeof(Results))
+    nearest, nearest_results = (c_int64 * 12)(12 * 8), (c_int64 * 6)(6 * 8)
     answer = (c_int64 * 13)(13 * 8)  # a bc_patches without rows
     body_box = (c_double * 11)(0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1)
     step, motion = c_double(0.001), (c_int64 * 4)(4 * 8)  # a bc_motion that wants nothing
@@ -91,6 +92,8 @@ def test_null_pointers(library: CLibrary) -> None:
     calls: list[tuple[Callable[..., int], list[object], set[int]]] = [
         (library.bc_collide, [box, box, None, contact], {0, 1, 3}),
         (library.bc_collide_rows, [byref(rows), None, byref(results), 1, None], {0, 2}),
+        (library.bc_distance, [box, box, nearest], {0, 1, 2}),
+        (library.bc_distance_rows, [byref(rows), nearest_results, 1, None], {0, 1}),
         (library.bc_patch_forces_create,
          [(c_double * 7)(1, 1, 1, 1), c_int64(1), None, byref(made)], {0, 3}),
         (library.bc_patch_forces_copy, [library.forces, byref(made)], {0, 1}),

@@ -187,6 +187,7 @@ def threads_that_are_none() -> None:
     one = np.ones((1, 3))
     for threads in (0, -1, -2**63, 1025, 2**62):
         refused(ValueError, exact().solve, rows(), rows(), one, one, threads)
+        refused(ValueError, native.distances, rows(), rows(), one, one, threads, None)
 
 
 def extreme_numbers() -> None:
@@ -196,6 +197,7 @@ def extreme_numbers() -> None:
         for solver in (exact(), native.Mlp(a_network(rng))):
             pairs = poses.extreme_pairs(rng, 200)
             solver.solve(*pairs, 2)
+            native.distances(*pairs, 2, None)
             for row in range(0, 200, 10):
                 solver.solve(*(part[row:row + 1] for part in pairs), 1)
 
@@ -276,6 +278,7 @@ def pairs_changed_meanwhile() -> None:
     for _ in range(100):
         try:
             refused += solver.solve(rows(2), rows(2), one, one, 2, True, pairs)[1] >= 0
+            refused += native.distances(rows(2), rows(2), one, one, 2, pairs)[1] >= 0
         except ValueError:
             refused += 1
     stop.set()
@@ -294,6 +297,11 @@ def random_calls(seed: int, rounds: int) -> None:
         (public.batch, [rows(), rows()], {'size_a': boxes, 'threads': 2, 'patch': True}),
         (public.batch, [rows(), rows()], {'size_b': boxes, 'threads': 2, 'patch': False}),
         (public.batch, [rows()], {'sizes': boxes, 'pairs': places}),
+        (public.distance, [POSE, ABOVE], {}),
+        (public.distance_batch, [rows(), rows()], {'size_a': boxes, 'threads': 2}),
+        (public.distance_batch, [rows()], {'sizes': boxes, 'pairs': places}),
+        (native.distances, [rows(), rows(), one, one, 2, places], {}),
+        (native.Nearest, [True, 0.0, np.ones(3), np.ones(3), np.ones(3)], {}),
         (solver.solve, [rows(), rows(), one, one, 2, True, places, 0.1], {}),
         (native.Contact, [True, -1.0, np.ones(3), np.ones(3), 1.0, np.eye(3), 2], {}),
         (native.write_poses, [rows(), np.array([3, 0]), [POSE, None]], {}),

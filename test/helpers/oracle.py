@@ -10,6 +10,7 @@ one side of a pyramid whose apex lies inside. Pyramids are cut into tetrahedra.
 """
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -91,6 +92,59 @@ def axis_gaps(a, b):
 def separation(a, b):
     """Largest gap over the axes."""
     return max(gap for _, _, gap in axis_gaps(a, b))
+
+
+def nearest(a, b):
+    """Return the distance of two boxes apart, a nearest point on each, and the distance's doubt.
+
+    Where no edges cross, a vertex of one box is nearest to the other: 16 vertices are clamped, and
+    the crossings of all 144 pairs of edges tried. The gap along the way found is a lower bound of
+    the distance; the doubt is what it stays below.
+    """
+    found = [*_clamped(a, b), *((p, q) for q, p in _clamped(b, a)), *_crossings(a, b)]
+    p, q = min(found, key=lambda points: dot(*2 * [add(points[1], points[0], -1)]))
+    way = add(q, p, -1)
+    distance = sqrt(dot(way, way))
+    direction = scaled(way, 1 / distance)
+    gap = dot(add(b.centre, a.centre, -1), direction) - a.width(direction) - b.width(direction)
+    return distance, p, q, distance - gap
+
+
+def _clamped(a, b):
+    """Yield each vertex of A and its nearest point on B."""
+    for signs in itertools.product((-1, 1), repeat=3):
+        vertex = a.centre
+        for sign, half, axis in zip(signs, a.half, a.axes):
+            vertex = add(vertex, axis, sign * half)
+        point = b.centre
+        for half, axis in zip(b.half, b.axes):
+            along = dot(add(vertex, b.centre, -1), axis)
+            point = add(point, axis, max(-half, min(half, along)))
+        yield vertex, point
+
+
+def _edges(box):
+    """Yield the middle, unit direction and half length of each edge."""
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        for s, t in itertools.product((-1, 1), repeat=2):
+            middle = add(add(box.centre, box.axes[i], s * box.half[i]), box.axes[j],
+                         t * box.half[j])
+            yield middle, box.axes[k], box.half[k]
+
+
+def _crossings(a, b):
+    """Yield the nearest points of the lines of two edges, where both are within their edges."""
+    for middle_a, u, half_a in _edges(a):
+        for middle_b, v, half_b in _edges(b):
+            normal, between = cross(u, v), add(middle_b, middle_a, -1)
+            length2 = dot(normal, normal)
+            if length2 < SAME * SAME:
+                continue
+            on_a = dot(cross(between, v), normal) / length2
+            on_b = dot(cross(between, u), normal) / length2
+            if abs(on_a) <= half_a and abs(on_b) <= half_b:
+                yield add(middle_a, u, on_a), add(middle_b, v, on_b)
 
 
 def _clip(polygon, axis, bound, drop_on_plane):

@@ -7,9 +7,11 @@ The policy: docs/reference/conventions.md, "Bad input". test_faults.py has the n
 """
 from __future__ import annotations
 
+import itertools
 import math
 from decimal import Decimal
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 import poses
@@ -128,15 +130,16 @@ def test_a_bad_number_in_a_pose(place, value):
     solver, bad = SOLVERS['exact'], TILTED.copy()
     bad[place] = value
     words = f'{value:g}'.replace('+', r'\+')
-    for kind in (np.array, list):
+    for kind, call in itertools.product((np.array, list), (solver, solver.distance)):
         with pytest.raises(ValueError, match=f'^pose_a (position|quaternion) .*{words}'):
-            solver(kind(bad), kind(ABOVE))
+            call(kind(bad), kind(ABOVE))
         with pytest.raises(ValueError, match=f'^pose_b (position|quaternion) .*{words}'):
-            solver(kind(ABOVE), kind(bad))
+            call(kind(ABOVE), kind(bad))
     rows = np.tile(ABOVE, (11, 1))
     rows[9] = bad
-    with pytest.raises(ValueError, match=rf'^poses_b\[9\] (position|quaternion) .*{words}'):
-        solver.batch(np.tile(ABOVE, (11, 1)), rows)
+    for call in (solver.batch, solver.distance_batch):
+        with pytest.raises(ValueError, match=rf'^poses_b\[9\] (position|quaternion) .*{words}'):
+            call(np.tile(ABOVE, (11, 1)), rows)
 
 
 @pytest.mark.parametrize('axis', range(3))
@@ -156,10 +159,11 @@ def test_a_bad_extent(axis, value):
         rows = np.tile(poses.CUBE, (11, 1))
         rows[9] = bad
         good = np.tile(ABOVE, (11, 1))
-        with pytest.raises(ValueError, match=rf'^{name}\[9\] \(.*{words}.*\) is '):
-            SOLVERS['exact'].batch(good, good, **{name: rows})
-        with pytest.raises(ValueError, match=rf'^{name} \(.*{words}.*\) is '):
-            SOLVERS['exact'].batch(good, good, **{name: bad})
+        for call in (SOLVERS['exact'].batch, SOLVERS['exact'].distance_batch):
+            with pytest.raises(ValueError, match=rf'^{name}\[9\] \(.*{words}.*\) is '):
+                call(good, good, **{name: rows})
+            with pytest.raises(ValueError, match=rf'^{name} \(.*{words}.*\) is '):
+                call(good, good, **{name: bad})
 
 
 any_float = st.one_of(st.floats(), st.floats(-3, 3), st.sampled_from(
@@ -305,12 +309,13 @@ def test_what_is_no_pose(strange):
     NumPy alone would read '1' as 1, None as NaN and a date as a number, and drop imaginary parts.
     """
     solver = SOLVERS['exact']
-    asked = [(lambda: solver(strange, ABOVE), 'pose_a'),
-             (lambda: solver(ABOVE, strange), 'pose_b'),
-             (lambda: solver.batch([strange], [ABOVE]), 'poses_a'),
-             (lambda: solver.batch([ABOVE], [strange]), 'poses_b'),
-             (lambda: solver.batch([ABOVE], [ABOVE], size_b=[strange]), 'size_b'),
-             (lambda: ContactSolver([strange], poses.CUBE), 'size_a')]
+    asked = [(lambda: ContactSolver([strange], poses.CUBE), 'size_a')]
+    for one, many in ((solver, solver.batch), (solver.distance, solver.distance_batch)):
+        asked += [(partial(one, strange, ABOVE), 'pose_a'),
+                  (partial(one, ABOVE, strange), 'pose_b'),
+                  (partial(many, [strange], [ABOVE]), 'poses_a'),
+                  (partial(many, [ABOVE], [strange]), 'poses_b'),
+                  (partial(many, [ABOVE], [ABOVE], size_b=[strange]), 'size_b')]
     if not (isinstance(strange, list) and not strange):  # an empty list has no rows
         asked.append((lambda: solver.batch(strange, [ABOVE]), 'poses_a'))
     for ask, field in asked:
@@ -321,8 +326,9 @@ def test_what_is_no_pose(strange):
 
 
 def test_no_rows_beside_a_row():
-    with pytest.raises(ValueError, match='^poses_a and poses_b must be equally many'):
-        SOLVERS['exact'].batch([], [ABOVE])
+    for call in (SOLVERS['exact'].batch, SOLVERS['exact'].distance_batch):
+        with pytest.raises(ValueError, match='^poses_a and poses_b must be equally many'):
+            call([], [ABOVE])
 
 
 def test_a_long_double_beyond_float64():

@@ -14,6 +14,7 @@
 #include "../src/mlp/format.hpp"
 #include "../src/mlp/shipped_network.hpp"
 #include "contacts.hpp"
+#include "nearest.hpp"
 #include "pair_arrays.hpp"
 
 namespace box_contact::binding {
@@ -127,19 +128,33 @@ inline PyObject* network_reduce(PyObject* self, PyObject*) {
   return Py_BuildValue("(O(N))", Py_TYPE(self), array.object.release());
 }
 
+inline long read_threads(PyObject* number) {
+  long threads = whole_of(number);
+  if (threads < 1 || threads > detail::threads_max)
+    fail(PyExc_ValueError, "threads must be within 1 and 1024");
+  return threads;
+}
+
 inline PyObject* model_solve(PyObject* self, PyObject* const* args, Py_ssize_t count) {
   if (count < 4 || count > 8)
     fail(PyExc_TypeError,
          "solve(a, b, size_a, size_b, threads=1, patch=True, pairs=None, margin=0.0)");
-  long threads = count > 4 ? whole_of(args[4]) : 1;
+  long threads = count > 4 ? read_threads(args[4]) : 1;
   bool patch = count > 5 ? truth_of(args[5]) : true;
   double margin = count > 7 ? PyFloat_AsDouble(args[7]) : 0.0;
   if (PyErr_Occurred()) return nullptr;
-  if (threads < 1 || threads > detail::threads_max)
-    fail(PyExc_ValueError, "threads must be within 1 and 1024");
   PairArrays pairs(args, count > 6 ? args[6] : Py_None);
   ContactArrays found{pairs.count, patch};
   long refused = ModelObject::of(self)->solve(pairs.rows, found, margin, threads);
+  return Py_BuildValue("(Nl)", found.release(), refused);
+}
+
+inline PyObject* distances(PyObject*, PyObject* const* args, Py_ssize_t count) {
+  if (count != 6) fail(PyExc_TypeError, "distances(a, b, size_a, size_b, threads, pairs)");
+  long threads = read_threads(args[4]);
+  PairArrays pairs(args, args[5]);
+  NearestArrays found{pairs.count};
+  long refused = found.find(*kernel, pairs.rows, threads);
   return Py_BuildValue("(Nl)", found.release(), refused);
 }
 

@@ -30,6 +30,11 @@ PyMethodDef module_methods[] = {
      "Return the instruction sets that were built and that this machine can run, best last."},
     {"use_contacts", method<use_contacts>(), METH_O,
      "use_contacts(type)\n--\n\nSet the class of what batches return: with a slot for each field."},
+    {"use_nearests", method<use_nearests>(), METH_O,
+     "use_nearests(type)\n--\n\nSet the same of `distance_batch`."},
+    {"distances", method<distances>(), METH_FASTCALL,
+     "distances(a, b, size_a, size_b, threads, pairs)\n--\n\n"
+     "Return Nearests, and the first refused row or -1; arguments as of the models' `solve`."},
     {"pose_fault", method<pose_fault>(), METH_O,
      "pose_fault(pose)\n--\n\nReturn why seven numbers are no pose, a PoseFault; 0 if they are."},
     {"pose_faults", method<pose_faults>(), METH_O,
@@ -74,11 +79,14 @@ PyObject* make_module() {
   import_array1(nullptr);
   kernel = detail::chosen_kernel();
   contact_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&contact_spec)));
+  nearest_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&nearest_spec)));
   exact_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&exact_spec)));
   mlp_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&mlp_spec)));
   paper_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&paper_spec)));
   name_call_general = made(PyUnicode_InternFromString("_call_general"));
   name_batch_general = made(PyUnicode_InternFromString("_batch_general"));
+  name_distance_general = made(PyUnicode_InternFromString("_distance_general"));
+  name_distance_batch_general = made(PyUnicode_InternFromString("_distance_batch_general"));
   Owned module(made(PyModule_Create(&module_definition)));
   auto add = [&](const char* name, PyObject* value) {
     Owned owned(made(value));
@@ -89,6 +97,7 @@ PyObject* make_module() {
   add("lanes", PyLong_FromLong(kernel ? kernel->lanes : 0));
   add("compiler", PyUnicode_FromString(__VERSION__));
   add("Contact", Py_NewRef(contact_type));
+  add("Nearest", Py_NewRef(nearest_type));
   add("Exact", Py_NewRef(exact_type));
   add("Mlp", Py_NewRef(mlp_type));
   add("Paper", Py_NewRef(paper_type));

@@ -16,6 +16,8 @@ namespace box_contact::binding {
 
 inline PyObject* name_call_general = nullptr;  // of the methods for what is no plain array
 inline PyObject* name_batch_general = nullptr;
+inline PyObject* name_distance_general = nullptr;
+inline PyObject* name_distance_batch_general = nullptr;
 
 // Who answers, and the sizes of the boxes, where they are known.
 struct Setup {
@@ -104,7 +106,7 @@ struct PlainBatch {
   bool patch = true;
 
   // Returns false for what Python has to convert or to refuse.
-  bool read(PyObject* args, PyObject* keywords, const Setup& setup) {
+  bool read(PyObject* args, PyObject* keywords, const Setup& setup, bool takes_patch) {
     Py_ssize_t given = PyTuple_GET_SIZE(args);
     if (given != 1 && given != 2) return false;
     rows = setup.rows();
@@ -117,7 +119,7 @@ struct PlainBatch {
     count = poses;
     PyObject *key, *value;
     for (Py_ssize_t place = 0; keywords && PyDict_Next(keywords, &place, &key, &value);)
-      if (!PyUnicode_Check(key) || !read_keyword(key, value)) return false;
+      if (!PyUnicode_Check(key) || !read_keyword(key, value, takes_patch)) return false;
     bool are_known = rows.sizes_a == setup.size_a && rows.sizes_b == setup.size_b;
     if (setup.model->kind == Model::paper && !are_known) return false;  // Python checks new sizes
     return rows.sizes_a && rows.sizes_b && by_place == (rows.pairs != nullptr);
@@ -126,7 +128,7 @@ struct PlainBatch {
  private:
   bool by_place = false;  // batch(poses, sizes=…, pairs=…)
 
-  bool read_keyword(PyObject* key, PyObject* value) {
+  bool read_keyword(PyObject* key, PyObject* value, bool takes_patch) {
     auto is = [key](const char* name) { return PyUnicode_CompareWithASCIIString(key, name) == 0; };
     if (is("size_a")) return !by_place && read_sizes(value, rows.sizes_a, rows.size_step_a);
     if (is("size_b")) return !by_place && read_sizes(value, rows.sizes_b, rows.size_step_b);
@@ -134,7 +136,7 @@ struct PlainBatch {
       return by_place && read_sizes(value, rows.sizes_a, rows.size_step_a) &&
              read_sizes(value, rows.sizes_b, rows.size_step_b);
     if (is("pairs")) return by_place && read_pairs(value);
-    if (is("patch") && PyBool_Check(value)) return patch = value == Py_True, true;
+    if (takes_patch && is("patch") && PyBool_Check(value)) return patch = value == Py_True, true;
     if (!is("threads") || !PyLong_CheckExact(value)) return false;
     int overflow;
     threads = PyLong_AsLongAndOverflow(value, &overflow);
@@ -157,12 +159,38 @@ struct PlainBatch {
 inline PyObject* solver_batch(PyObject* self, PyObject* args, PyObject* keywords) {
   Setup* setup = Holder<PairSolver>::of(self).setup.get();
   PlainBatch plain;
-  if (setup && plain.read(args, keywords, *setup)) {
+  if (setup && plain.read(args, keywords, *setup, true)) {
     ContactArrays found{plain.count, plain.patch};
     if (setup->model->solve(plain.rows, found, setup->margin, plain.threads) < 0)
       return found.release();
   }
   return call_method(self, name_batch_general, args, keywords);
+}
+
+inline PyObject* solver_distance(PyObject* self, PyObject* const* args, Py_ssize_t count,
+                                 PyObject* names) {
+  Setup* setup = Holder<PairSolver>::of(self).setup.get();
+  if (setup && setup->has_size_a && setup->has_size_b && !names && count == 2) {
+    double copy_a[7], copy_b[7];
+    const double* a = numbers_of(args[0], 7, copy_a);
+    const double* b = a ? numbers_of(args[1], 7, copy_b) : nullptr;
+    bc_nearest nearest;
+    nearest.size = sizeof nearest;
+    if (b && kernel->nearest_pair(setup->pair(a, b), nearest))
+      return Nearest::make(nearest_type, std::move(nearest));
+  }
+  Owned general(made(PyObject_GetAttr(self, name_distance_general)));
+  return PyObject_Vectorcall(general.get(), args, size_t(count), names);
+}
+
+inline PyObject* solver_distance_batch(PyObject* self, PyObject* args, PyObject* keywords) {
+  Setup* setup = Holder<PairSolver>::of(self).setup.get();
+  PlainBatch plain;
+  if (setup && plain.read(args, keywords, *setup, false)) {
+    NearestArrays found{plain.count};
+    if (found.find(*kernel, plain.rows, plain.threads) < 0) return found.release();
+  }
+  return call_method(self, name_distance_batch_general, args, keywords);
 }
 
 inline PyMethodDef solver_methods[] = {
@@ -177,6 +205,15 @@ inline PyMethodDef solver_methods[] = {
      "depends on their number. Without `patch` volume and covariance are not computed, and are "
      "NaN;\n"
      "points then have the same error bounds, not always the same bits."},
+    {"distance", method<solver_distance>(), METH_FASTCALL | METH_KEYWORDS,
+     "distance($self, pose_a, pose_b)\n--\n\n"
+     "Return how far boxes at two poses (7,) are apart, and between which points: a Nearest.\n\n"
+     "Boxes in contact have the distance 0, and the contact point and normal of model exact."},
+    {"distance_batch", method<solver_distance_batch>(), METH_VARARGS | METH_KEYWORDS,
+     "distance_batch($self, poses_a, poses_b=None, *, size_a=None, size_b=None, sizes=None, "
+     "pairs=None, threads=1)\n--\n\n"
+     "Return the Nearests of n pairs: row i is what `distance` gives for row i.\n\n"
+     "Poses, sizes, pairs and threads are those of `batch`."},
     {nullptr, nullptr, 0, nullptr}};
 inline PyType_Slot solver_slots[] = {
     {Py_tp_doc,

@@ -4,11 +4,11 @@
 // One kernel. It is compiled once for each instruction set, which names it.
 #include "kernel.hpp"
 
+#include "distance/nearest.hpp"
 #include "mlp/mlp_model.hpp"
 #include "mlp/paper_model.hpp"
 #include "overlap/exact.hpp"
 #include "pair.hpp"
-#include "queue.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
 namespace {
@@ -51,6 +51,16 @@ long rows_by(const float* network, const Rows& rows, long begin, long end, const
   return solve_rows<Lanes<double, lanes>>(model_of<M>(network), rows, begin, end, results);
 }
 
+bool nearest_pair(const detail::PairNumbers& pair, bc_nearest& nearest) {
+  auto collide = [](const detail::PairNumbers& touching, bc_contact& contact) {
+    pair_by<ExactModel>(nullptr, touching, 0.0, contact);
+  };
+  return solve_nearest(pair, collide, nearest);
+}
+long nearest_rows(const Rows& rows, long begin, long end, const NearestResults& results) {
+  return solve_nearest_rows<Lanes<double, lanes>>(rows, begin, end, results);
+}
+
 }  // namespace
 }  // namespace box_contact::BOX_CONTACT_SET
 
@@ -64,6 +74,8 @@ const Kernel KERNEL = {name,
                         {pair_by<PaperModel>, pair_by<PaperModel>}},
                        {{rows_by<ExactPointModel>, rows_by<ExactModel>},
                         {rows_by<MlpPointModel>, rows_by<MlpModel>},
-                        {rows_by<PaperModel>, rows_by<PaperModel>}}};
+                        {rows_by<PaperModel>, rows_by<PaperModel>}},
+                       nearest_pair,
+                       nearest_rows};
 
 }  // namespace box_contact::detail

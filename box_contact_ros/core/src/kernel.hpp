@@ -34,6 +34,12 @@ struct Results {
   double margin;  // [m]; normals are given up to this separation
 };
 
+// The same of distances. What is nullptr is not wanted.
+struct NearestResults {
+  bool* colliding;
+  double *distance, *normal, *point_a, *point_b;
+};
+
 enum class Model { exact, mlp, paper };
 constexpr int model_count = 3;
 
@@ -52,6 +58,10 @@ struct Kernel {
   // Solve rows `begin` to `end`. Returns the first row that is refused, or −1.
   long (*solve_rows[model_count][2])(const float* network, const Rows&, long begin, long end,
                                      const Results&);
+
+  // The same of distances.
+  bool (*nearest_pair)(const PairNumbers&, bc_nearest& nearest);
+  long (*nearest_rows)(const Rows&, long begin, long end, const NearestResults&);
 };
 
 extern const Kernel kernel_baseline, kernel_avx2, kernel_avx512;

@@ -1,7 +1,8 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-/* The C interface of libbox_contact: whether two boxes touch, where, and along which direction.
+/* The C interface of libbox_contact: whether two boxes touch, where, and along which direction; or
+ * how far they are apart, and between which points.
  *
  *   bc_box a = {{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}}, {{1.0, 1.0, 1.0}}};
  *   bc_box b = {{{0.0, 0.0, 0.99}, {0.0, 0.0, 0.0, 1.0}}, {{1.0, 1.0, 1.0}}};
@@ -144,6 +145,40 @@ BC_API bc_status bc_collide(const bc_box* a, const bc_box* b, const bc_query* qu
  * solved, and *refused is the first refused row, or −1. `refused` may be NULL. */
 BC_API bc_status bc_collide_rows(const bc_rows* rows, const bc_query* query,
                                  const bc_results* results, int threads, int64_t* refused);
+
+/* How far two boxes are apart, and between which points. Where the nearest points of a box fill a
+ * set, the point is its centroid. Both points tend to the contact point as the boxes come together.
+ *
+ * `normal` is the gradient of the distance by B's position, and −normal by A's. By a turn of B about
+ * its centre the gradient is (point_b − centre of B) × normal; by a turn of A about its centre it is
+ * −(point_a − centre of A) × normal. */
+typedef struct bc_nearest {
+  size_t size;       /* sizeof(bc_nearest) */
+  double distance;   /* [m]; 0 in contact; never below the separation */
+  double normal[3];  /* unit vector from point_a to point_b; in contact that of the contact */
+  double point_a[3]; /* on box A [m]; in contact the contact point */
+  double point_b[3]; /* on box B [m]; likewise */
+  bool colliding;    /* as of bc_collide */
+} bc_nearest;
+
+/* Arrays of a row for each pair, or NULL for what is not wanted. */
+typedef struct bc_nearest_results {
+  size_t size; /* sizeof(bc_nearest_results) */
+  bool* colliding;
+  double* distance;
+  double* normal;  /* (count, 3) */
+  double* point_a; /* (count, 3) */
+  double* point_b; /* (count, 3) */
+} bc_nearest_results;
+
+/* Find the distance of one pair. The contact of boxes that touch is that of model `exact`. On
+ * failure *nearest is as it was. */
+BC_API bc_status bc_distance(const bc_box* a, const bc_box* b, bc_nearest* nearest);
+
+/* Find the distances of many pairs, as bc_collide_rows finds their contacts. Each refused row gets
+ * `colliding` false and `distance` NaN. */
+BC_API bc_status bc_distance_rows(const bc_rows* rows, const bc_nearest_results* results,
+                                  int threads, int64_t* refused);
 
 /* The area [m²] of the patch of a contact with this normal (3) and covariance (3, 3): 12·√(e₁·e₂) by
  * the eigenvalues of the covariance across the normal; NaN where the covariance is. It is that of a

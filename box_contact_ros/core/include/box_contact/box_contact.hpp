@@ -1,7 +1,8 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// The C++17 interface of libbox_contact: whether two boxes touch, where, and along which direction.
+// The C++17 interface of libbox_contact: whether two boxes touch, where, and along which direction;
+// or how far they are apart, and between which points.
 //
 //   box_contact::Box a{{{0.0, 0.0, 1.49}, {0.0, 0.0, 0.0, 1.0}}, {1.0, 1.0, 1.0}};
 //   box_contact::Box b{{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}}, {2.0, 2.0, 2.0}};
@@ -58,6 +59,7 @@ using Size = bc_size;        // full extents along the box's own axes [m]
 using Pose = bc_pose;        // position [m]; quaternion x y z w of any length
 using Box = bc_box;          // pose and size
 using Contact = bc_contact;  // see above
+using Nearest = bc_nearest;  // see box_contact.h
 
 enum class Model { exact = BC_EXACT, mlp = BC_MLP };
 enum class Patch { none = BC_NO_PATCH, volume = BC_VOLUME, covariance = BC_COVARIANCE };
@@ -146,17 +148,25 @@ struct Rows {
   std::optional<Span<const std::int64_t>> pairs{};
 };
 
-// The contacts of many pairs, bit for bit those of single calls. Returns the first row that is refused, or
-// −1. A refused row gets `colliding` false and `separation` NaN, and its other fields have no meaning.
-// All other rows are solved. Throws as for one pair, for arrays of unequal lengths as well, and where a
-// place in `pairs` has no pose. Calls allocate no memory, but for those of several threads.
-inline std::int64_t collide(const Rows& rows, const Results& results, const Query& query = {},
-                            int threads = 1) {
+// Arrays of a row for each pair; nullptr for what is not wanted.
+struct NearestResults {
+  bool* colliding = nullptr;
+  double* distance = nullptr;
+  double* normal = nullptr;   // three numbers a row
+  double* point_a = nullptr;  // three numbers a row
+  double* point_b = nullptr;  // three numbers a row
+};
+
+namespace detail {
+
+// Ask `call` for rows. Returns the first row that is refused, or −1.
+template <class Call>
+std::int64_t ask_rows(const Rows& rows, Call call) {
   auto size = [](const auto& span) { return std::int64_t(span.size()); };
   if (size(rows.poses_a) != size(rows.poses_b))
-    detail::raise(BC_BAD_ARGUMENT, "poses_a and poses_b must be equally many");
+    raise(BC_BAD_ARGUMENT, "poses_a and poses_b must be equally many");
   Span<const std::int64_t> pairs = rows.pairs.value_or(Span<const std::int64_t>());
-  if (pairs.size() % 2) detail::raise(BC_BAD_ARGUMENT, "pairs must be two indices a row");
+  if (pairs.size() % 2) raise(BC_BAD_ARGUMENT, "pairs must be two indices a row");
   const bc_rows plain{sizeof(bc_rows),
                       rows.pairs ? size(pairs) / 2 : size(rows.poses_a),
                       size(rows.poses_a),
@@ -167,18 +177,50 @@ inline std::int64_t collide(const Rows& rows, const Results& results, const Quer
                       size(rows.sizes_a),
                       size(rows.sizes_b),
                       pairs.data()};
-  const bc_results wanted{sizeof(bc_results), results.colliding, results.separation,
-                          results.normal,     results.point,     results.volume,
-                          results.covariance, results.axis};
-  const bc_query asked = detail::plain(query);
   std::int64_t refused = -1;
-  bc_status status = bc_collide_rows(&plain, &asked, &wanted, threads, &refused);
+  bc_status status = call(plain, refused);
   auto is_place = [&](std::int64_t place) { return place >= 0 && place < size(rows.poses_a); };
   bool bad_pose = status == BC_BAD_ROWS &&
                   (!rows.pairs || (is_place(pairs.data()[2 * refused]) &&
                                    is_place(pairs.data()[2 * refused + 1])));
-  if (!bad_pose) detail::check(status);
+  if (!bad_pose) check(status);
   return refused;
+}
+
+}  // namespace detail
+
+// The contacts of many pairs, bit for bit those of single calls. Returns the first row that is
+// refused, or −1. A refused row gets `colliding` false and `separation` NaN, and its other fields
+// have no meaning. All other rows are solved. Throws as for one pair, for arrays of unequal lengths
+// as well, and where a place in `pairs` has no pose. Calls allocate no memory, but for those of
+// several threads.
+inline std::int64_t collide(const Rows& rows, const Results& results, const Query& query = {},
+                            int threads = 1) {
+  const bc_results wanted{sizeof(bc_results), results.colliding, results.separation,
+                          results.normal,     results.point,     results.volume,
+                          results.covariance, results.axis};
+  const bc_query asked = detail::plain(query);
+  return detail::ask_rows(rows, [&](const bc_rows& plain, std::int64_t& refused) {
+    return bc_collide_rows(&plain, &asked, &wanted, threads, &refused);
+  });
+}
+
+// How far two boxes are apart, and between which points. Throws as `collide`.
+inline Nearest distance(const Box& a, const Box& b) {
+  Nearest nearest{};
+  nearest.size = sizeof(Nearest);
+  detail::check(bc_distance(&a, &b, &nearest));
+  return nearest;
+}
+
+// The same of many pairs, as `collide` takes and answers them. A refused row gets `distance` NaN.
+inline std::int64_t distance(const Rows& rows, const NearestResults& results, int threads = 1) {
+  const bc_nearest_results wanted{sizeof(bc_nearest_results), results.colliding,
+                                  results.distance,           results.normal,
+                                  results.point_a,            results.point_b};
+  return detail::ask_rows(rows, [&](const bc_rows& plain, std::int64_t& refused) {
+    return bc_distance_rows(&plain, &wanted, threads, &refused);
+  });
 }
 
 // The area [m²] of a contact's patch; NaN without a covariance. See bc_patch_area.

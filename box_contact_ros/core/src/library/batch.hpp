@@ -56,26 +56,38 @@ inline bool solve_pair(const Solver& solver, const PairNumbers& pair, bc_patch p
 // Rows that a thread takes at a time: some 100 µs of work, and whole blocks.
 constexpr long rows_per_chunk = 512;
 
-inline long solve_in_threads(const Solver& solver, const Rows& rows, long count,
-                             const Results& results, long threads) {
+// Call solve(begin, end), which returns the first row that is refused, or −1, for chunks of `count`
+// rows, in as many threads as are asked for and worth it. Rows are independent, so no bit depends on
+// the number of threads. Returns the first row that is refused, or −1.
+template <class Solve>
+long in_chunks(long count, long threads, const Solve& solve) {
   long chunks = (count + rows_per_chunk - 1) / rows_per_chunk;
+  threads = std::min(threads, chunks);
+  if (threads <= 1) return solve(0, count);
   std::vector<long> refused_of(threads, count);
   in_threads(threads, chunks, [&](long thread, long chunk) {
     long begin = chunk * rows_per_chunk, end = std::min(begin + rows_per_chunk, count);
-    long refused = solver.solve(rows, begin, end, results);
+    long refused = solve(begin, end);
     if (refused >= 0) refused_of[thread] = std::min(refused_of[thread], refused);
   });
   long refused = *std::min_element(refused_of.begin(), refused_of.end());
   return refused < count ? refused : -1;
 }
 
-// Solve `count` rows, in as many threads as are asked for and worth it. Rows are independent, so no bit
-// depends on the number of threads. Returns the first row that is refused, or −1.
+// Solve `count` rows. Returns the first row that is refused, or −1.
 inline long solve_rows(const Solver& solver, const Rows& rows, long count, const Results& results,
                        long threads) {
-  threads = std::min(threads, (count + rows_per_chunk - 1) / rows_per_chunk);
-  return threads <= 1 ? solver.solve(rows, 0, count, results)
-                      : solve_in_threads(solver, rows, count, results, threads);
+  return in_chunks(count, threads, [&](long begin, long end) {
+    return solver.solve(rows, begin, end, results);
+  });
+}
+
+// The same of distances.
+inline long nearest_rows(const Kernel& kernel, const Rows& rows, long count,
+                         const NearestResults& results, long threads) {
+  return in_chunks(count, threads, [&](long begin, long end) {
+    return kernel.nearest_rows(rows, begin, end, results);
+  });
 }
 
 }  // namespace box_contact::detail

@@ -123,8 +123,9 @@ bc_status check_rows(const bc_rows& rows, int threads, int64_t& refused) {
               (long long)rows.pairs[2 * refused + 1], (long long)rows.pose_count);
 }
 
-bc_status collide_rows(const Solver& solver, const bc_rows& given, double margin,
-                       const bc_results& wanted, int threads, int64_t& refused) {
+// Answer rows by `solve`, which returns the first that is refused, or −1.
+template <class Solve>
+bc_status answer_rows(const bc_rows& given, int threads, int64_t& refused, const Solve& solve) {
   bc_status status = check_rows(given, threads, refused);
   if (status != BC_OK || given.count == 0) return status;
   Rows rows{numbers(given.poses_a),
@@ -135,9 +136,7 @@ bc_status collide_rows(const Solver& solver, const bc_rows& given, double margin
             given.size_count_b == 1 ? 0 : 3,
             given.pairs,
             long(given.pose_count)};
-  Results results{wanted.colliding, wanted.separation, wanted.normal, wanted.point,
-                  wanted.volume,    wanted.covariance, wanted.axis,   margin};
-  refused = solve_rows(solver, rows, long(given.count), results, threads);
+  refused = solve(rows, long(given.count));
   if (refused < 0) return BC_OK;
   // Another thread may have changed the pairs since: each place is read once.
   int64_t places[2] = {refused, refused};
@@ -151,6 +150,10 @@ bc_status collide_rows(const Solver& solver, const bc_rows& given, double margin
   char why[sizeof error_text];
   std::memcpy(why, error_text, sizeof why);
   return fail(BC_BAD_ROWS, "row %lld: %.480s", (long long)refused, why);
+}
+
+PairNumbers pair_of(const bc_box& a, const bc_box& b) {
+  return {numbers(&a.pose), numbers(&b.pose), numbers(&a.size), numbers(&b.size)};
 }
 
 }  // namespace
@@ -176,7 +179,7 @@ bc_status bc_collide(const bc_box* a, const bc_box* b, const bc_query* query,
   return guarded([&] {
     if (!a || !b || !contact) return refuse_null(!a ? "a" : !b ? "b" : "contact");
     return with_query(query, [&](const Solver& solver, const bc_query& asked) {
-      PairNumbers pair{numbers(&a->pose), numbers(&b->pose), numbers(&a->size), numbers(&b->size)};
+      PairNumbers pair = pair_of(*a, *b);
       if (solve_pair(solver, pair, asked.patch, asked.margin, *contact)) return BC_OK;
       return refuse_pair(pair.pose_a, pair.pose_b, pair.size_a, pair.size_b);
     });
@@ -193,7 +196,44 @@ bc_status bc_collide_rows(const bc_rows* rows, const bc_query* query, const bc_r
     if (!read(rows, all_rows)) return fail(BC_BAD_ABI, "rows.size is unknown");
     if (!read(results, all_results)) return fail(BC_BAD_ABI, "results.size is unknown");
     return with_query(query, [&](const Solver& solver, const bc_query& asked) {
-      return collide_rows(solver, all_rows, asked.margin, all_results, threads, first);
+      Results wanted{all_results.colliding,  all_results.separation, all_results.normal,
+                     all_results.point,      all_results.volume,     all_results.covariance,
+                     all_results.axis,       asked.margin};
+      return answer_rows(all_rows, threads, first, [&](const Rows& given, long count) {
+        return solve_rows(solver, given, count, wanted, threads);
+      });
+    });
+  });
+  if (refused) *refused = first;
+  return status;
+}
+
+bc_status bc_distance(const bc_box* a, const bc_box* b, bc_nearest* nearest) {
+  return guarded([&] {
+    if (!a || !b || !nearest) return refuse_null(!a ? "a" : !b ? "b" : "nearest");
+    if (nearest->size != sizeof(bc_nearest)) return fail(BC_BAD_ABI, "nearest.size is unknown");
+    return with_query(nullptr, [&](const Solver& solver, const bc_query&) {
+      PairNumbers pair = pair_of(*a, *b);
+      if (solver.kernel->nearest_pair(pair, *nearest)) return BC_OK;
+      return refuse_pair(pair.pose_a, pair.pose_b, pair.size_a, pair.size_b);
+    });
+  });
+}
+
+bc_status bc_distance_rows(const bc_rows* rows, const bc_nearest_results* results, int threads,
+                           int64_t* refused) {
+  int64_t first = -1;
+  bc_status status = guarded([&] {
+    if (!rows || !results) return refuse_null(rows ? "results" : "rows");
+    bc_rows all_rows{};
+    bc_nearest_results all{};
+    if (!read(rows, all_rows)) return fail(BC_BAD_ABI, "rows.size is unknown");
+    if (!read(results, all)) return fail(BC_BAD_ABI, "results.size is unknown");
+    NearestResults wanted{all.colliding, all.distance, all.normal, all.point_a, all.point_b};
+    return with_query(nullptr, [&](const Solver& solver, const bc_query&) {
+      return answer_rows(all_rows, threads, first, [&](const Rows& given, long count) {
+        return nearest_rows(*solver.kernel, given, count, wanted, threads);
+      });
     });
   });
   if (refused) *refused = first;
