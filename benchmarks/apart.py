@@ -20,7 +20,7 @@ from box_contact_ros.solver.nearest import Nearests
 from box_contact_ros.solver.pose import rotation_matrix
 
 from .judge import AXES, _axes, _axis, _dot
-from .pose_sets import Pairs, log_uniform, quaternion_multiply, turns, unit_quaternions
+from .pose_sets import CONTAINER, Pairs, log_uniform, quaternion_multiply, turns, unit_quaternions
 
 ROUNDS = 60  # of a bisection: as many as a double has digits, and some
 Shape = Callable[[np.random.Generator, int], tuple[np.ndarray, np.ndarray]]
@@ -43,6 +43,10 @@ def _plates(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
     size_a[:, 0] *= 1e-5
     size_b[:, 1] *= 1e-5
     return size_a, size_b
+
+
+def _containers(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
+    return np.tile(CONTAINER, (n, 1)), np.tile(CONTAINER, (n, 1))
 
 
 def _unequal(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -70,6 +74,7 @@ class Family:
 
 FAMILIES = {
     'random': Family((0.01, 2.0), 'any', along='any'),
+    'swaying containers': Family((1e-3, 0.16), 'yaw', (1e-3, 0.05), shape=_containers),
     'close': Family((1e-12, 1e-3), 'any', along='any'),
     'far': Family((1e3, 1e6), 'any', along='any'),
     'aligned': Family(moved=False),
@@ -104,11 +109,11 @@ def draw(name: str, rng: np.random.Generator, n: int) -> Pairs:
     poses_a[:, 6], poses_b[:, 3:] = 1.0, turn_b
     for _ in range(ROUNDS):
         middle = 0.5 * (low + high)
-        poses_b[:, :3] = unit[:, None] * aside + middle[:, None] * direction
+        poses_b[:, :3] = aside * size_a + middle[:, None] * direction
         near = ContactSolver().distance_batch(poses_a, poses_b, size_a=size_a, size_b=size_b,
                                               ).distance < gap
         low, high = np.where(near, middle, low), np.where(near, high, middle)
-    poses_b[:, :3] = unit[:, None] * aside + high[:, None] * direction
+    poses_b[:, :3] = aside * size_a + high[:, None] * direction
     if family.moved:
         turn, shift = unit_quaternions(rng, n), unit[:, None] * rng.uniform(-3.0, 3.0, (n, 3))
         for poses in (poses_a, poses_b):
@@ -118,7 +123,7 @@ def draw(name: str, rng: np.random.Generator, n: int) -> Pairs:
 
 
 def _placement(along: str, rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return where B is beside a line from A's centre, and the line's direction, (n, 3) each.
+    """Return where B is beside A's centre [A's extents], and along which direction, (n, 3) each.
 
     Three in ten of the boxes beside an axis or a side are along a diagonal: edge to edge.
     """
@@ -127,7 +132,7 @@ def _placement(along: str, rng: np.random.Generator, n: int) -> tuple[np.ndarray
         return np.zeros((n, 3)), direction / np.linalg.norm(direction, axis=1, keepdims=True)
     rows, axis = np.arange(n), {'side': rng.integers(0, 2, n), 'above': np.full(n, 2),
                                 'axis': rng.integers(0, 3, n)}[along]
-    aside, direction = rng.uniform(-0.6, 0.6, (n, 3)), np.zeros((n, 3))
+    aside, direction = rng.uniform(-0.5, 0.5, (n, 3)), np.zeros((n, 3))
     aside[rows, axis], direction[rows, axis] = 0.0, 1.0
     diagonal = (rng.random(n) < 0.3) & (along != 'above')
     direction[rows, (axis + 1) % 3] = diagonal
@@ -135,8 +140,14 @@ def _placement(along: str, rng: np.random.Generator, n: int) -> tuple[np.ndarray
 
 
 class Proof(NamedTuple):
-    """What nearest points are worth, in units of 2⁻⁵³ times the largest size or coordinate."""
+    """What nearest points are worth, in units of 2⁻⁵³ times the largest size or coordinate.
 
+    No error is larger than it says, and the doubt of the true distance is in it.
+    """
+
+    true: np.ndarray  # (n,) the middle of both bounds of the distance [m]
+    unit: np.ndarray  # (n,) [m]
+    doubt: np.ndarray  # (n,) of the true distance
     above: np.ndarray  # (n,) by how much the distance may exceed the true one
     below: np.ndarray  # (n,) by how much it may stay below
     outside: np.ndarray  # (n,) how far the points are outside their boxes
@@ -151,14 +162,20 @@ def prove(pairs: Pairs, found: Nearests) -> Proof:
         for part in (found.distance, found.normal, found.point_a, found.point_b))
     boxes = [_Box(pose[:3], _axes(pose[3:]), size / 2)
              for pose, size in zip(parts[:2], parts[2:])]
-    # The nearest point of the box is an upper bound, whatever is wrong with a point.
-    near = [box.nearest(point) for box, point in zip(boxes, (point_a, point_b))]
-    way, length = near[1] - near[0], point_b - point_a
-    largest = np.abs(np.hstack([pairs.pose_a[:, :3], pairs.pose_b[:, :3], *pairs[2:]])).max(axis=1)
-    return Proof(*(np.asarray(part / (2.0**-53 * largest), dtype=np.float64) for part in (
-        distance - _lower_bound(boxes, normal, near), np.sqrt(_dot(way, way)) - distance,
-        np.maximum(*(box.outside(point) for box, point in zip(boxes, (point_a, point_b)))),
-        np.abs(np.sqrt(_dot(length, length)) - distance))))
+    # From any point of a box to the nearest one of the other box is a bound from above, whatever was
+    # wrong with a point. This way is across a face or an edge to the last digit.
+    starts = boxes[0].nearest(point_b), boxes[1].nearest(point_a)
+    ways = boxes[1].nearest(starts[0]) - starts[0], starts[1] - boxes[0].nearest(starts[1])
+    length = point_b - point_a
+    lower = _lower_bound(*boxes, (normal, *ways))
+    upper = np.minimum(*(np.sqrt(_dot(way, way)) for way in ways))
+    unit = 2.0**-53 * np.abs(np.hstack([pairs.pose_a[:, :3], pairs.pose_b[:, :3], *pairs[2:]])
+                             ).max(axis=1)
+    return Proof(np.asarray((lower + upper) / 2, dtype=np.float64), unit, *(
+        np.asarray(part / unit, dtype=np.float64) for part in (
+            (upper - lower) / 2, distance - lower, upper - distance,
+            np.maximum(*(box.outside(point) for box, point in zip(boxes, (point_a, point_b)))),
+            np.abs(np.sqrt(_dot(length, length)) - distance))))
 
 
 class _Box(NamedTuple):
@@ -182,16 +199,13 @@ class _Box(NamedTuple):
         return sum(half * np.abs(_dot(axis, direction)) for half, axis in zip(self.half, self.axes))
 
 
-def _lower_bound(boxes: list[_Box], normal: np.ndarray, near: list[np.ndarray]) -> np.ndarray:
-    """Return the largest gap (n,) along some directions: each of them is a bound.
+def _lower_bound(a: _Box, b: _Box, directions: tuple[np.ndarray, ...]) -> np.ndarray:
+    """Return the largest gap (n,) along directions (3, n): each of them is a bound.
 
-    The way from a point to its nearest point on a box is across the face or edge to the last digit.
     The axes of the separating-axis test are good where edges are almost parallel.
     """
-    a, b = boxes
-    ways = [near[1] - a.nearest(near[1]), b.nearest(near[0]) - near[0]]
-    return np.nanmax([_gap(a, b, direction) for direction in (
-        normal, *ways, *(_axis(a.axes, b.axes, number) for number in range(AXES)))], axis=0)
+    axes = (_axis(a.axes, b.axes, number) for number in range(AXES))
+    return np.nanmax([_gap(a, b, direction) for direction in (*directions, *axes)], axis=0)
 
 
 def _gap(a: _Box, b: _Box, direction: np.ndarray) -> np.ndarray:

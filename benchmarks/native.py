@@ -137,7 +137,8 @@ def compiled(folder: Path, sets: Sequence[str]) -> tuple[Path, list[str]]:
     # Old tags: LD_LIBRARY_PATH must not replace the library beside the program by another.
     run_compiler(
         [*compiler, '-O2', f'-I{mujoco / "include"}', '-Wl,--disable-new-dtags',
-         *[str(CALLS_FOLDER / f'{name}.cpp') for name in ('main', 'mujoco', 'ours', *rivals)],
+         *[str(CALLS_FOLDER / f'{name}.cpp') for name in (
+             'main', 'contestants', 'mujoco', 'ours', *rivals)],
          '-o', str(folder / 'native'), shutil.copy(LIBRARY, folder),
          str(next(mujoco.glob('libmujoco.so*'))), '-Wl,-rpath,$ORIGIN',
          f'-Wl,-rpath,{mujoco}', *flags])
@@ -173,10 +174,10 @@ def networks_for(pairs: Pairs) -> bytes:
                     + numbers.tobytes() for name, numbers in networks.items())
 
 
-def calls_shown(missing: Sequence[str]) -> str:
+def calls_shown(missing: Sequence[str], folder: Path = CALLS_FOLDER) -> str:
     """Return the code of each call, as it was compiled."""
     blocks = []
-    for file in sorted(CALLS_FOLDER.glob('*.cpp')):
+    for file in sorted(folder.glob('*.cpp')):
         _, *parts = file.read_text(encoding='utf-8').split('// call: ')
         for name, _, rest in (part.partition('\n') for part in parts if file.stem not in missing):
             code = textwrap.dedent(rest[:rest.index('// end of call')].rstrip())

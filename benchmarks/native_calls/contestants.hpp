@@ -58,6 +58,11 @@ Contestant single(const std::string& name, size_t calls, Call call, Read read) {
           }};
 }
 
+// Writes what each contestant answers for the first `calls` pairs to a file: float64, a row for each.
+// Prints the names of all, and a line for each contestant and round: nanoseconds a pair.
+void compare(const Contestants& all, const Poses& poses, size_t rounds, size_t calls,
+             const char* answers_path);
+
 [[noreturn]] void fail(const std::string& what);
 
 // Each adds its contestants, with `calls` single calls a round. What they use is never freed.

@@ -9,63 +9,10 @@
 // for the first CALLS pairs: float64, signed separations, a row for each contestant.
 // NETWORKS: see `add_networks_avx2`. POSES has a count of int64, then poses of A and B (n, 7) and full extents of A and B (n, 3).
 #include <algorithm>
-#include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 
 #include "contestants.hpp"
-
-double kept;
-
-void fail(const std::string& what) {
-  std::fprintf(stderr, "native: %s\n", what.c_str());
-  std::exit(2);
-}
-
-namespace {
-
-template <class Item>
-std::vector<Item> read(std::FILE* file, size_t count) {
-  std::vector<Item> items(count);
-  if (std::fread(items.data(), sizeof(Item), count, file) != count) fail("the poses end early");
-  return items;
-}
-
-PlacedBox placed(const bc_pose& pose, const bc_size& size) {
-  const double* q = pose.quaternion;
-  double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  double x = q[0] / length, y = q[1] / length, z = q[2] / length, w = q[3] / length;
-  PlacedBox box = {{},
-                   {},
-                   {1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w),
-                    2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
-                    2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}};
-  for (int k = 0; k < 3; ++k) {
-    box.half[k] = 0.5 * size.extent[k];
-    box.position[k] = pose.position[k];
-  }
-  return box;
-}
-
-}  // namespace
-
-Poses::Poses(const char* path) {
-  std::FILE* file = std::fopen(path, "rb");
-  if (!file) fail(std::string("cannot read ") + path);
-  size_t n = size_t(read<int64_t>(file, 1)[0]);
-  a = read<bc_pose>(file, n);
-  b = read<bc_pose>(file, n);
-  size_a = read<bc_size>(file, n);
-  size_b = read<bc_size>(file, n);
-  std::fclose(file);
-  for (size_t pair = 0; pair < n; ++pair) {
-    box_a.push_back({a[pair], size_a[pair]});
-    box_b.push_back({b[pair], size_b[pair]});
-    placed_a.push_back(placed(a[pair], size_a[pair]));
-    placed_b.push_back(placed(b[pair], size_b[pair]));
-  }
-}
 
 int main(int count, char** arguments) {
   if (count != 3 && count != 6)
@@ -75,8 +22,8 @@ int main(int count, char** arguments) {
     time_each_contact(poses, std::strtoul(arguments[2], nullptr, 10));
     return 0;
   }
-  size_t rounds = std::strtoul(arguments[2], nullptr, 10), n = poses.count();
-  size_t calls = std::min<size_t>(std::strtoul(arguments[3], nullptr, 10), n);
+  size_t rounds = std::strtoul(arguments[2], nullptr, 10);
+  size_t calls = std::min<size_t>(std::strtoul(arguments[3], nullptr, 10), poses.count());
   Contestants all;
   add_mujoco(poses, calls, all);
 #ifdef WITH_COAL
@@ -95,25 +42,6 @@ int main(int count, char** arguments) {
 #endif
 
   std::printf("%s\n", set.c_str());
-  std::FILE* answers = std::fopen(arguments[4], "wb");
-  if (!answers) fail(std::string("cannot write ") + arguments[4]);
-  for (const Contestant& one : all) {
-    std::printf("%s%s", &one == &all[0] ? "" : "\t", one.name.c_str());
-    for (size_t pair = 0; pair < calls; ++pair) {
-      double separation = one.separation(pair);
-      std::fwrite(&separation, sizeof separation, 1, answers);
-    }
-  }
-  std::printf("\n");
-  std::fclose(answers);
-
-  for (size_t round = 0; round <= rounds; ++round)  // the first one warms up
-    for (const Contestant& one : all) {
-      size_t first = round * calls % (n - calls + 1);
-      auto start = std::chrono::steady_clock::now();
-      one.round(first);
-      std::chrono::duration<double, std::nano> took = std::chrono::steady_clock::now() - start;
-      if (round) std::printf("%s\t%.2f\n", one.name.c_str(), took.count() / double(one.pairs));
-    }
+  compare(all, poses, rounds, calls, arguments[4]);
   return kept == 0.5 ? 3 : 0;
 }
