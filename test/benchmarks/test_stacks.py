@@ -16,7 +16,8 @@ pytest.importorskip('mujoco')
 
 from benchmarks import settled, stacks
 from benchmarks.loops import MUJOCO, TIMINGS, Boxes, Scene, Timing, corner_speeds, steps
-from benchmarks.stacks import ORDERS, off_centre, ratio, run, sideways, slope, stays, turntable
+from benchmarks.stack_scenes import ORDERS, off_centre, ratio, sideways, slope, tower, turntable
+from benchmarks.stacks import run, stays
 from box_contact_ros.forces.patch_forces import GRAVITY
 
 
@@ -86,7 +87,7 @@ def test_the_program(monkeypatch: pytest.MonkeyPatch, tmp_path: Path,
 
 def test_pairs_are_recorded(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Those whose bounding boxes overlap, as placed and by each engine; they touch at rest."""
-    monkeypatch.setattr(stacks, 'SCENES', (partial(stacks.tower, 2),))
+    monkeypatch.setattr(stacks, 'SCENES', (partial(tower, 2),))
     assert stacks.main(['--record', str(tmp_path / 'pairs.npz')]) == 0
     found = settled.read(tmp_path / 'pairs.npz')
     assert set(found.scene) == {'tower of 2'}
