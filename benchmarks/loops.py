@@ -11,6 +11,7 @@ Lengths in m, masses in kg, times in s.
 from __future__ import annotations
 
 import logging
+import math
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -38,6 +39,7 @@ FLOOR = ((60.0, 60.0, 1.0), 0.0, (0.0, 0.0, -0.5))
 """A row of `Boxes.of`, whose top is at z = 0."""
 
 Wrenches = Callable[[float, 'Boxes', np.ndarray, np.ndarray], np.ndarray]
+Drive = Callable[[float], Sequence[float]]
 
 
 class Parts(NamedTuple):
@@ -103,18 +105,25 @@ class Boxes:
 
 @dataclass
 class Scene:
-    """Boxes, and the wrenches (n, 6) that act on them beside weight and contacts."""
+    """Boxes, and the wrenches (n, 6) that act on them beside weight and contacts.
+
+    drive: velocity (6,) of box 0, which is fixed, at a time. belt: velocity (3,) of its surface,
+    while the box itself stays.
+    """
 
     name: str
     boxes: Boxes
     seconds: float = 5.0
     act: Wrenches | None = None
+    drive: Drive | None = None
+    belt: Sequence[float] | None = None
 
 
 class Timing(NamedTuple):
     """The loop of a client: step of physics [s], rate of questions, latency [s], share lost.
 
     own: answers are lists of pairs, and `PatchForces` solves the pairs at each step.
+    lengths: of the steps [s], in turn, where steps are uneven; `step` is their mean.
     """
 
     step: float
@@ -122,16 +131,34 @@ class Timing(NamedTuple):
     latency: float
     lost: float = 0.0
     own: bool = False
+    lengths: tuple[float, ...] = ()
+
+    @classmethod
+    def uneven(cls, lengths: Sequence[float]) -> Timing:
+        """Return the loop of steps of some lengths [s] in turn, with its own contacts at each."""
+        mean = sum(lengths) / len(lengths)
+        return cls(mean, 1.0 / mean, 0.0, own=True, lengths=tuple(lengths))
 
     def __str__(self) -> str:
-        return (f'{1e3 * self.step:g} ms, ' + ('each step' if self.rate_hz * self.step == 1.0 else
-                                               f'{self.rate_hz:g} Hz')
+        return (self._steps + ', '
+                + ('each step' if math.isclose(self.rate_hz * self.step, 1.0) else
+                   f'{self.rate_hz:g} Hz')
                 + (f', {1e3 * self.latency:g} ms late' if self.latency else '')
                 + (f', {100 * self.lost:g} % lost' if self.lost else '')
                 + (', own contacts' if self.own else ''))
 
+    @property
+    def _steps(self) -> str:
+        """Return the length of the steps in words."""
+        if len(self.lengths) > LISTED:
+            return f'{1e3 * min(self.lengths):.3g} to {1e3 * max(self.lengths):.3g} ms at random'
+        return ', '.join(f'{1e3 * step:.3g}' for step in self.lengths or (self.step,)) + ' ms'
 
-TIMINGS = (Timing(0.001, 1000.0, 0.0), Timing(0.004, 250.0, 0.0), Timing(0.001, 200.0, 0.0),
+
+FRAME = 1.0 / 60.0  # [s]
+LISTED = 8  # lengths of steps that the name of a timing lists; more are drawn at random
+TIMINGS = (Timing(0.001, 1000.0, 0.0), Timing(0.004, 250.0, 0.0), Timing(FRAME, 60.0, 0.0),
+           Timing.uneven((0.003, 0.003, 0.003, FRAME - 0.009)), Timing(0.001, 200.0, 0.0),
            Timing(0.001, 200.0, 0.002), Timing(0.001, 50.0, 0.005),
            Timing(0.001, 50.0, 0.005, lost=0.05, own=True))
 MUJOCO = 'MuJoCo, 1 ms'
@@ -166,17 +193,18 @@ def corner_speeds(boxes: Boxes) -> np.ndarray:
 class Ours:
     """Contacts by the solver, forces by `PatchForces`."""
 
-    def __init__(self, scene: Scene, timing: Timing) -> None:
-        """Make solver and forces."""
+    def __init__(self, scene: Scene, timing: Timing, **options: int) -> None:
+        """Make solver and forces; options: those of `PatchForces`."""
         boxes = self.boxes = scene.boxes
         self.scene, self.timing, self.step_size = scene, timing, timing.step
+        self.lengths, self.time = timing.lengths or (timing.step,), 0.0
         self.rng = np.random.default_rng(9)  # of lost answers
         self.every = max(1, round(1.0 / (timing.rate_hz * timing.step)))
         self.late = round(timing.latency / timing.step)
         self.solver = ContactSolver()
         self.forces = PatchForces(
             [Body(mass=m, inertia=i, centre=c)
-             for m, i, c in zip(boxes.mass, boxes.inertia, boxes.centre)])
+             for m, i, c in zip(boxes.mass, boxes.inertia, boxes.centre)], **options)
         self.tick, self.searched, self.spent = 0, -SEARCHED, 0.0
         self.answers: deque = deque()
         if boxes.parts is None:
@@ -198,7 +226,7 @@ class Ours:
 
     def answer(self) -> tuple:
         """Return the arguments of `hold`: pairs, and their contacts and poses if not its own."""
-        boxes, h = self.boxes, self.step_size
+        boxes, h = self.boxes, max(self.lengths)
         if self.timing.own:  # the next answer may be lost
             return (near_pairs(boxes, self.way(2.0 * self.every * h + self.timing.latency)),)
         if self.tick - self.searched >= SEARCHED:
@@ -210,16 +238,20 @@ class Ours:
 
     def hold(self, pairs: np.ndarray, *contacts_and_poses: Any) -> None:
         """Hand an answer to the forces."""
-        times = {} if self.timing.own else {
+        options: dict[str, Any] = {} if self.timing.own else {
             'age': self.timing.latency, 'period': self.every * self.step_size}
-        self.forces.hold(pairs, *contacts_and_poses, **times)
+        if self.scene.belt is not None:  # of B's surface relative to A's, box 0
+            options['surface_velocity'] = np.outer(pairs[:, 0] == 0, self.scene.belt) * -1.0
+        self.forces.hold(pairs, *contacts_and_poses, **options)
 
     def step(self) -> None:
         """Advance all boxes by a step."""
-        boxes, h = self.boxes, self.step_size
+        boxes, h = self.boxes, self.lengths[self.tick % len(self.lengths)]
         outside = self.weight
         if self.scene.act:
-            outside = outside + self.scene.act(self.tick * h, boxes, boxes.pose, boxes.velocity)
+            outside = outside + self.scene.act(self.time, boxes, boxes.pose, boxes.velocity)
+        if self.scene.drive:
+            boxes.velocity[0] = self.scene.drive(self.time + 0.5 * h)
         start = time.perf_counter()
         if self.tick % self.every == 0 and self.rng.random() >= self.timing.lost:
             self.answers.append((self.tick + self.late, *self.answer()))
@@ -227,6 +259,7 @@ class Ours:
             self.hold(*self.answers.popleft()[1:])
         boxes.pose, boxes.velocity, _ = self.forces.advance(h, boxes.pose, boxes.velocity, outside)
         self.spent += time.perf_counter() - start
+        self.time += h
         self.tick += 1
 
 
@@ -240,7 +273,8 @@ class Theirs:
         spec.option.gravity = 0.0, 0.0, -GRAVITY
         spec.option.timestep = step
         spec.memory = 2**28
-        self.free, self.carrier = boxes.mass > 0, boxes.carrier
+        self.free = boxes.mass > 0
+        self.carrier = 0 if scene.drive or scene.belt is not None else boxes.carrier
         for k, free in enumerate(self.free):
             x, y, z, qx, qy, qz, qw = boxes.pose[k]
             body = spec.worldbody.add_body(pos=(x, y, z), quat=(qw, qx, qy, qz))
@@ -250,8 +284,8 @@ class Theirs:
                 body.mass, body.inertia = boxes.mass[k], boxes.inertia[k]
                 body.ipos = boxes.centre[k]
             elif k == self.carrier:
-                body.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=(0, 0, 1))
-                body.explicitinertial = True
+                body.add_freejoint()
+                body.gravcomp, body.explicitinertial = 1.0, True
                 body.mass, body.inertia = HEAVY, (HEAVY,) * 3
             body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=0.5 * boxes.size[k],
                           friction=(FRICTION, 0.005, 0.0001))
@@ -261,7 +295,7 @@ class Theirs:
                                   quat=(qw, qx, qy, qz), friction=(FRICTION, 0.005, 0.0001))
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
-        self.tick, self.spent = 0, 0.0
+        self.tick, self.time, self.spent = 0, 0.0, 0.0
         self.bodies = 1 + np.flatnonzero(self.free)
         joints = self.model.body_jntadr[self.bodies]
         self.places = self.model.jnt_qposadr[joints][:, None] + np.arange(7)
@@ -274,36 +308,46 @@ class Theirs:
         self.data.qvel[self.rates] = np.hstack([v[:, :3] - np.cross(v[:, 3:], arm), spin])
         if self.carrier is not None:
             joint = self.model.body_jntadr[1 + self.carrier]
-            self.hinge = self.model.jnt_qposadr[joint]
-            self.data.qvel[self.model.jnt_dofadr[joint]] = boxes.velocity[self.carrier, 5]
+            self.carried = self.model.jnt_qposadr[joint] + np.array([0, 1, 2, 4, 5, 6, 3])
+            self.driven = self.model.jnt_dofadr[joint] + np.arange(6)
+
+    def drive(self) -> None:
+        """Give the carrier its velocity; what is free cannot change that by much."""
+        boxes, scene = self.boxes, self.scene
+        if scene.drive:
+            boxes.velocity[0] = scene.drive(self.time + 0.5 * self.step_size)
+        velocity = boxes.velocity[self.carrier] if scene.belt is None else [*scene.belt, 0, 0, 0]
+        self.data.qvel[self.driven] = velocity
 
     def step(self) -> None:
         """Advance all boxes by a step."""
         boxes, free = self.boxes, self.free
         if self.scene.act:
-            push = self.scene.act(self.tick * self.step_size, boxes, boxes.pose, boxes.velocity)
+            push = self.scene.act(self.time, boxes, boxes.pose, boxes.velocity)
             self.data.xfrc_applied[self.bodies] = push[free]
+        if self.carrier is not None:
+            self.drive()
         start = time.perf_counter()
         mujoco.mj_step(self.model, self.data)
         self.spent += time.perf_counter() - start
         boxes.pose[free] = self.data.qpos[self.places][:, [0, 1, 2, 4, 5, 6, 3]]
-        if self.carrier is not None:
-            half = 0.5 * self.data.qpos[self.hinge]
-            boxes.pose[self.carrier, 5:] = np.sin(half), np.cos(half)
+        if self.carrier is not None and self.scene.belt is None:
+            boxes.pose[self.carrier] = self.data.qpos[self.carried]
         v = self.data.qvel[self.rates]
         rotation = rotation_matrix(boxes.pose[free, 3:])
         spin = np.einsum('nij,nj->ni', rotation, v[:, 3:])
         arm = np.einsum('nij,nj->ni', rotation, boxes.centre[free])
         boxes.velocity[free] = np.hstack([v[:, :3] + np.cross(spin, arm), spin])
+        self.time += self.step_size
         self.tick += 1
 
 
-def steps(scene: Scene, timing: Timing | None) -> Iterator[Ours | Theirs]:
+def steps(scene: Scene, timing: Timing | None, **options: int) -> Iterator[Ours | Theirs]:
     """Run a scene by ours at a timing, or by MuJoCo; yield the loop before each step and last.
 
-    The scene's boxes are those of the loop.
+    The scene's boxes are those of the loop. options: those of `PatchForces`.
     """
-    loop = Ours(scene, timing) if timing else Theirs(scene, STEP)
+    loop = Ours(scene, timing, **options) if timing else Theirs(scene, STEP)
     for _ in range(round(scene.seconds / loop.step_size)):
         yield loop
         loop.step()

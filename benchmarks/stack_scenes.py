@@ -271,6 +271,184 @@ def sideways(order: str, share: float) -> Scene:
     return replace(scene, seconds=PUSHED, act=lambda *_: push)
 
 
+# --- carriers, and what acts for a time -----------------------------------------------------------
+
+def rolling_deck(degrees: float = 20.0) -> Scene:
+    """Return a container on a deck that rolls by an angle to either side, ten seconds a period.
+
+    Without friction it would slide: the tangent of 20° is 0.36, and μ is 0.5.
+    """
+    rate, most = 2.0 * math.pi * 0.1, math.radians(degrees)
+
+    def drive(t: float) -> tuple[float, ...]:
+        return 0.0, 0.0, 0.0, most * rate * math.cos(rate * t), 0.0, 0.0
+
+    return Scene(f'deck that rolls by {degrees:g}°', Boxes.of([
+        ((30.0, 20.0, 1.0), 0.0, (0, 0, -0.5)),
+        (CONTAINER, 20_000.0, (0, 0, 0.5 * CONTAINER[2]))]), 20.0, drive=drive)
+
+
+def braking_lorry(braking: float = 0.4) -> Scene:
+    """Return a crate, and two on each other, on a lorry that brakes [g] from 15 m/s to rest."""
+    crate = (1.0, 1.0, 0.5)
+
+    def drive(t: float) -> tuple[float, ...]:
+        return max(0.0, 15.0 - braking * GRAVITY * t), 0.0, 0.0, 0.0, 0.0, 0.0
+
+    boxes = Boxes.of([((12.0, 2.5, 1.0), 0.0, (0, 0, -0.5)), (crate, 200.0, (-3, 0, 0.25)),
+                      *((crate, 200.0, (3, 0, 0.5 * k + 0.25)) for k in range(2))])
+    boxes.velocity[:, 0] = 15.0
+    return Scene(f'lorry that brakes by {braking:g} g', boxes, 6.0, drive=drive)
+
+
+def reach_stacker() -> Scene:
+    """Return five containers on each other, of which the upmost is lifted by 2 m after a second."""
+    mass, start = 20_000.0, 4.5 * CONTAINER[2]
+    boxes = Boxes.of([FLOOR, *((CONTAINER, mass, (0, 0, CONTAINER[2] * (k + 0.5)))
+                               for k in range(5))])
+
+    def lift(t: float, _: Boxes, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        push = np.zeros((6, 6))
+        if t > 1.0:
+            high = start + min(2.0, t - 1.0)
+            push[5, 2] = mass * (GRAVITY + 25.0 * (high - pose[5, 2]) - 10.0 * velocity[5, 2])
+        return push
+
+    return Scene('the fifth of five is lifted', boxes, 6.0, act=lift)
+
+
+def dammed_belt() -> Scene:
+    """Return ten parcels on a belt, at a dam that takes μ·m·g of each, 392.4 N in all."""
+    parcel = (0.4, 0.3, 0.3)
+    rows = [FLOOR, ((0.1, 1.0, 0.5), 0.0, (0.05, 0, 0.25))]
+    rows += [(parcel, 8.0, (-parcel[0] * (k + 0.5), 0, 0.15)) for k in range(10)]
+    return Scene('ten parcels, dammed on a belt', Boxes.of(rows), 4.0, belt=(0.35, 0.0, 0.0))
+
+
+def dominoes(count: int = 50) -> Scene:
+    """Return dominoes, of which the first is pushed."""
+    size = (0.1, 0.5, 1.0)
+    rows = [FLOOR, *((size, 10.0, (0.5 * k - 12.0, 0, 0.5)) for k in range(count))]
+
+    def push(t: float, *_: object) -> np.ndarray:
+        found = np.zeros((count + 1, 6))
+        found[1, 4] = 30.0 if t < 0.2 else 0.0  # six times what tips it
+        return found
+
+    return Scene(f'{count} dominoes', Boxes.of(rows), 8.0, act=push)
+
+
+# --- what hardly stands ---------------------------------------------------------------------------
+
+def card_house(storeys: int = 5) -> Scene:
+    """Return pairs of cards that lean on each other by 20°, on cards that lie on the pairs below.
+
+    Edges alone touch, as in a house of real cards.
+    """
+    long, wide, thick, lean = 0.2, 0.2, 0.004, math.radians(20.0)
+    half = 0.5 * (long * math.sin(lean) + thick * math.cos(lean))  # of a leaning card's width
+    high = long * math.cos(lean) + thick * math.sin(lean)
+    rows, level = [FLOOR], 0.0
+    for pairs in range(storeys, 0, -1):
+        first = -2.0 * half * (pairs - 1)
+        for k in range(pairs):
+            for side in (-1, 1):
+                rows.append(((thick, wide, long), 0.1, (first + 4.0 * half * k + side * half, 0,
+                                                        level + 0.5 * high),
+                             turned((0, 1, 0), -side * lean)))
+        level += high
+        for k in range(pairs - 1):
+            rows.append(((4.0 * half, wide, thick), 0.1, (first + 2.0 * half * (2 * k + 1), 0,
+                                                          level + 0.5 * thick)))
+        level += thick
+    return Scene(f'card house of {storeys}', Boxes.of(rows), 5.0)
+
+
+def seesaw(heavier: float = 0.005) -> Scene:
+    """Return a plank on a bar of 6 mm, with cubes at its ends, one heavier by a share.
+
+    The plank of 10 kg and the cubes of 50 kg, 1 m from the middle, tip where the middle of all is
+    beyond 3 mm: from a share of 0.66 % on.
+    """
+    cube, plank, bar = (0.2,) * 3, (2.4, 0.3, 0.05), (0.006, 0.3, 0.1)
+    top = bar[2] + plank[2] + 0.5 * cube[2]
+    return Scene(f'seesaw, {100 * heavier:g} % heavier', Boxes.of([
+        FLOOR, (bar, 0.0, (0, 0, 0.5 * bar[2])), (plank, 10.0, (0, 0, bar[2] + 0.5 * plank[2])),
+        (cube, 50.0, (-1, 0, top)), (cube, 50.0 * (1.0 + heavier), (1, 0, top))]), 4.0)
+
+
+def timbers(tiers: int = 1, across: int = 4, drop: float = 0.0) -> Scene:
+    """Return containers of 24 t, each on timbers of 8 kg; the first is dropped by a height [m]."""
+    timber, rows, height = (0.1, 2.4, 0.1), [FLOOR], 0.0
+    places = np.linspace(-2.2, 2.2, across) if across > 2 else (-2.0, 2.0)
+    for _ in range(tiers):
+        rows += [(timber, 8.0, (x, 0, height + 0.05)) for x in places]
+        rows.append((CONTAINER, 24_000.0, (0, 0, height + drop + 0.1 + 0.5 * CONTAINER[2])))
+        height += 0.1 + CONTAINER[2]
+    return Scene((f'{tiers} tiers on timbers' if tiers > 1 else '24 t on four timbers')
+                 + (f', dropped by {drop:g} m' if drop else ''), Boxes.of(rows), 5.0)
+
+
+def full_on_empty(speed: float = 0.0) -> Scene:
+    """Return a container of 30 t on an empty one of 2.3 t, which it meets at a speed [m/s]."""
+    boxes = Boxes.of([FLOOR, (CONTAINER, 2_300.0, (0, 0, 0.5 * CONTAINER[2])),
+                      (CONTAINER, 30_000.0, (0, 0, 1.5 * CONTAINER[2] + (1e-6 if speed else 0)))])
+    boxes.velocity[2, 2] = -speed
+    return Scene('30 t on an empty container' + (f', at {speed:g} m/s' if speed else ''), boxes,
+                 4.0)
+
+
+def flush_pallet() -> Scene:
+    """Return 48 cartons of 0.2 to 100 kg, four layers whose sides touch."""
+    rng, carton = np.random.default_rng(1), (0.4, 0.3, 0.3)
+    return Scene('flush pallet, 0.2 to 100 kg', Boxes.of([FLOOR, *(
+        (carton, 0.2 * 500.0 ** rng.random(), (0.4 * i, 0.3 * j, 0.3 * k + 0.15))
+        for k, i, j in product(range(4), range(3), range(4)))]), 5.0)
+
+
+def gaps(count: int = 20, gap: float = 1e-9) -> Scene:
+    """Return a tower of cubes with a gap below each [m]."""
+    return Scene(f'tower of {count}, gaps of {gap:g} m', Boxes.of([FLOOR, *(
+        ((0.5,) * 3, 50.0, (0, 0, 0.5 * (k + 0.5) + gap * (k + 1))) for k in range(count))]), 3.0)
+
+
+def wide_floor(slope: float = 0.0) -> Scene:
+    """Return a cube of 1 m on a floor of 1 km, which has a slope (its tangent)."""
+    q = turned((0, 1, 0), math.atan(slope))
+    up = rotation_matrix(q)[:, 2]
+    return Scene('cube on a floor of 1 km' + (f', slope {slope:.2g}' if slope else ''), Boxes.of([
+        ((1000.0, 1000.0, 1.0), 0.0, -0.5 * up, q), ((1.0,) * 3, 50.0, 0.5 * up, q)]), 3.0)
+
+
+FEET = ((-0.3, -0.2), (0.5, -0.2), (0.1, 0.4))  # of the table [m]
+SPREADER_FEET = tuple(product((-6.0, -0.2, 0.2, 6.0), (-1.0, 1.0)))  # of the twin spreader [m]
+
+
+def on_feet(name: str, feet: tuple[tuple[float, float], ...], size: tuple[float, float, float],
+            foot: tuple[float, float, float], mass: float, centre: tuple[float, float]) -> Scene:
+    """Return a plate of a size on feet; `centre` is the place of its mass [m]."""
+    boxes = Boxes.of([FLOOR, (size, mass, (0, 0, foot[2] + 0.5 * size[2]), (0, 0, 0, 1),
+                              (*centre, 0.0))])
+    low = -0.5 * (size[2] + foot[2])
+    boxes.parts = Parts(np.ones(len(feet), dtype=int), np.tile(foot, (len(feet), 1)),
+                        np.array([(x, y, low, 0, 0, 0, 1) for x, y in feet], dtype=float))
+    return Scene(name, boxes, 3.0)
+
+
+def table() -> Scene:
+    """Return a table of 56 kg on three feet of 6 cm, its mass aside."""
+    return on_feet('table on three feet', FEET, (1.2, 1.0, 0.05), (0.06, 0.06, 0.5), 56.0,
+                   (0.12, 0.08))
+
+
+def twin_spreader() -> Scene:
+    """Return a twin spreader of 10 t on its eight twist-locks, its mass 0.9 m aside."""
+    return on_feet('twin spreader', SPREADER_FEET, (12.4, 2.3, 0.6), (0.16, 0.12, 0.15), 10_000.0,
+                   (0.9, 0.0))
+
+
+# --- all ------------------------------------------------------------------------------------------
+
 ORDERS = ('00100408', '00100001', '00100002', '00100003', '00100004')
 SCENES: tuple[Callable[[], Scene], ...] = (
     partial(tower, 20), partial(tower, 20, jitter=0.03), wall, pyramid, pile, bars, mixed, pallet,
@@ -279,4 +457,7 @@ SCENES: tuple[Callable[[], Scene], ...] = (
     cube_on_four, twist_locks, heap, packed_pallets, spreader, turntable,
     partial(slope, 'plate'), partial(slope, 'tall'), partial(slope, 'five'),
     *(partial(gripper, force) for force in (2.0, 5.0, 20.0, 50.0)),
-    *(partial(real_pallet, order) for order in ORDERS))
+    *(partial(real_pallet, order) for order in ORDERS),
+    rolling_deck, braking_lorry, reach_stacker, dammed_belt, dominoes, card_house,
+    partial(tower, 200), seesaw, timbers, partial(timbers, 5, 2), full_on_empty, flush_pallet,
+    gaps, wide_floor, partial(wide_floor, 1.0 / 3.0), table, twin_spreader)

@@ -24,10 +24,11 @@ from pathlib import Path
 import numpy as np
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.solver.pose import rotation_matrix
 
 from . import output, settled
 from .loops import MUJOCO, TIMINGS, Boxes, Scene, Timing, corner_speeds, near_pairs, steps
-from .pose_sets import Pairs
+from .pose_sets import Pairs, quaternion_multiply
 from .stack_scenes import ORDERS, SCENES, sideways
 
 LOST_SPEED = 100.0  # a run with a faster corner is over [m/s]
@@ -65,7 +66,7 @@ def run(make: Callable[[], Scene], timing: Timing | None) -> Outcome:
         if not speed <= REST_SPEED:
             rest = math.nan
         elif math.isnan(rest):
-            rest = loop.tick * loop.step_size
+            rest = loop.time
         _, size, pose = boxes.every_box()
         depth = -solver.batch(pose, sizes=size, pairs=near_pairs(boxes, 0.0), patch=False
                               ).separation.min(initial=0.0)
@@ -78,12 +79,24 @@ def run(make: Callable[[], Scene], timing: Timing | None) -> Outcome:
 
 
 def moved(boxes: Boxes, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return how far [mm] and by what angle [°] the free boxes (n,) are from poses (m, 7)."""
-    free = boxes.mass > 0
-    pose, start = boxes.pose[free], start[free]
+    """Return how far [mm] and by what angle [°] the free boxes (n,) are from poses (m, 7).
+
+    Where box 0 is fixed, both are relative to it, as it may be a carrier.
+    """
+    free, pose = boxes.mass > 0, boxes.pose
+    if not free[0]:
+        pose, start = _seen_from_the_first(pose), _seen_from_the_first(start)
+    pose, start = pose[free], start[free]
     dots = np.abs((pose[:, 3:] * start[:, 3:]).sum(axis=1))
     return (1e3 * np.linalg.norm(pose[:, :3] - start[:, :3], axis=1),
             np.degrees(2.0 * np.arccos(np.clip(dots, 0.0, 1.0))))
+
+
+def _seen_from_the_first(pose: np.ndarray) -> np.ndarray:
+    """Return poses (n, 7) in the frame of the first."""
+    back = pose[0, 3:] * (-1, -1, -1, 1)
+    return np.hstack([(pose[:, :3] - pose[0, :3]) @ rotation_matrix(pose[0, 3:]),
+                      quaternion_multiply(np.tile(back, (len(pose), 1)), pose[:, 3:])])
 
 
 def stays(make: Callable[[], Scene], timing: Timing | None) -> np.ndarray:
