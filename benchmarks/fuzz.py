@@ -14,6 +14,8 @@ A broken gate prints the pose, ready to be pasted into a test; the exit status i
 has a digest of all verdicts and separations. Runs of equal seed and number have equal digests for
 every instruction set (BOX_CONTACT_INSTRUCTION_SET), and before and after a change of the core that
 keeps these bits.
+
+With `--heaps N`, N random heaps of boxes are moved by `PatchForces` instead (benchmarks/heaps.py).
 """
 from __future__ import annotations
 
@@ -39,7 +41,7 @@ from box_contact_ros.solver.contact import FIELDS, Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix
 
-from . import judge, output, probes
+from . import heaps, judge, output, probes
 from .pose_sets import (
     CONTAINER,
     HIGH_CUBE,
@@ -403,9 +405,13 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--random-weights', action='store_true',
                         help=f'mlp has other random weights in each piece of {PIECE:,} pairs; the '
                         'table is fuzz_random_weights.csv')
+    parser.add_argument('--heaps', type=within(1), metavar='N',
+                        help='run N heaps of boxes by the forces, and no pairs')
     parser.add_argument('--workers', type=within(1), default=os.cpu_count() or 1,
                         help='processes at once')
     options = parser.parse_args(args)
+    if options.heaps:
+        return int(heaps.fuzz(options.heaps, seed=options.seed, workers=options.workers) > 0)
     folder = output.results_folder(parser, options)
     require('fuzz', 'report')
     tallies = fuzz(QUICK_PAIRS if options.quick else options.pairs, seed=options.seed,

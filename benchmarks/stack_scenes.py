@@ -283,9 +283,11 @@ def rolling_deck(degrees: float = 20.0) -> Scene:
     def drive(t: float) -> tuple[float, ...]:
         return 0.0, 0.0, 0.0, most * rate * math.cos(rate * t), 0.0, 0.0
 
-    return Scene(f'deck that rolls by {degrees:g}°', Boxes.of([
-        ((30.0, 20.0, 1.0), 0.0, (0, 0, -0.5)),
-        (CONTAINER, 20_000.0, (0, 0, 0.5 * CONTAINER[2]))]), 20.0, drive=drive)
+    boxes = Boxes.of([((30.0, 20.0, 1.0), 0.0, (0, 0, -0.5)),
+                      (CONTAINER, 20_000.0, (0, 0, 0.5 * CONTAINER[2]))])
+    boxes.velocity[:, 3] = most * rate
+    boxes.velocity[1, 1] = -most * rate * (0.5 + 0.5 * CONTAINER[2])
+    return Scene(f'deck that rolls by {degrees:g}°', boxes, 20.0, drive=drive)
 
 
 def braking_lorry(braking: float = 0.4) -> Scene:
