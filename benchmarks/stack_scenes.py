@@ -330,7 +330,7 @@ def dammed_belt() -> Scene:
 def dominoes(count: int = 50) -> Scene:
     """Return dominoes, of which the first is pushed."""
     size = (0.1, 0.5, 1.0)
-    rows = [FLOOR, *((size, 10.0, (0.5 * k - 12.0, 0, 0.5)) for k in range(count))]
+    rows = [FLOOR, *((size, 10.0, (0.3 * k - 7.5, 0, 0.5)) for k in range(count))]
 
     def push(t: float, *_: object) -> np.ndarray:
         found = np.zeros((count + 1, 6))
