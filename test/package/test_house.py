@@ -91,24 +91,6 @@ def test_all_nodes_are_guarded() -> None:
                     f'{file}: {node.name}')
 
 
-def calls(folder: str) -> Iterator[tuple[str, str, list[ast.expr], dict[str | None, ast.expr]]]:
-    """Yield the place, name, arguments and options of each call in Python below a folder."""
-    for file in sorted((ROOT / folder).rglob('*.py')):
-        for node in nodes(file):
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
-                yield (f'{file}:{node.lineno}', node.func.attr, node.args,
-                       {option.arg: option.value for option in node.keywords})
-
-
-def test_tests_wait_as_long_as_a_busy_machine_needs() -> None:
-    """Their limit is PATIENCE: no number stands where a call takes one."""
-    waiting = {'wait', 'wait_for', 'wait_for_output', 'join', 'recv', 'timeout'}
-    short = [place for place, name, arguments, options in calls('test')
-             for limit in [*(arguments[-1:] if name in waiting else []), options.get('timeout')]
-             if isinstance(limit, ast.Constant) and isinstance(limit.value, (int, float))]
-    assert short == []
-
-
 def test_a_test_that_hangs_is_ended(tmp_path: Path) -> None:
     """Although it has Python's lock, as it has where Fast DDS hangs; the traceback names it."""
     (tmp_path / 'test_hanging.py').write_text('from ctypes import PyDLL\n'
@@ -118,19 +100,6 @@ def test_a_test_that_hangs_is_ended(tmp_path: Path) -> None:
          '-o', 'faulthandler_timeout=0.2', tmp_path], capture_output=True, text=True,
         timeout=PATIENCE)
     assert done.returncode == 1 and 'test_hanging.py", line 2 in test_it' in done.stderr
-
-
-def test_hypothesis_has_no_limit_of_time() -> None:
-    settings = pytest.importorskip('hypothesis').settings
-    assert settings().deadline is None
-    assert 'too_slow' in {check.name for check in settings().suppress_health_check}
-
-
-def test_legends_have_a_place() -> None:
-    """Matplotlib otherwise looks for one, and warns if that takes a second of a busy machine."""
-    assert [place for folder in (NAME, *OUTSIDE, 'docs')
-            for place, name, _, options in calls(folder)
-            if name == 'legend' and 'loc' not in options] == []
 
 
 @pytest.mark.parametrize(('asked', 'kept'), [('', 'plain'), ('network', 'plain network')])

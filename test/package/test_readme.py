@@ -10,7 +10,6 @@ of fails.
 """
 from __future__ import annotations
 
-import codeop
 import contextlib
 import inspect
 import io
@@ -338,19 +337,6 @@ def test_python_example(text, lines, program, tmp_path, monkeypatch):
     with contextlib.redirect_stdout(io.StringIO()) as printed:
         exec(compile(text, 'example', 'exec'), {'__name__': 'example'})
     assert printed.getvalue().splitlines() == lines
-
-
-@pytest.mark.parametrize(('text', 'lines'), list(examples()))
-def test_python_example_can_be_pasted(text, lines):
-    """Into `python`, where a blank line ends a loop: without it the next line is a SyntaxError."""
-    if text.startswith(' '):
-        pytest.skip('a part of a file')
-    typed = []
-    for line in [*text.splitlines(), '']:
-        typed.append(line)
-        if codeop.compile_command('\n'.join(typed), symbol='single'):
-            typed.clear()
-    assert not any(typed), typed
 
 
 def test_the_table_of_programs_is_whole():
