@@ -92,6 +92,7 @@ reports:
 	run benchmarks.fuzz $(ARGS)
 	run benchmarks.landing $(ARGS)
 	run benchmarks.stacks $(ARGS)
+	run benchmarks.force_lines $(ARGS)
 	run benchmarks.frontier $(ARGS) $(LEFT_OUT)
 	run benchmarks.native $(ARGS) $(LEFT_OUT)
 	run benchmarks.scenes $(ARGS)

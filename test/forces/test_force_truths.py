@@ -6,61 +6,15 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
 import pytest
+from worlds import CONTAINER, FIXED, FLOOR, STEP, World, turned
 
 from box_contact_ros import Body, ContactSolver, PatchForces
-from box_contact_ros.forces.patch_forces import FRICTION, GRAVITY
+from box_contact_ros.forces.patch_forces import GRAVITY
 from box_contact_ros.solver.pose import rotation_matrix
-
-STEP = 0.001  # [s]
-FIXED = Body(mass=0.0, inertia=np.zeros(3))
-FLOOR = (60.0, 60.0, 1.0), 0.0, (0.0, 0.0, -0.5)
-"""A row of `World`, its top at z = 0."""
-CONTAINER = (12.192, 2.438, 2.591)
-
-
-def turned(axis: Sequence[float], angle: float) -> np.ndarray:
-    return np.append(math.sin(0.5 * angle) * np.array(axis, float), math.cos(0.5 * angle))
-
-
-class World:
-    """Bodies of one box each, under gravity, by contacts of their own at each step.
-
-    A row is a size, a mass (0: fixed), a position and perhaps a quaternion and a centre of mass.
-    """
-
-    def __init__(self, *rows: tuple, **options) -> None:
-        self.size = np.array([row[0] for row in rows], float)
-        self.mass = np.array([row[1] for row in rows], float)
-        self.poses = np.array([[*row[2], *(row[3] if len(row) > 3 else (0, 0, 0, 1))]
-                               for row in rows], float)
-        self.velocities = np.zeros((len(rows), 6))
-        self.outside = np.zeros((len(rows), 6))
-        self.outside[:, 2] = -GRAVITY * self.mass
-        self.bodies = [
-            Body(mass=mass, inertia=Body.of_box(size, mass).inertia,
-                 centre=row[4] if len(row) > 4 else (0, 0, 0)) if mass else FIXED
-            for row, size, mass in zip(rows, self.size, self.mass)]
-        self.forces = PatchForces(self.bodies, **options)
-        self.forces.set_boxes(self.size)
-        n = len(rows)
-        self.forces.hold([(a, b) for a in range(n) for b in range(a + 1, n)
-                          if self.mass[a] or self.mass[b]])
-
-    def step(self, dt: float = STEP) -> World:
-        self.poses, self.velocities, self.wrenches = self.forces.advance(
-            dt, self.poses, self.velocities, self.outside)
-        return self
-
-    def run(self, seconds: float) -> World:
-        for _ in range(round(seconds / STEP)):
-            self.step()
-        return self
-
 
 # --- contacts of one's own ------------------------------------------------------------------------
 
@@ -302,26 +256,6 @@ def test_the_angle_at_which_a_box_tips(share: float, tips: bool) -> None:
     leaning = math.acos(min(1.0, rotation_matrix(world.poses[1, 3:])[:, 2] @ up))
     assert (leaning > 0.1) == tips
     assert tips or leaning < 1e-3
-
-
-def test_the_way_of_a_sliding_box() -> None:
-    """v² / (2·μ·g), from 2 m/s."""
-    world = World(FLOOR, ((1.0, 1.0, 0.2), 10.0, (0, 0, 0.1)))
-    world.run(0.05).velocities[1, 0] = 2.0
-    world.run(1.0)
-    assert world.poses[1, 0] == pytest.approx(2.0**2 / (2 * FRICTION * GRAVITY), rel=1e-3)
-    assert np.abs(world.velocities).max() < 1e-9
-
-
-def test_the_time_to_stop_of_a_spinning_box() -> None:
-    """I·ω / (μ·m·g·r) on its square face: r = 0.3826·a, times 0.966 as for real overlaps."""
-    world = World(FLOOR, ((1.0, 1.0, 0.2), 10.0, (0, 0, 0.1)))
-    world.run(0.05).velocities[1, 5] = 3.0
-    expected = 10.0 / 6.0 * 3.0 / (FRICTION * 10.0 * GRAVITY * 0.3826 * 0.966)
-    world.run(expected - 0.01)
-    assert world.velocities[1, 5] > 0.01
-    world.run(0.02)
-    assert abs(world.velocities[1, 5]) < 1e-6
 
 
 def test_the_impact_of_two_equal_boxes() -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -28,7 +29,7 @@ class World:
     """Bodies of one box each, under gravity, by contacts of their own at each step.
 
     A row is a size, a mass (0: fixed), a position and perhaps a quaternion and a centre of mass.
-    pairs: of boxes that may touch; without it, all of which one is free.
+    pairs: of boxes that may touch; None: all of which one is free; none: contacts are held.
     """
 
     def __init__(self, *rows: tuple, pairs: Sequence[tuple[int, int]] | None = None,
@@ -45,10 +46,12 @@ class World:
                  centre=row[4] if len(row) > 4 else (0, 0, 0)) if mass else FIXED
             for row, size, mass in zip(rows, self.size, self.mass)]
         self.forces = PatchForces(self.bodies, **options)
-        self.forces.set_boxes(self.size)
-        n = len(rows)
-        self.forces.hold(pairs or [(a, b) for a in range(n) for b in range(a + 1, n)
-                                   if self.mass[a] or self.mass[b]])
+        if pairs is None:
+            pairs = [(a, b) for a, b in combinations(range(len(rows)), 2)
+                     if self.mass[a] or self.mass[b]]
+        if pairs:
+            self.forces.set_boxes(self.size)
+            self.forces.hold(pairs)
 
     def step(self, dt: float = STEP) -> World:
         self.poses, self.velocities, self.wrenches = self.forces.advance(
