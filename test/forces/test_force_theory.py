@@ -182,7 +182,7 @@ def crowd(rng: np.random.Generator, groups: int, gravity: float, **options: int)
 
 
 @pytest.mark.parametrize('gravity', [0.0, GRAVITY])
-@pytest.mark.parametrize('seed, substeps', enumerate([1, 4, 4, 16, 64]))
+@pytest.mark.parametrize('seed, substeps', [(0, 1), (1, 4), (2, 4), (3, 16), (4, 64)])
 def test_energy_is_never_gained(seed: int, substeps: int, gravity: float) -> None:
     """In 100 histories each of three boxes that hit each other, and a floor, by uneven steps.
 
