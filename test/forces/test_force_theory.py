@@ -69,9 +69,13 @@ def test_cargo_stays_on_a_lorry_that_brakes(dt: float, line: float) -> None:
     assert abs(slid_on_a_lorry(0.4, dt)) <= line
 
 
-@pytest.mark.parametrize('dt, line', [(STEP, 0.003), (FRAME, 0.02)])
+@pytest.mark.parametrize('dt, line', [(STEP, 0.003), (FRAME, 0.04)])
 def test_cargo_slides_on_a_lorry_that_brakes_hard(dt: float, line: float) -> None:
-    """By ½·(a − μ·g)·t² at 0.6 g; a sub-step moves by its last speed, which is first order."""
+    """By ½·(a − μ·g)·t² at 0.6 g.
+
+    In its first step the lorry has the speed of the step's middle, and the crate may stick to it:
+    it is faster by μ·g·dt / 2 at most from then on.
+    """
     expected = 0.5 * (0.6 - FRICTION) * GRAVITY * 2.0**2
     assert slid_on_a_lorry(0.6, dt) == pytest.approx(expected, rel=line)
 
