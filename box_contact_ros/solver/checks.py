@@ -139,7 +139,7 @@ def as_floats(value: ArrayLike, name: str, shapes: str, *accepted: tuple[int | N
         if len(shape) == array.ndim and all(
                 want is None or want == have for want, have in zip(shape, array.shape)):
             return array
-        if array.shape == (0,) and not shape[0]:
+        if array.shape == (0,) and shape and not shape[0]:
             return array.reshape(0, *filter(None, shape))
     raise ValueError(f'{name} must be {shapes}, not an array of shape {array.shape}')
 
