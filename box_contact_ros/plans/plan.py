@@ -22,7 +22,7 @@ from ..solver.checks import (
     short_repr,
 )
 
-FAULT_KINDS = ('gap', 'twice', 'slot', 'size type', 'mass', 'dimension', 'pose', 'shape')
+FAULT_KINDS = ('gap', 'twice', 'cut', 'slot', 'size type', 'mass', 'dimension', 'pose', 'shape')
 """What may be wrong with a row of a file."""
 
 
