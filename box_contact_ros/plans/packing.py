@@ -1,0 +1,213 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Packing plans: CSV and JSON of our own, and the JSON of two projects.
+
+A row is a box: its name, full extents and centre [m], and, where it has them, its quaternion, mass
+and limit [kg], and whether it is fixed. Where no row is fixed, z = 0 is the ground.
+msg_schemas/plan.json is the format in JSON; the columns of a CSV file have the same names.
+"""
+from __future__ import annotations
+
+import csv
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..core import LENGTH_MAX, MASS_MAX
+from ..solver.checks import nearest_name, pose_fault, short_repr, size_fault
+from .plan import Fault, Plan
+
+EXTENTS, PLACE, TURN = ('length', 'width', 'height'), ('x', 'y', 'z'), ('qx', 'qy', 'qz', 'qw')
+NEEDED = ('name', *EXTENTS, *PLACE)
+KEYS = (*NEEDED, *TURN, 'mass', 'limit', 'fixed')
+DELIMITERS = ',;\t'
+WORDS = {'true': True, '1': True, 'yes': True, 'false': False, '0': False, 'no': False, '': False}
+"""What `fixed` may be in a CSV file."""
+UNTURNED = (0.0, 0.0, 0.0, 1.0)
+GROUND, GROUND_THICKNESS, GROUND_MARGIN = 'ground', 1.0, 1.0
+"""Name, thickness, and how far it reaches beyond the boxes [m]."""
+ROOM = 1.0  # between the stacks of one file, which are placed side by side [m]
+MILLIMETRE = 1e-3
+Row = Mapping[str, Any]
+
+
+def read_csv(text: str) -> Plan:
+    """Return the plan of a CSV file; its faults are rows. Raises ValueError for other files."""
+    lines = text.removeprefix('\ufeff').splitlines()
+    start = next((n for n, line in enumerate(lines) if line.strip()), None)
+    if start is None:
+        raise ValueError('it is empty')
+    delimiter = max(DELIMITERS, key=lines[start].count)
+    try:
+        header, *rows = csv.reader(lines[start:], delimiter=delimiter)
+    except csv.Error as error:
+        raise ValueError(f'it is not CSV: {error}') from None
+    columns = [column.strip().lower() for column in header]
+    for key in NEEDED:
+        if key not in columns:
+            raise ValueError(f'line {start + 1}: the column {key} is missing'
+                             f'{nearest_name(key, columns)}; the columns are {", ".join(KEYS)}')
+    if delimiter == ';':  # where a comma is the decimal mark
+        rows = [[value.replace(',', '.') if column != 'name' else value
+                 for column, value in zip(columns, row)] for row in rows]
+    return plan_of({key: value.strip() for key, value in zip(columns, row) if value.strip()}
+                   for row in rows if any(value.strip() for value in row))
+
+
+def read_packing(document: Any) -> Plan | None:
+    """Return the plan of a JSON document, or None if it has another form."""
+    if isinstance(document, Mapping):
+        if isinstance(document.get('boxes'), list):
+            return plan_of(document['boxes'])
+        if isinstance(document.get('containers'), list):
+            return plan_of(_side_by_side(map(_placements, document['containers'])))
+        if document and all(isinstance(order, list) and order and all(
+                isinstance(entry, Mapping) and 'flb_coordinates' in entry for entry in order)
+                for order in document.values()):
+            return plan_of(_side_by_side(_order(name, order)
+                                         for name, order in document.items()))
+    return None
+
+
+def _placements(container: Any) -> Iterator[dict[str, Any]]:
+    """Yield the rows of a container of 3d-bin-container-packing's viewer, in millimetres."""
+    try:
+        for n, entry in enumerate(container['stack']['placements']):
+            goods = entry['stackable']
+            yield _from_corner(f'{container.get("name")}/{goods.get("name") or n + 1}/{n + 1}',
+                               [goods[key] for key in ('dx', 'dy', 'dz')],
+                               [entry[key] for key in ('x', 'y', 'z')])
+    except (LookupError, TypeError, AttributeError) as error:
+        raise ValueError(f'a container lacks {error}') from None
+
+
+def _order(name: str, entries: Sequence[Row]) -> Iterator[dict[str, Any]]:
+    """Yield the rows of an order of BED-BPP, in millimetres."""
+    for n, entry in enumerate(entries):
+        try:
+            item, corner = entry['item'], entry['flb_coordinates']
+            extents = [item[f'{side}/mm'] for side in EXTENTS]
+            if entry['orientation'] == 1:
+                extents[:2] = extents[1::-1]
+            yield {**_from_corner(f'{name}/{item["sequence"]}', extents, corner),
+                   'mass': item['weight/kg']}
+        except (LookupError, TypeError) as error:
+            raise ValueError(f'order {name}, entry {n}: it lacks {error}') from None
+
+
+def _from_corner(name: str, extents: Sequence[Any], corner: Sequence[Any]) -> dict[str, Any]:
+    """Return a row of extents and of the least corner, both in millimetres."""
+    sides, low = ([_number(value) * MILLIMETRE for value in values] for values in (extents, corner))
+    return {'name': name, **dict(zip(EXTENTS, sides)),
+            **{key: value + side / 2.0 for key, value, side in zip(PLACE, low, sides)}}
+
+
+def _side_by_side(stacks: Iterable[Iterable[dict[str, Any]]]) -> Iterator[Row]:
+    """Yield the rows of stacks that each begin at x = 0, one after another along x."""
+    start = 0.0
+    for stack in stacks:
+        rows = list(stack)
+        ends = [row['x'] + row['length'] / 2.0 for row in rows]
+        for row in rows:
+            yield {**row, 'x': row['x'] + start}
+        start += max((end for end in ends if math.isfinite(end)), default=0.0) + ROOM
+
+
+def plan_of(rows: Iterable[Any]) -> Plan:
+    """Return the plan of rows; those that cannot be placed are left out, and named as faults.
+
+    Raises ValueError where none can be placed.
+    """
+    faults: list[Fault] = []
+    boxes = [box for number, row in enumerate(rows, 1)
+             if (box := _box(row if isinstance(row, Mapping) else {}, number, faults))]
+    if not boxes:
+        raise ValueError(f'no box can be placed: {faults[0].text}' if faults else 'it has no box')
+    names = [box.name for box in boxes]
+    for name, count in Counter(names).items():
+        if count > 1:
+            faults.append(Fault('twice', (name,), f'{count} boxes have this name'))
+    weighed = any(box.mass is not None for box in boxes)
+    for box in boxes:
+        if weighed and box.mass is None and not box.fixed:
+            faults.append(Fault('mass', (box.name,), 'has no mass: taken as 0'))
+    sizes, poses = np.array([box.size for box in boxes]), np.array([box.pose for box in boxes])
+    masses = [box.mass or 0.0 for box in boxes]
+    limits = [box.limit for box in boxes]
+    ground = [n for n, box in enumerate(boxes) if box.fixed]
+    if not ground:
+        size, pose = slab_below(sizes, poses)
+        sizes, poses = np.vstack((sizes, size)), np.vstack((poses, pose))
+        names, masses, limits = [*names, GROUND], [*masses, 0.0], [*limits, math.inf]
+        ground = [len(boxes)]
+    return Plan(sizes, poses, masses if weighed else None, ground=ground, names=names,
+                limits=limits, faults=faults)
+
+
+def slab_below(sizes: np.ndarray, poses: np.ndarray, height: float = 0.0,
+               ) -> tuple[np.ndarray, np.ndarray]:
+    """Return full extents (3,) and pose (7,) of a slab under all boxes, its top at a height [m]."""
+    reach = np.linalg.norm(sizes, axis=1, keepdims=True) / 2.0 + GROUND_MARGIN
+    low, high = (poses[:, :2] - reach).min(axis=0), (poses[:, :2] + reach).max(axis=0)
+    return (np.array([*np.minimum(high - low, LENGTH_MAX), GROUND_THICKNESS]),
+            np.array([*(low + high) / 2.0, height - GROUND_THICKNESS / 2.0, *UNTURNED]))
+
+
+@dataclass(frozen=True)
+class _Box:
+    """A row that can be placed."""
+
+    name: str
+    size: list[float]
+    pose: list[float]
+    mass: float | None
+    limit: float
+    fixed: bool
+
+
+def _box(row: Row, number: int, faults: list[Fault]) -> _Box | None:
+    """Return what a row says, or None; add what is wrong with it to the faults."""
+    name = str(row.get('name', f'row {number}'))
+    place = '' if name == f'row {number}' else f'row {number}: '
+    turn = TURN if any(key in row for key in TURN) else ()
+    for kind, keys in ('dimension', EXTENTS), ('pose', PLACE + turn):
+        values = [_number(row.get(key)) for key in keys]
+        text = next((f'{key} is {short_repr(row[key]) if key in row else "missing"}'
+                     for key, value in zip(keys, values) if math.isnan(value)), '')
+        if kind == 'dimension':
+            size, text = values, text or size_fault(values) or ''
+        else:
+            pose = values if turn else [*values, *UNTURNED]
+            text = text or pose_fault(pose) or ''
+        if text:
+            faults.append(Fault(kind, (name,), f'{place}{text}: left out'))
+            return None
+    amounts: list[float | None] = []
+    for key, most in ('mass', MASS_MAX), ('limit', math.inf):
+        value = _number(row[key]) if row.get(key) is not None else None
+        if value is not None and not 0.0 <= value <= most:
+            faults.append(Fault('mass', (name,), f'{place}{key} is {short_repr(row[key])}: taken '
+                                                 f'as {"0" if key == "mass" else "unknown"}'))
+            value = 0.0 if key == 'mass' else None
+        amounts.append(value)
+    fixed = WORDS.get(str(row.get('fixed', '')).lower())
+    if fixed is None:
+        faults.append(Fault('pose', (name,), f'{place}fixed is {short_repr(row["fixed"])}, neither '
+                                             'true nor false: left out'))
+        return None
+    return _Box(name, size, pose, amounts[0], math.inf if amounts[1] is None else amounts[1], fixed)
+
+
+def _number(value: Any) -> float:
+    """Return a number, or one that a text has; NaN for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str) or '_' in str(value):
+        return math.nan
+    try:
+        return float(value)
+    except (ValueError, OverflowError):
+        return math.nan
