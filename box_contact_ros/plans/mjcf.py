@@ -1,0 +1,130 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""MJCF and URDF, read by MuJoCo, in the pose that the file has.
+
+What joints join to each other is one body, and what they join to the world is fixed. Geoms may
+touch as they may in MuJoCo: by contype and conaffinity, <pair>, <exclude> and filterparent.
+"""
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..extras import require
+from .bodies import Solid, Weight, plan_of_bodies, total
+from .plan import Fault, Plan
+
+WELDS = ('mjEQ_CONNECT', 'mjEQ_WELD')
+"""Equalities that join two bodies."""
+LEAST = 1e-9
+"""Mass and inertia of a body whose meshes are left out: MuJoCo takes none without."""
+
+
+def read_mjcf(path: Path) -> Plan:
+    """Return the plan of a model of MuJoCo, or of a robot. Raises ValueError for other files."""
+    require('sim')
+    import mujoco
+
+    model, meshes = _compiled(path)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    tops = _tops(model)
+    faults = [Fault('shape', tuple(meshes), f'{len(meshes)} mesh, height field or SDF: no box, so '
+                                            'left out')] if meshes else []
+    solids = []
+    for geom in range(model.ngeom):
+        kind = mujoco.mjtGeom(model.geom_type[geom]).name.removeprefix('mjGEOM_').lower()
+        turn = np.zeros(4)
+        mujoco.mju_mat2Quat(turn, data.geom_xmat[geom])
+        size = 2.0 * (model.geom_size[geom] if kind == 'box' else model.geom_aabb[geom, 3:])
+        solids.append(Solid(
+            model.geom(geom).name or f'geom {geom}', kind,
+            (1.0, 1.0, 1.0) if kind == 'plane' else tuple(size),
+            np.r_[data.geom_xpos[geom], turn[1:], turn[0]],  # MuJoCo puts w first
+            tops[model.geom_bodyid[geom]]))
+    weights: dict[int, list[Weight]] = {}
+    for body in range(1, model.nbody):
+        weights.setdefault(tops[body], []).append(
+            Weight(float(model.body_mass[body]), data.xipos[body].copy()))
+    return plan_of_bodies(solids, {0}, {top: total(parts) for top, parts in weights.items() if top},
+                          _filter(model), faults, is_whole=not meshes)
+
+
+def _compiled(path: Path) -> tuple[Any, list[str]]:
+    """Return MuJoCo's model, and the names of the geoms that were left out.
+
+    These are all meshes and height fields, if a file of theirs cannot be read.
+    """
+    import mujoco
+
+    def spec() -> Any:
+        model = mujoco.MjSpec.from_file(str(path))
+        model.compiler.balanceinertia = True  # nothing turns here
+        return model
+
+    try:
+        return spec().compile(), []
+    except ValueError as error:
+        first = error
+    try:
+        model = spec()
+        left_out = [geom for geom in model.geoms if geom.type in (
+            mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_HFIELD, mujoco.mjtGeom.mjGEOM_SDF)]
+        names = [geom.name or f'mesh of {geom.parent.name}' for geom in left_out]
+        for material in model.materials:
+            material.textures = [''] * len(material.textures)
+        for part in (*left_out, *model.meshes, *model.hfields, *model.skins, *model.textures):
+            model.delete(part)
+        model.compiler.boundmass = model.compiler.boundinertia = LEAST
+        return model.compile(), names
+    except ValueError:
+        raise ValueError(f'MuJoCo does not read it: {" ".join(str(first).split())}') from None
+
+
+def _tops(model: Any) -> list[int]:
+    """Return of each body the one by which the whole that joints join is known; 0 is fixed."""
+    import mujoco
+
+    tops = [0]
+    for body in range(1, model.nbody):
+        first = model.body_jntadr[body]
+        is_free = first >= 0 and model.jnt_type[first] == mujoco.mjtJoint.mjJNT_FREE
+        tops.append(body if is_free else tops[model.body_parentid[body]])
+    joins = {getattr(mujoco.mjtEq, name) for name in WELDS}
+    for n in range(model.neq):
+        if model.eq_type[n] in joins and model.eq_active0[n]:
+            ends = model.eq_obj1id[n], model.eq_obj2id[n]
+            if model.eq_objtype[n] == mujoco.mjtObj.mjOBJ_SITE:
+                ends = tuple(model.site_bodyid[end] for end in ends)
+            low, high = sorted(tops[end] for end in ends)
+            tops = [low if top == high else top for top in tops]
+    return tops
+
+
+def _filter(model: Any) -> Callable[[int, int], bool]:
+    """Return what tells whether two geoms may touch."""
+    import mujoco
+
+    pairs = {frozenset(pair) for pair in zip(model.pair_geom1.tolist(), model.pair_geom2.tolist())}
+    excluded = {frozenset((int(bodies) >> 16, int(bodies) & 0xffff))
+                for bodies in model.exclude_signature}
+    weld = model.body_weldid.tolist()
+    above = [weld[parent] for parent in model.body_parentid[model.body_weldid].tolist()]
+    filters = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
+    bodies = model.geom_bodyid.tolist()
+    kinds, others = model.geom_contype.tolist(), model.geom_conaffinity.tolist()
+
+    def may_touch(a: int, b: int) -> bool:
+        if frozenset((a, b)) in pairs:
+            return True
+        own, other = weld[bodies[a]], weld[bodies[b]]
+        # The world collides with its children.
+        is_parent = filters and own and other and (above[own] == other or above[other] == own)
+        return (own != other and not is_parent
+                and frozenset((bodies[a], bodies[b])) not in excluded
+                and bool(kinds[a] & others[b] | kinds[b] & others[a]))
+    return may_touch
