@@ -1,0 +1,104 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""A plan from a file, whatever its format: the content tells it, and else the file's ending."""
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from .plan import Plan
+
+FORMATS = ('SMDG BAPLIE, SDF, MJCF, URDF, a scene file (YAML), and packing plans as CSV or JSON')
+MOST_BYTES = 2**28
+"""Of a file: 256 MiB, some hundred times the largest ship's plan."""
+
+
+class ReadPlan(NamedTuple):
+    """A plan, and how its boxes stand on each other."""
+
+    plan: Plan
+    bears: str
+    """'corners' of containers, else 'faces', as `inspect_plan` takes it."""
+
+
+def read_plan(path: str | os.PathLike[str]) -> Plan:
+    """Return the plan of a file: SMDG BAPLIE, SDF, MJCF, URDF, a scene file, CSV or JSON.
+
+    What a file says wrongly about some boxes is among the plan's faults. MJCF and URDF need the
+    extra `sim`. Raises OSError, and ValueError with the file and the reason for what is no plan.
+    """
+    return read_any(path).plan
+
+
+def read_any(path: str | os.PathLike[str]) -> ReadPlan:
+    """Return the plan of a file as `read_plan` does, and how its boxes stand on each other."""
+    file = Path(path)
+    if file.is_file() and file.stat().st_size > MOST_BYTES:
+        raise ValueError(f'{file}: it has more than {MOST_BYTES >> 20} MiB')
+    data = file.read_bytes()
+    try:
+        return _read(file, data)
+    except RecursionError:
+        raise ValueError(f'{file}: it is nested too deeply') from None
+    except UnicodeDecodeError as error:
+        raise ValueError(f'{file}: byte {error.start} is not UTF-8; what is read: {FORMATS}'
+                         ) from None
+    except ValueError as error:
+        if str(error).startswith(str(file)):
+            raise
+        raise ValueError(f'{file}: {error}') from None
+
+
+def _read(file: Path, data: bytes) -> ReadPlan:
+    start = data[:4096].decode('latin-1').removeprefix('ï»¿').lstrip()
+    ending = file.suffix.lower()
+    if start[:4] in ('UNA:', 'UNB+') or start[:3] in ('UNA', 'UNB', 'UNH') or ending == '.edi':
+        from .baplie import read_baplie
+        return ReadPlan(read_baplie(data.decode('latin-1')), 'corners')
+    if start.startswith('<'):
+        return ReadPlan(_read_xml(file, data), 'faces')
+    if start[:1] in ('{', '['):
+        return ReadPlan(_read_json(file, data), 'faces')
+    if ending in ('.yaml', '.yml'):
+        from .scene import read_scene_plan
+        return ReadPlan(read_scene_plan(file), 'faces')
+    first = start.partition('\n')[0].lower()
+    if ending in ('.csv', '.tsv') or ('name' in first and 'length' in first):
+        from .packing import read_csv
+        return ReadPlan(read_csv(data.decode('utf-8')), 'faces')
+    shown = first.strip()[:60]
+    raise ValueError(f'line 1: {shown!r} begins no format that is read: {FORMATS}' if shown else
+                     f'it is empty; what is read: {FORMATS}')
+
+
+def _read_xml(file: Path, data: bytes) -> Plan:
+    from .sdf import parse_xml, read_sdf
+
+    root = parse_xml(data)
+    if root.tag in ('mujoco', 'robot'):
+        from .mjcf import read_mjcf
+        return read_mjcf(file)
+    if root.tag in ('sdf', 'gazebo', 'world', 'model'):
+        return read_sdf(root)
+    raise ValueError(f'line 1: <{root.tag}> begins no format that is read: {FORMATS}')
+
+
+def _read_json(file: Path, data: bytes) -> Plan:
+    from .packing import read_packing
+
+    try:
+        document = json.loads(data)
+    except json.JSONDecodeError as error:
+        raise ValueError(f'line {error.lineno}: it is not JSON: {error.msg}') from None
+    plan = read_packing(document)
+    if plan is not None:
+        return plan
+    if isinstance(document, Mapping) and {'boxes', 'bodies', 'pairs'} & document.keys():
+        from .scene import read_scene_plan
+        return read_scene_plan(file)
+    raise ValueError('it is JSON, but neither a packing plan (boxes: [...], see '
+                     'msg_schemas/plan.json) nor a scene file')

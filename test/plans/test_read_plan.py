@@ -1,0 +1,387 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Readers of plans: small files with a fault each, and what files of one plan have in common."""
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from box_contact_ros.plans.plan import Plan
+from box_contact_ros.plans.read_plan import read_any, read_plan
+from box_contact_ros.solver.contacts_of import contacts_of
+
+ROOT = Path(__file__).resolve().parents[2]
+FILES = ROOT / 'docs' / 'examples' / 'files'
+
+
+def baplie(*boxes: str, end: str = '', message: str = 'BAPLIE:D:95B:UN:SMDG22') -> str:
+    """Return a plan; a box is a slot, a size type, and segments in between: '0010082 22G1 ...'."""
+    lines = [f'UNH+1+{message}', 'BGM++1+9']
+    for n, box in enumerate(boxes):
+        slot, kind, *more = box.split()
+        lines += [f'LOC+147+{slot}::5'] if slot != '-' else []
+        lines += more or ['MEA+WT++KGM:20000']
+        lines += [f'EQD+CN+TEST{n:07}+{kind}+++5'] if kind != '-' else []
+    lines += [end or f'UNT+{len(lines) + 1}+1']
+    return "'\n".join(['UNB+UNOA:2+A+B+261126:0900+1', *lines, 'UNZ+1+1']) + "'\n"
+
+
+HEADER = 'name,length,width,height,x,y,z'
+FLAT = 'a,1,1,1,0,0,0.5'
+
+
+def sheet(*rows: str, more: str = '') -> str:
+    """Return a CSV file, with more columns than those that are needed."""
+    return '\n'.join([HEADER + more, *rows]) + '\n'
+
+
+def document(**changed: object) -> str:
+    """Return a JSON file of two boxes, of which the second has other values."""
+    box = {'name': 'a', 'length': 1, 'width': 1, 'height': 1, 'x': 0, 'y': 0, 'z': 0.5}
+    return json.dumps({'boxes': [box, {**box, 'name': 'b', 'z': 1.5, **changed}]})
+
+
+BOX = '<geometry><box><size>1 1 1</size></box></geometry>'
+
+
+def collision(shape: str = BOX, name: str = 'c', more: str = '') -> str:
+    """Return a link with a collision."""
+    return f'<link name="l"><collision name="{name}">{more}{shape}</collision></link>'
+
+
+def model(name: str, content: str, z: float = 0.5) -> str:
+    """Return a model at a height."""
+    return f'<model name="{name}"><pose>0 0 {z} 0 0 0</pose>{content}</model>'
+
+
+FLOOR = ('<model name="floor"><static>1</static><link name="l"><collision name="c"><geometry>'
+         '<plane/></geometry></collision></link></model>')
+
+
+def world(*content: str) -> str:
+    """Return a world with a floor."""
+    return f'<sdf version="1.9"><world name="w">{FLOOR}{"".join(content)}</world></sdf>'
+
+
+A = model('a', collision())
+
+
+def mjcf(*content: str, more: str = '') -> str:
+    """Return a model of MuJoCo with a floor."""
+    return (f'<mujoco><worldbody><geom name="floor" type="plane" size="1 1 1"/>{"".join(content)}'
+            f'</worldbody>{more}</mujoco>')
+
+
+def body(name: str, z: float, *, x: float = 0.0, kind: str = 'box', more: str = '') -> str:
+    """Return a free body of MuJoCo, a cube of 1 m."""
+    return (f'<body name="{name}" pos="{x} 0 {z}"><freejoint/><geom name="{name}" type="{kind}" '
+            f'size=".5 .5 .5" {more}/></body>')
+
+
+PLACED = '0010082 22G1'
+FAULTS = {
+    # BAPLIE
+    'gap': ('p.edi', baplie(PLACED, '0010086 22G1'),
+            'gap', '0010086', 'no container below it down to tier 82'),
+    'gap in the hold': ('p.edi', baplie('0010002 22G1', '0010008 22G1'), 'gap', '0010008',
+                        'down to tier 02'),
+    'gap to the deck': ('p.edi', baplie('0010086 22G1'), 'gap', '0010086', 'down to the deck'),
+    'slot twice': ('p.edi', baplie(PLACED, PLACED), 'twice', '0010082', 'TEST0000001 has the slot'),
+    'slot of 6': ('p.edi', baplie(PLACED, '010082 22G1'), 'slot', '010082', 'of 6 characters'),
+    'slot of 8': ('p.edi', baplie(PLACED, '00010082 22G1'), 'slot', '00010082', 'of 8 characters'),
+    'slot of signs': ('p.edi', baplie(PLACED, '00100$$ 22G1'), 'slot', '00100$$', '7 digits'),
+    'no slot': ('p.edi', baplie(PLACED, '- 22G1'), 'slot', 'TEST0000001', 'without a slot'),
+    'size type': ('p.edi', baplie(PLACED, '0010084 5EGB'), 'size type', '0010084', 'type 5EGB'),
+    'height': ('p.edi', baplie(PLACED, '0010084 2ZG1'), 'size type', '0010084', 'type 2ZG1'),
+    'no type': ('p.edi', baplie(PLACED, '0010084 -'), 'size type', '0010084', 'without a size'),
+    'no weight': ('p.edi', baplie(PLACED, '0010084 22G1 RFF+BM:1'), 'mass', '0010084', 'no weight'),
+    'negative weight': ('p.edi', baplie(PLACED, '0010084 22G1 MEA+WT++KGM:-5'), 'mass', '0010084',
+                        'its weight is -5'),
+    'unit': ('p.edi', baplie(PLACED, '0010084 22G1 MEA+WT++XYZ:5'), 'mass', '0010084', 'unit XYZ'),
+    'too heavy': ('p.edi', baplie(PLACED, '0010084 22G1 MEA+WT++KGM:99999999'), 'mass', '0010084',
+                  'more than any container'),
+    'over-height': ('p.edi', baplie('0010082 22U1 MEA+WT++KGM:9000 DIM+9+CMT:::79'), 'dimension',
+                    '0010082', '79 cm in height'),
+    'over-width': ('p.edi', baplie('0010082 22P1 MEA+WT++KGM:9000 DIM+7+CMT::30'), 'dimension',
+                   '0010082', '30 cm on the right'),
+    'end missing': ('p.edi', baplie(PLACED, end='RFF+BM:1'), 'cut', '', 'no UNT'),
+    'cut': ('p.edi', baplie(PLACED, end='UNT+99+1'), 'cut', '', 'counts 99 segments, and there '
+                                                                'are 6'),
+    'cut in a message': ('p.edi', baplie(PLACED) + baplie('0010084 22G1').replace('UNT', 'TNU'),
+                         'cut', '', 'no UNT'),
+    # CSV
+    'size': ('p.csv', sheet(FLAT, 'b,1,-1,1,0,0,1.5'), 'dimension', 'b', '(1, -1, 1) is not '
+                                                                         'positive'),
+    'size in words': ('p.csv', sheet(FLAT, 'b,1,one,1,0,0,1.5'), 'dimension', 'b', "width is 'one"),
+    'short row': ('p.csv', sheet(FLAT, 'b,1,1,1,0,0'), 'pose', 'b', 'z is missing'),
+    'place': ('p.csv', sheet(FLAT, 'b,1,1,1,nan,0,1.5'), 'pose', 'b', "x is 'nan'"),
+    'far away': ('p.csv', sheet(FLAT, 'b,1,1,1,1e300,0,1.5'), 'pose', 'b', 'exceeds'),
+    'no turn': ('p.csv', sheet('a,1,1,1,0,0,.5,0,0,0,1', 'b,1,1,1,0,0,1.5,0,0,0,0',
+                               more=',qx,qy,qz,qw'), 'pose', 'b', 'zero length'),
+    'half a turn': ('p.csv', sheet('a,1,1,1,0,0,.5,0,0,0,1', 'b,1,1,1,0,0,1.5,0,0,1',
+                                   more=',qx,qy,qz,qw'), 'pose', 'b', 'qw is missing'),
+    'mass': ('p.csv', sheet(f'{FLAT},2', 'b,1,1,1,0,0,1.5,-2', more=',mass'), 'mass', 'b',
+             "mass is '-2'"),
+    'mass missing': ('p.csv', sheet(f'{FLAT},2', 'b,1,1,1,0,0,1.5', more=',mass'), 'mass', 'b',
+                     'no mass'),
+    'limit': ('p.csv', sheet(f'{FLAT},x', more=',limit'), 'mass', 'a', "limit is 'x'"),
+    'fixed': ('p.csv', sheet(FLAT, 'b,1,1,1,0,0,1.5,perhaps', more=',fixed'), 'pose', 'b',
+              "fixed is 'perhaps'"),
+    'name twice': ('p.csv', sheet(FLAT, 'a,1,1,1,0,0,1.5'), 'twice', 'a', '2 boxes'),
+    'no name': ('p.csv', sheet(FLAT, ',1,1,0,0,0,1.5'), 'dimension', 'row 2', '(1, 1, 0)'),
+    'digits with _': ('p.csv', sheet(FLAT, 'b,1_0,1,1,0,0,1.5'), 'dimension', 'b', "'1_0'"),
+    # JSON
+    'text': ('p.json', document(width='wide'), 'dimension', 'b', "width is 'wide'"),
+    'true': ('p.json', document(width=True), 'dimension', 'b', 'width is True'),
+    'null': ('p.json', document(x=None), 'pose', 'b', 'x is None'),
+    'NaN': ('p.json', document(x=float('nan')), 'pose', 'b', 'x is nan'),
+    'list': ('p.json', document(length=[1]), 'dimension', 'b', r'length is [1]'),
+    'huge': ('p.json', document(length=10**400), 'dimension', 'b', 'length is 1000'),
+    'no row': ('p.json', '{"boxes": [7, ' + document()[11:], 'dimension', 'row 1', 'missing'),
+    # SDF
+    'SDF size': ('p.sdf', world(A, model('b', collision(BOX.replace('1 1 1', '-1 1 1')))),
+                 'dimension', 'b::l::c', 'size: (-1, 1, 1) is not positive'),
+    'SDF size in words': ('p.sdf', world(A, model('b', collision(BOX.replace('1 1', 'x')))),
+                          'dimension', 'b::l::c', "its <size> is 'x 1'"),
+    'SDF pose': ('p.sdf', world(A, '<model name="b"><pose>1 2 3 4</pose></model>'), 'pose', 'b',
+                 "its pose is '1 2 3 4', not 6 numbers"),
+    'relative_to': ('p.sdf', world(A, model('b', collision(
+        more='<pose relative_to="lid">0 0 0 0 0 0</pose>'))), 'pose', 'b::l::c', 'relative to lid'),
+    'placement_frame': ('p.sdf', world(A, model('b" placement_frame="f', collision())), 'pose', 'b',
+                        'placement_frame f'),
+    'model twice': ('p.sdf', world(A, A), 'twice', 'a', 'two models'),
+    'collision twice': ('p.sdf', world(A.replace('</link>', f'<collision name="c">{BOX}'
+                                                            '</collision></link>')),
+                        'twice', 'a::l::c', 'two collisions'),
+    'include': ('p.sdf', world(A, '<include><uri>crane</uri></include>'), 'shape', 'crane',
+                'included'),
+    'mesh': ('p.sdf', world(A, model('b', collision('<geometry><mesh/></geometry>'))), 'shape',
+             'b::l::c', '1 mesh'),
+    'on a ball': ('p.sdf', world(A, model('b', collision(), 2.5), model('c', collision(
+        '<geometry><sphere><radius>.5</radius></sphere></geometry>'), 1.5)), 'shape',
+        'a::l::c  b::l::c', 'not judged'),
+    'scale': ('p.sdf', world(A, model('b', collision()), '<state><model name="b"><scale>2 2 2'
+                             '</scale></model></state>'), 'dimension', 'b', 'scales it by 2 2 2'),
+    'population': ('p.sdf', world(A, '<population name="p"/>'), 'shape', 'p', '<population>'),
+    'SDF mass': ('p.sdf', world(A.replace('<collision', '<inertial><mass>-1</mass></inertial>'
+                                          '<collision')), 'mass', 'a::l', 'its mass is -1'),
+    'bits': ('p.sdf', world(A.replace('</geometry>', '</geometry><surface><contact><collide_bitmask'
+                                      '>x</collide_bitmask></contact></surface>')), 'shape',
+             'a::l::c', "collide_bitmask 'x'"),
+    'another world': ('p.sdf', world(A).replace('</sdf>', '<world name="v"/></sdf>'), 'shape', 'v',
+                      'another world'),
+    'joint to what is not read': ('p.sdf', world(A.replace(
+        '</model>', '<joint name="j"><parent>x</parent><child>l</child></joint></model>')), 'shape',
+        'a::l', 'joined to a::x'),
+    # MJCF, URDF, scene
+    'geom': ('p.xml', mjcf(body('a', .5), body('b', 5, kind='sphere')), 'shape', 'b', '1 sphere'),
+    'on a geom': ('p.xml', mjcf(body('a', 1.5), body('b', .5, kind='sphere')), 'shape', 'a',
+                  'not judged'),
+    'mesh file': ('p.xml', mjcf(body('a', .5), '<geom name="m" type="mesh" mesh="m"/>',
+                                more='<asset><mesh name="m" file="m.obj"/></asset>'), 'shape', 'm',
+                  '1 mesh'),
+    'robot': ('p.urdf', '<robot name="r"><link name="l"><collision><geometry><sphere radius="1"/>'
+              '</geometry></collision></link></robot>', 'shape', 'geom 0', '1 sphere'),
+    'scene': ('p.yaml', 'boxes: {a: {size: [1, 1, 1]}, b: {size: [1, 1, 1], pose: [0, 0, 0, 0, 0, '
+              '0, 1]}}\npairs: all\n', 'pose', 'a', 'no pose in the file'),
+}
+
+
+def written(folder: Path, name: str, text: str) -> Path:
+    """Return the path of a file with a text."""
+    path = folder / name
+    path.write_text(text, 'utf-8')
+    return path
+
+
+@pytest.mark.parametrize('case', FAULTS)
+def test_a_fault_is_a_row(case: str, tmp_path: Path) -> None:
+    """And the only one of its kind, but for shapes that others stand on; the rest is read."""
+    name, text, kind, names, words = FAULTS[case]
+    if Path(name).suffix in ('.xml', '.urdf'):
+        pytest.importorskip('mujoco')
+    plan = read_plan(written(tmp_path, name, text))
+    rows = [fault for fault in plan.faults if words in fault.text]
+    assert [(fault.kind, '  '.join(fault.names)) for fault in rows] == [(kind, names)], plan.faults
+    assert {fault.kind for fault in plan.faults} == {kind}
+
+
+REFUSED = {
+    'nothing': ('p.edi', baplie(), 'it has no container'),
+    'other message': ('p.edi', baplie(PLACED, message='MOVINS:D:95B'), 'its message is MOVINS'),
+    'no slot is known': ('p.edi', baplie('010082 22G1'), 'no container can be placed; slot 010082'),
+    'no size is known': ('p.edi', baplie('0010082 5EGB'), 'size type 0010082: of the type 5EGB'),
+    'empty': ('p.csv', '\n', 'it is empty'),
+    'column': ('p.csv', sheet().replace('height', 'hight'),
+               r'line 1: the column height is missing \(did you mean hight\?\)'),
+    'no rows': ('p.csv', sheet(), 'it has no box'),
+    'no good row': ('p.csv', sheet('a,1,1,0,0,0,0'), r'no box can be placed: row 1: \(1, 1, 0\)'),
+    'other columns': ('p.csv', 'a,b\n', 'the column name is missing; the columns are name, len'),
+    'prose': ('p.txt', 'Dear all,\n', "line 1: 'dear all,' begins no format"),
+    'JSON': ('p.json', '{"boxes": [\n{]', 'line 2: it is not JSON'),
+    'other JSON': ('p.json', '{"a": 1}', 'neither a packing plan'),
+    'deep JSON': ('p.json', '[' * 10**5, 'nested too deeply'),
+    'order': ('p.json', '{"1": [{"item": {}, "flb_coordinates": [0, 0, 0]}]}', "'length/mm'"),
+    'container': ('p.json', '{"containers": [{"stack": {"placements": [{"x": 0}]}}]}', 'stackable'),
+    'XML': ('p.sdf', '<sdf>\n<world>\n</sdf>', 'line 3: it is not XML'),
+    'other XML': ('p.xml', '<html/>', '<html> begins no format'),
+    'entities': ('p.sdf', '<!DOCTYPE a [<!ENTITY b "c">]><sdf>&b;</sdf>', 'EntitiesForbidden'),
+    'no world': ('p.sdf', '<sdf/>', 'neither a <world> nor a <model>'),
+    'no box is left': ('p.sdf', world(model('b', collision(BOX.replace('1 1 1', '')))),
+                       "no box can be read; b::l::c: its <size> is ''"),
+    'MuJoCo': ('p.xml', '<mujoco><worldbody><geom size="x"/></worldbody></mujoco>',
+               'MuJoCo does not read it'),
+    'no scene': ('p.yaml', 'boxes: 7\n', "'pairs' is a required"),
+}
+
+
+@pytest.mark.parametrize('case', REFUSED)
+def test_a_file_that_is_no_plan_is_refused(case: str, tmp_path: Path) -> None:
+    """By one line, which names the file."""
+    name, text, words = REFUSED[case]
+    if 'MuJoCo' in words:
+        pytest.importorskip('mujoco')
+    path = written(tmp_path, name, text)
+    with pytest.raises(ValueError, match=words) as caught:
+        read_plan(path)
+    assert str(caught.value).startswith(f'{path}: ') and '\n' not in str(caught.value)
+
+
+def same(a: Plan, b: Plan) -> bool:
+    """Whether two plans are equal."""
+    return (a.names == b.names and a.faults == b.faults and all(np.array_equal(x, y) for x, y in (
+        (a.sizes, b.sizes), (a.poses, b.poses), (a.masses, b.masses), (a.ground, b.ground))))
+
+
+SHIP = (FILES / 'ship.edi').read_text('utf-8')
+
+
+def equipment_first(text: str) -> str:
+    """Return a plan as BAPLIE 3 has it."""
+    out: list[str] = []
+    for line in text.split('\n'):
+        if line.startswith('EQD'):
+            place = max(n for n, other in enumerate(out) if other.startswith('LOC+147'))
+            out.insert(place, line)
+        else:
+            out.append(line)
+    return '\n'.join(out).replace('MEA+WT++', 'MEA+AAE+VGM+')
+
+
+@pytest.mark.parametrize('changed', [
+    SHIP.replace('\n', ''), SHIP.replace('\n', '\r\n'), SHIP.replace('+', '+\n'),
+    SHIP.replace('00', '0\n0'), '\ufeff' + SHIP, f"UNA:+.? '{SHIP}",
+    'UNA|*,! ~' + SHIP.replace(':', '|').replace('+', '*').replace("'", '~'),
+    SHIP.replace('BGM++1', "BGM+?'LOC?+147+1"), equipment_first(SHIP),
+    SHIP.replace('KGM:24000', 'TNE:24'), SHIP.replace('WT++KGM:24000', 'VGM++KGM:24000'),
+    SHIP.replace('UNT+30', 'UNT+000030'), SHIP.replace('22G1+', '22G1:102:5+')])
+def test_the_same_ship(changed: str, tmp_path: Path) -> None:
+    """However its lines are wrapped, and its segments separated and ordered."""
+    assert changed != SHIP
+    assert same(read_plan(written(tmp_path, 'a', changed)), read_plan(FILES / 'ship.edi'))
+
+
+def test_the_weighed_mass_counts(tmp_path: Path) -> None:
+    text = baplie('0010082 22G1 MEA+WT++KGM:1 MEA+VGM++KGM:2', '0010084 22G1 MEA+WT++LBR:1')
+    assert read_plan(written(tmp_path, 'a', text)).masses[:2].tolist() == [2.0, 0.45359237]
+
+
+@pytest.mark.parametrize(('kind', 'size'), [
+    ('22G1', (6.058, 2.438, 2.591)), ('45R1', (12.192, 2.438, 2.896)),
+    ('44G1', (12.192, 2.438, 2.743)), ('4432', (12.192, 2.438, 2.896)),
+    ('9500', (13.716, 2.438, 2.896)), ('L5G1', (13.716, 2.438, 2.896)),
+    ('4EG1', (12.192, 2.5, 2.896)), ('2232', (6.058, 2.438, 2.591)),
+    ('4351', (12.192, 2.438, 2.591))])
+def test_size_types(kind: str, size: tuple[float, ...], tmp_path: Path) -> None:
+    """Four digits are a type of 1984: then 4 was all above 8 ft 6 in."""
+    plan = read_plan(written(tmp_path, 'a', baplie(f'0020082 {kind}')))
+    assert tuple(plan.sizes[0]) == size and not plan.faults
+
+
+def test_a_40_ft_over_the_20_ft_of_its_tier_overlaps(tmp_path: Path) -> None:
+    plan = read_plan(written(tmp_path, 'a', baplie('0020082 42G1', '0010082 22G1')))
+    pairs, contacts = contacts_of(plan.sizes[:2], plan.poses[:2])
+    assert len(pairs) == 1 and contacts.separation[0] == pytest.approx(-2.438)
+
+
+def test_bays_by_majority(tmp_path: Path) -> None:
+    """40 ft bays 4k stand on the 20 ft bays beside them, as those of 4k + 2 do."""
+    for first in (1, 3):
+        bays = [f'{first + 4 * k:03}' for k in range(3)]
+        boxes = [box for bay in bays for box in (
+            f'{bay}0082 22G1', f'{int(bay) + 2:03}0082 22G1', f'{int(bay) + 1:03}0084 42G1')]
+        plan = read_plan(written(tmp_path, 'a', baplie(*boxes)))
+        pairs, contacts = contacts_of(plan.sizes[:9], plan.poses[:9], tolerance=1e-4)
+        assert len(pairs) == 6 and np.abs(contacts.separation).max() < 1e-9
+
+
+def test_the_deck_is_above_the_hold(tmp_path: Path) -> None:
+    boxes = [f'00100{tier:02} 25G1' for tier in range(2, 26, 2)] + ['0010082 22G1']
+    plan = read_plan(written(tmp_path, 'a', baplie(*boxes)))
+    assert contacts_of(plan.sizes, plan.poses)[1].separation.min() > -1e-9
+    assert plan.poses[12, 2] > 12 * 2.896 + 1.0
+
+
+def test_an_outer_stack_on_deck_may_begin_a_tier_higher(tmp_path: Path) -> None:
+    """Where another of its bay begins a tier lower: ships have steps there."""
+    boxes = ['0010182 22G1', '0010384 22G1', '0010586 22G1']
+    assert not read_plan(written(tmp_path, 'a', baplie(*boxes))).faults
+
+
+def test_containers_bear_at_their_corners() -> None:
+    assert [read_any(FILES / name).bears for name in ('ship.edi', 'yard.sdf')] == [
+        'corners', 'faces']
+
+
+def test_rows_with_semicolons(tmp_path: Path) -> None:
+    """As spreadsheets write them where a comma is the decimal mark."""
+    text = sheet(f'{FLAT},2.5', more=',mass').replace(',', ';').replace('.', ',')
+    plan = read_plan(written(tmp_path, 'a.csv', text))
+    assert plan.masses.tolist() == [2.5, 0.0] and plan.poses[0, 2] == 0.5
+
+
+def test_the_ground_of_rows(tmp_path: Path) -> None:
+    """It is z = 0, unless a row is fixed."""
+    plan = read_plan(written(tmp_path, 'a.csv', sheet(FLAT)))
+    assert plan.names == ('a', 'ground') and plan.ground.tolist() == [1]
+    assert plan.poses[1, 2] + plan.sizes[1, 2] / 2.0 == 0.0 and plan.masses is None
+    plan = read_plan(written(tmp_path, 'a.csv', sheet(f'{FLAT},yes', more=',fixed')))
+    assert plan.names == ('a',) and plan.ground.tolist() == [0]
+
+
+def test_pallets() -> None:
+    """Five orders beside each other; an order of its own is as long as its goods."""
+    plan = read_plan(ROOT / 'docs/examples/pallets/packing_plans.json')
+    assert len(plan) == 190 and plan.names[0] == '00100408/1' and not plan.faults
+    pairs, contacts = contacts_of(plan.sizes[:-1], plan.poses[:-1])
+    orders = [name.split('/')[0] for name in plan.names]
+    assert all(orders[a] == orders[b] for a, b in pairs) and contacts.separation.min() > -1e-9
+    assert plan.masses[:3] == pytest.approx([6.296, 6.78, 6.78])
+
+
+def test_loads_of_a_container(tmp_path: Path) -> None:
+    """As the viewer of 3d-bin-container-packing has them, in millimetres."""
+    goods = [{'x': 100, 'y': 0, 'z': z, 'stackable': {'name': 'g', 'dx': 500, 'dy': 200, 'dz': 100}}
+             for z in (0, 100)]
+    text = json.dumps({'containers': [{'name': '1', 'stack': {'placements': goods}}]})
+    plan = read_plan(written(tmp_path, 'a.json', text))
+    assert plan.poses[:2, :3] == pytest.approx(np.array([[.35, .1, .05], [.35, .1, .15]]))
+    assert plan.names[:2] == ('1/g/1', '1/g/2')
+
+
+def test_the_schema(tmp_path: Path) -> None:
+    """What the schema takes is read without a fault, and what it refuses has one."""
+    jsonschema = pytest.importorskip('jsonschema')
+    schema = json.loads((ROOT / 'msg_schemas/plan.json').read_text('utf-8'))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    for changed, good in (({}, True), ({'mass': 3.5, 'limit': 0, 'fixed': True}, True),
+                          ({'qx': 0, 'qy': 0, 'qz': 1, 'qw': 0}, True), ({'length': 0}, False),
+                          ({'z': '1'}, False), ({'qx': 1}, False), ({'mass': -1}, False)):
+        text = document(**changed)
+        faults = read_plan(written(tmp_path, 'a.json', text)).faults
+        assert jsonschema.Draft202012Validator(schema).is_valid(json.loads(text)) == good
+        assert good or faults or changed == {'z': '1'}
