@@ -40,8 +40,9 @@ FIRST_ON_DECK, LAST_BASE = 80, 84
 """Tiers: what is on deck, and the highest on which a stack may begin without one beside it."""
 SLAB = 0.1  # thickness [m]
 SHIP = 'ship'
-POUNDS, TONNES = 0.45359237, 1000.0
-UNITS = {'KGM': 1.0, 'LBR': POUNDS, 'TNE': TONNES}
+UNITS = {'KGM': 1.0, 'LBR': 0.45359237, 'TNE': 1000.0}
+"""Of masses [kg]."""
+HEAVIEST = 1e6  # [kg] of a container
 GROSS = ('WT', 'VGM', 'G', 'AET')
 """What MEA calls the mass of a container with its goods; VGM is that which was weighed."""
 OVERS = {'5': 'in front', '6': 'behind', '7': 'on the right', '8': 'on the left', '9': 'in height'}
@@ -175,8 +176,8 @@ def _measure(row: Stowed, segment: list[str]) -> None:
 
 def _shown(text: str) -> str:
     """Return a text of the file with released characters as they are."""
-    return ''.join(chr(ord(mark) - ESCAPED) if ESCAPED <= ord(mark) < ESCAPED + 256 else mark
-                   for mark in text) if any(mark >= chr(ESCAPED) for mark in text) else text
+    return text if text.isascii() else ''.join(
+        chr(ord(mark) - ESCAPED) if ESCAPED <= ord(mark) < ESCAPED + 256 else mark for mark in text)
 
 
 def extents_of(kind: str) -> tuple[float, float, float] | None:
@@ -256,9 +257,6 @@ def _mass(row: Stowed, faults: list[Fault]) -> float:
         faults.append(Fault('mass', (row.slot,), f'{fault}: taken as 0'))
         return 0.0
     return UNITS[unit] * float(number)
-
-
-HEAVIEST = 1e6  # [kg] of a container
 
 
 def stow(boxes: list[Placed], faults: list[Fault]) -> Plan:

@@ -1,0 +1,127 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Is a plan sound? A line for each fault, the worst first, and one for the whole plan.
+
+It reads SMDG BAPLIE, SDF, MJCF, URDF, scene files, and packing plans as CSV or JSON. Of several
+files it prints a line each. The exit status is 0 if all are sound, 1 if one is not, and 2 if one
+could not be read.
+"""
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import sys
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from ..arguments import program_parser, within
+from ..extras import MissingExtra
+from .inspect_plan import inspect_plan
+from .inspection import Inspection
+from .plan import Plan
+from .read_plan import read_any
+from .report import as_json, rows_of, summary_of
+
+SOUND, NOT_SOUND, NOT_READ = 0, 1, 2
+"""Exit statuses."""
+PATIENT = 5.0  # time [s] after which several files have a progress bar
+COLUMNS = ('file', 'kind', 'boxes', 'text')
+
+
+def judged(path: str, options: argparse.Namespace) -> Inspection:
+    """Return what is wrong with the plan of a file. Raises OSError and ValueError."""
+    plan, bears = read_any(path)
+    limits = plan.limits.copy()
+    if options.limit is not None:
+        free = np.setdiff1d(np.arange(len(plan)), plan.ground)
+        limits[free] = np.minimum(limits[free], options.limit)
+    ground = range(len(plan)) if len(plan) == 1 else plan.ground  # it can touch nothing
+    plan = Plan(plan.sizes, plan.poses, None if options.geometry else plan.masses, ground=ground,
+                names=plan.names, centres=plan.centres, limits=limits, body=plan.body,
+                apart=plan.apart, faults=plan.faults)
+    try:
+        return inspect_plan(plan, tolerance=options.tolerance, acceleration=options.acceleration,
+                            bears=options.bears or bears)
+    except ValueError as error:
+        raise ValueError(f'{path}: {error}') from None
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = program_parser('inspect', __doc__)
+    parser.add_argument('files', nargs='+', metavar='FILE')
+    parser.add_argument('--json', action='store_true', help='all that was found, a line of JSON a '
+                        'file, as msg_schemas/inspection.json has it')
+    parser.add_argument('--csv', action='store_true', help='a row for each fault')
+    parser.add_argument('--picture', metavar='OUT.png', help='draw the plan of one file, coloured '
+                        'by cause (needs Matplotlib)')
+    parser.add_argument('--limit', type=within(0.0), metavar='KG', help='the most that may rest on '
+                        'any box')
+    parser.add_argument('--tolerance', type=within(0.0), default=1e-4, metavar='M', help='the gap '
+                        'up to which faces touch, and the depth up to which boxes do not overlap '
+                        '(default: 1e-4)')
+    parser.add_argument('--bears', choices=('faces', 'corners'), help='where boxes stand on each '
+                        'other (default: corners for containers, faces for others)')
+    parser.add_argument('--acceleration', type=float, nargs=3, default=(0.0, 0.0, -9.81),
+                        metavar=('X', 'Y', 'Z'), help='what the goods feel, gravity included '
+                        '[m/s²]; a lorry that brakes along +x by 0.4 g: 3.92 0 -9.81')
+    parser.add_argument('--geometry', action='store_true', help='leave masses out: judge overlaps '
+                        'and support alone')
+    return parser
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Judge files; return the worst exit status."""
+    parser = _parser()
+    options = parser.parse_args(args)
+    if options.picture and len(options.files) > 1:
+        parser.error('--picture takes one file')
+    if options.json and options.csv:
+        parser.error('--json and --csv exclude each other')
+    writer = csv.writer(sys.stdout, lineterminator='\n')
+    if options.csv:
+        writer.writerow(COLUMNS)
+    worst = SOUND
+    for path in _with_progress(options.files):
+        try:
+            found = judged(path, options)
+            if options.picture:
+                found.plot().savefig(options.picture, dpi=120)
+        except (OSError, ValueError, MissingExtra) as error:
+            print(_line(error), file=sys.stderr)
+            worst = NOT_READ
+            continue
+        worst = max(worst, SOUND if found.sound else NOT_SOUND)
+        if options.json:
+            print(json.dumps({'file': path, **as_json(found)}))
+        elif options.csv:
+            writer.writerows((path, row.kind, ' '.join(row.names), row.text)
+                             for row in rows_of(found))
+        elif len(options.files) > 1:
+            print(f'{path}: {summary_of(found)}', flush=True)
+        else:
+            print('\n'.join([*map(str, rows_of(found)), summary_of(found)]))
+            print(f'To see it in 3D: box_contact_view {path}')
+    return worst
+
+
+def _with_progress(paths: Sequence[str]) -> Iterable[str]:
+    """Return the paths; of several, a bar tells after a while how many are done."""
+    if len(paths) == 1:
+        return paths
+    from tqdm import tqdm
+
+    return tqdm(paths, unit='file', delay=PATIENT, leave=False, disable=None)
+
+
+def _line(error: Exception) -> str:
+    """Return what went wrong in one line, with the file."""
+    if isinstance(error, OSError) and error.filename is not None:
+        return f'{error.filename}: {error.strerror}'
+    return ' '.join(str(error).split())
+
+
+if __name__ == '__main__':
+    sys.exit(main())

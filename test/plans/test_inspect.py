@@ -1,0 +1,207 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The program `inspect`: its lines, its exit statuses, its JSON and CSV, on small files."""
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import pytest
+
+from box_contact_ros.plans import inspect
+
+pytest.importorskip('clarabel')
+
+from test_read_plan import A, baplie, body, collision, mjcf, model, sheet, world, written
+
+ROOT = Path(__file__).resolve().parents[2]
+FILES = ROOT / 'docs' / 'examples' / 'files'
+ON_BOX = 'b,1,1,1,{x},0,1.5'
+PAIR = ('a,1,1,1,0,0,0.5,100', 'b,1,1,1,0,0,1.5,200')
+
+
+@pytest.fixture
+def judge(tmp_path, capsys):
+    """Return a function that writes a file and judges it: exit status and lines, or stderr's."""
+    def run(name: str, text: str, *options: str) -> tuple[int, list[str]]:
+        status = inspect.main([str(written(tmp_path, name, text)), *options])
+        printed = capsys.readouterr()
+        return status, (printed.err if status == 2 else printed.out).splitlines()
+    return run
+
+
+@pytest.mark.parametrize(('text', 'status', 'line'), [
+    (sheet('a,1,1,1,0,0,0.5', ON_BOX.format(x=0.4)), 0, '2 boxes: sound'),
+    (sheet('a,1,1,1,0,0,0.5', ON_BOX.format(x=0.6)), 1,
+     'unsupported           b  share 0.40, centre 100 mm outside'),
+    (sheet('a,1,1,1,0,0,0.5', 'b,1,1,1,0,0,1.4'), 1, 'overlap               a  b  100.0 mm deep'),
+    (sheet('a,1,1,1,0,0,0.5', 'b,1,1,1,0,0,2.5'), 1,
+     'hangs                 b  share 0.00, centre on nothing'),
+    (sheet('a,1,1,1,0,0,0.4'), 1, 'overlap               a  ground  100.0 mm deep'),
+    (sheet(f'{PAIR[0]},150', f'{PAIR[1]},', more=',mass,limit'), 1,
+     'overloaded            a  200 kg on top'),
+    (sheet(*PAIR, more=',mass'), 0, '2 boxes, 300.0 kg, centre of mass 0.000 0.000 1.167 m: sound'),
+    (sheet('a,1,1,1,0,0,0.5', 'a,1,1,1,3,0,0.5'), 1, 'twice                 a  2 boxes have this '
+                                                     'name'),
+    (sheet('a,1,1,1,0,0,0.5', 'b,1,0,1,0,0,1.5'), 0, '1 box, 1 left out: sound')])
+def test_rows(judge, text, status, line):
+    """What is wrong with a file decides the exit status."""
+    found, lines = judge('p.csv', text)
+    assert found == status and line in lines, lines
+
+
+@pytest.mark.parametrize(('boxes', 'status', 'kind'), [
+    (['0010082 22G1', '0010084 22G1'], 0, None), (['0010082 22G1', '0010086 22G1'], 1, 'gap'),
+    (['0010082 22G1', '0010082 22G1'], 1, 'twice'),
+    (['0010082 22G1', '0020082 42G1'], 1, 'overlap'),
+    (['0010086 22G1'], 1, 'gap'), (['0010082 22G1', '0010084 5EGB'], 0, 'size type'),
+    (['0010082 22G1', '010084 22G1'], 0, 'slot'), (['0010082 22G1 RFF+BM:1'], 0, 'mass'),
+    (['0010082 22U1 DIM+9+CMT:::79'], 0, 'dimension')])
+def test_what_makes_a_ship_unsound(judge, boxes, status, kind):
+    """Gaps, slots taken twice and overlaps do; the others are told."""
+    found, lines = judge('p.edi', baplie(*boxes))
+    assert found == status
+    assert kind is None or any(line.startswith(kind) for line in lines), lines
+
+
+def test_a_cut_file_is_not_sound(judge):
+    text = baplie('0010082 22G1', '0010084 22G1')
+    assert judge('p.edi', text)[0] == 0
+    status, lines = judge('p.edi', text[:text.index('UNT')])
+    assert status == 1 and lines[0].startswith('cut ')
+    assert judge('p.edi', text.replace('MEA+WT++KGM:20000', 'RFF+BM:1', 1).replace(
+        "RFF+BM:1'\n", '', 1))[0] == 1
+
+
+SMALL = collision('<geometry><box><size>1 1 1</size></box></geometry><surface><contact>'
+                  '<collide_bitmask>2</collide_bitmask></contact></surface>')
+
+
+@pytest.mark.parametrize(('text', 'status', 'verdict'), [
+    (world(A), 0, 'sound'), (f'<sdf>{A}</sdf>', 0, 'nothing can touch'),
+    (f'<sdf><world name="w">{A.replace("<link", "<static>true</static><link")}</world></sdf>', 0,
+     'nothing can touch'),
+    (world(A, model('b', collision(), 1.4)), 1, 'not sound'),
+    (world(A, model('b', collision(), 1.5)), 0, 'sound'),
+    (world(A, model('b', collision(), 1.5)).replace('<sdf ', '<!-- a -- b --><sdf '), 0, 'sound'),
+    (world(A.replace('<link', '<gz:system/><link')), 0, 'sound'),
+    (world(A.replace('<pose>', '<pose degrees="false">')), 0, 'sound'),
+    (world(A.replace('0.5 0', '0.5 90').replace('<pose>', '<pose degrees="true">')), 0, 'sound'),
+    (world(A.replace('<pose>', '<pose relative_to="world">')), 0, 'sound'),
+    (world(A, model('b', collision(more='<pose relative_to="__model__">0 0 1 0 0 0</pose>'))), 0,
+     'sound'),
+    (world(A, model('b', collision(), 9), '<state><model name="b"><pose>0 0 1.5 0 0 0</pose>'
+           '</model></state>'), 0, 'sound'),
+    (world(model('a', SMALL), model('b', SMALL.replace('>2<', '>4<'), 0.5)), 0, 'sound'),
+    (world(model('a', SMALL), model('b', SMALL, 0.5)), 1, 'not sound'),
+    (world(model('a', collision().replace('"l"', '"k"') + collision())), 0, 'sound'),
+    (world(model('a', '<self_collide>1</self_collide>' + collision().replace('"l"', '"k"')
+                 + collision())), 1, 'not sound'),
+    (world(model('a', collision().replace('"l"', '"k"') + collision(
+        more='<pose>0 0 1 0 0 0</pose>') + '<joint name="j"><parent>k</parent><child>l</child>'
+        '</joint>')), 0, 'sound'),
+    (world(model('a', collision().replace('"l"', '"k"') + collision(
+        more='<pose>0 0 5 0 0 0</pose>') + '<joint name="j"><parent>world</parent><child>l</child>'
+        '</joint>')), 0, 'sound')])
+def test_worlds(judge, text, status, verdict):
+    """What may not touch in Gazebo is no overlap, and what is joined holds together."""
+    found, lines = judge('p.sdf', text)
+    summary = next(line for line in lines if ': ' in line and 'box' in line.split(':')[0])
+    assert (found, summary.rpartition(': ')[2]) == (status, verdict), lines
+
+
+TWO = [body('a', .5), body('b', 1.4)]
+
+
+@pytest.mark.parametrize(('text', 'status'), [
+    (mjcf(*TWO), 1), (mjcf(body('a', .5), body('b', 1.5)), 0),
+    (mjcf(*TWO, more='<contact><exclude body1="a" body2="b"/></contact>'), 1),  # b then hangs
+    (mjcf(*TWO, body('c', .5, x=5), more='<contact><exclude body1="a" body2="b"/></contact>'), 1),
+    (mjcf(body('a', .5), body('b', .5, more='contype="2" conaffinity="4"')), 1),
+    (mjcf(body('a', .5, more='contype="2" conaffinity="1"'),
+          body('b', .5, more='contype="2" conaffinity="1"')), 0),
+    (mjcf(body('a', .5, more='contype="2" conaffinity="1"'),
+          body('b', .5, more='contype="2" conaffinity="1"'),
+          more='<contact><pair geom1="a" geom2="b"/></contact>'), 1)])
+def test_models_of_mujoco(judge, text, status):
+    """Geoms may touch as they may in MuJoCo."""
+    pytest.importorskip('mujoco')
+    assert judge('p.xml', text)[0] == status
+
+
+def test_one_line_for_what_is_not_read(judge):
+    for name, text, words in (('p.txt', 'Dear all', 'begins no format'), ('p.csv', '', 'empty')):
+        status, lines = judge(name, text)
+        assert status == 2 and len(lines) == 1 and name in lines[0] and words in lines[0]
+
+
+def test_options(judge):
+    text = sheet(*PAIR, more=',mass')
+    assert judge('p.csv', text, '--limit', '199')[0] == 1
+    assert judge('p.csv', text, '--limit', '201')[0] == 0
+    assert judge('p.csv', text, '--limit', '199', '--geometry')[0] == 0
+    assert judge('p.csv', text, '--acceleration', '9.9', '0', '-9.81')[0] == 1
+    gap = sheet('a,1,1,1,0,0,0.501')
+    assert judge('p.csv', gap)[0] == 1 and judge('p.csv', gap, '--tolerance', '0.002')[0] == 0
+    status, lines = judge('p.csv', gap, '--tolerance', '0.9')
+    assert status == 2 and 'tolerance' in lines[0]
+    assert judge('p.csv', gap, '--acceleration', '0', '0', '0')[0] == 2
+
+
+def test_several_files_have_a_line_each(tmp_path, capsys):
+    """And the worst exit status."""
+    good = str(written(tmp_path, 'a.csv', sheet('a,1,1,1,0,0,0.5')))
+    bad = str(written(tmp_path, 'b.csv', sheet('a,1,1,1,0,0,0.7')))
+    assert inspect.main([good, bad]) == 1
+    assert capsys.readouterr().out.splitlines() == [f'{good}: 1 box: sound',
+                                                    f'{bad}: 1 box: not sound']
+    assert inspect.main([bad, str(tmp_path / 'none.csv'), good]) == 2
+    printed = capsys.readouterr()
+    assert printed.err == f'{tmp_path / "none.csv"}: No such file or directory\n'
+    assert len(printed.out.splitlines()) == 2
+
+
+def test_json_is_as_its_schema_has_it(judge):
+    jsonschema = pytest.importorskip('jsonschema')
+    schema = json.loads((ROOT / 'msg_schemas/inspection.json').read_text('utf-8'))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    for name, text in (('ship.edi', (FILES / 'ship.edi').read_text('utf-8')),
+                       ('a.sdf', f'<sdf>{A}</sdf>'), ('b.csv', sheet(*PAIR, more=',mass'))):
+        status, (line,) = judge(name, text, '--json')
+        document = json.loads(line)
+        jsonschema.validate(document, schema, jsonschema.Draft202012Validator)
+        assert document['sound'] == (status == 0)
+        assert len(document['names']) == len(document['stands']) == len(document['load'])
+
+
+def test_csv_has_a_row_for_each_fault(judge):
+    status, lines = judge('ship.edi', (FILES / 'ship.edi').read_text('utf-8'), '--csv')
+    rows = list(csv.DictReader(io.StringIO('\n'.join(lines))))
+    assert status == 1
+    assert [(row['kind'], row['boxes']) for row in rows] == [
+        ('unsupported', '0100304'), ('goes with what falls', '0100306')]
+
+
+def test_the_worst_comes_first(judge):
+    rows = ['a,1,1,1,0,0,.5', 'b,1,1,1,0,0,1.4', 'c,1,1,1,5,0,.3', 'd,1,1,1,9,0,.5',
+            'e,1,1,1,9.6,0,1.5', 'f,1,1,1,13,0,.5', 'g,1,1,1,13.9,0,1.5']
+    lines = judge('p.csv', sheet(*rows))[1]
+    assert [line[22:23] for line in lines[:4]] == ['c', 'a', 'g', 'e']
+
+
+def test_a_line_has_three_names_and_shows_no_control_characters(judge):
+    rows = [f'{name},1,1,1,0,0,{z}' for z, name in enumerate(('a', 'b\x1b[31m', 'c', 'd'))]
+    lines = judge('p.yaml', 'pairs: all\nboxes: {' + ', '.join(
+        f'{name}: {{size: [1, 1, 1]}}' for name in 'abcde') + '}')[1]
+    assert lines[0].startswith('pose                  a  b  c and 2 more  moves')
+    assert '\x1b' not in ''.join(judge('p.csv', sheet(*rows))[1])
+
+
+def test_a_picture(tmp_path):
+    pytest.importorskip('matplotlib')
+    out = tmp_path / 'ship.png'
+    assert inspect.main([str(FILES / 'ship.edi'), '--picture', str(out)]) == 1
+    assert out.read_bytes().startswith(b'\x89PNG')
