@@ -119,8 +119,10 @@ def cuts(parts: list[list[str]]) -> Iterator[Fault]:
                 yield Fault('cut', (), 'a message has no UNT at its end: a part may be missing')
             start = place
         elif segment[0] == 'UNT':
-            count, start = place + 1 - (start or 0), None
-            if part(segment, 1).lstrip('0') != str(count):
+            begin, start = start, None
+            if begin is None:
+                yield Fault('cut', (), 'a message has no UNH at its start: a part may be missing')
+            elif part(segment, 1).lstrip('0') != str(count := place + 1 - begin):
                 yield Fault('cut', (), f'UNT counts {_shown(part(segment, 1)) or "no"} segments, '
                                        f'and there are {count}')
     if start is not None or all(segment[0] != 'UNT' for segment in parts):
@@ -320,9 +322,14 @@ def _stack(boxes: list[Placed], on_deck: bool, size: np.ndarray, pose: np.ndarra
         else:
             floor = high + TIER * (box.tier - low) / 2.0
             lowest.append(n)
-            if on_deck and box.tier > LAST_BASE and box.tier - 2 not in bases[blocks[n]]:
+            begun = bases[blocks[n]] if on_deck else set()
+            if on_deck and box.tier > LAST_BASE and box.tier - 2 not in begun:
                 faults.append(Fault('gap', (box.slot,), 'has no container below it down to the '
                                                         'deck'))
+            elif box.tier > min(begun, default=box.tier):
+                faults.append(Fault('slot', (box.slot,), (
+                    f'begins a stack, as others of its bay do at tier {min(begun)}: taken as on '
+                    'the ship')))
             bases[blocks[n]].add(box.tier)
         pose[n, 2] = floor + size[n, 2] / 2.0
     return lowest

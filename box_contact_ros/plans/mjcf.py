@@ -8,6 +8,7 @@ touch as they may in MuJoCo: by contype and conaffinity, <pair>, <exclude> and f
 """
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -29,9 +30,15 @@ def read_mjcf(path: Path) -> Plan:
     require('sim')
     import mujoco
 
-    model, meshes = _compiled(path)
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: None)  # else it writes a file in this folder
+    try:
+        with warnings.catch_warnings(action='ignore'):
+            model, meshes = _compiled(path)
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+    finally:
+        mujoco.set_mju_user_warning(before)
     tops = _tops(model)
     faults = [Fault('shape', tuple(meshes), f'{len(meshes)} mesh, height field or SDF: no box, so '
                                             'left out')] if meshes else []

@@ -326,10 +326,13 @@ def test_the_deck_is_above_the_hold(tmp_path: Path) -> None:
     assert plan.poses[12, 2] > 12 * 2.896 + 1.0
 
 
-def test_an_outer_stack_on_deck_may_begin_a_tier_higher(tmp_path: Path) -> None:
-    """Where another of its bay begins a tier lower: ships have steps there."""
+def test_a_stack_on_deck_may_begin_a_tier_higher_than_another(tmp_path: Path) -> None:
+    """Ships have steps there; it is told."""
     boxes = ['0010182 22G1', '0010384 22G1', '0010586 22G1']
-    assert not read_plan(written(tmp_path, 'a', baplie(*boxes))).faults
+    faults = read_plan(written(tmp_path, 'a', baplie(*boxes))).faults
+    assert [(fault.kind, *fault.names) for fault in faults] == [('slot', '0010384'),
+                                                                ('slot', '0010586')]
+    assert not read_plan(written(tmp_path, 'a', baplie('0010184 22G1', '0010384 22G1'))).faults
 
 
 def test_containers_bear_at_their_corners() -> None:

@@ -1,0 +1,103 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Mutated files end in a status within a second, and a damaged ship is never sound in silence."""
+from __future__ import annotations
+
+import io
+import os
+import random
+import time
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+
+import pytest
+
+from box_contact_ros.plans import inspect
+
+pytest.importorskip('clarabel')
+pytest.importorskip('mujoco')
+
+from test_read_plan import (
+    FILES,
+    A,
+    baplie,
+    body,
+    collision,
+    document,
+    mjcf,
+    model,
+    sheet,
+    world,
+)
+
+COUNT = int(os.environ.get('BOX_CONTACT_MUTANTS', '300'))
+"""Files in all."""
+LONGEST = 1.0  # of a file [s of this process]
+SHIP = baplie(*(f'{bay:03}{row:02}{tier} 22G1' for bay in (1, 3) for row in (1, 2, 3)
+                for tier in (82, 84, 86)))
+UNT = 57  # segments before it
+SEEDS = {
+    'ship.edi': SHIP, 'small.edi': (FILES / 'ship.edi').read_text('utf-8'),
+    'rows.csv': sheet('a,1,1,1,0,0,0.5,100,500,', 'b,1,1,1,0,0,1.5,100,500,', more=',mass,limit,'
+                      'fixed'),
+    'rows.json': document(mass=3, limit=4), 'world.sdf': world(A, model('b', collision(), 1.5)),
+    'yard.sdf': (FILES / 'yard.sdf').read_text('utf-8'),
+    'model.xml': mjcf(body('a', .5), body('b', 1.5)),
+    'gripper.xml': (FILES / 'gripper.xml').read_text('utf-8'),
+    'scene.yaml': 'boxes: {a: {size: [1, 1, 1], pose: [0, 0, 0, 0, 0, 0, 1]}, b: {size: [1, 1, 1]}}'
+                  '\npairs: all\n'}
+
+
+def mutated(data: bytes, draw: random.Random) -> bytes:
+    """Return data in which a few bytes or lines are cut, flipped, doubled or moved."""
+    for _ in range(draw.choice((1, 1, 1, 2, 5))):
+        start = draw.randrange(len(data) + 1)
+        end = min(len(data), start + draw.choice((1, 1, 2, 8, 40, 400)))
+        what = draw.randrange(6)
+        if what == 0:  # the end is missing
+            data = data[:start]
+        elif what == 1:  # a piece is missing
+            data = data[:start] + data[end:]
+        elif what == 2 and data:  # a byte is another one
+            place = draw.randrange(len(data))
+            data = data[:place] + bytes([data[place] ^ 1 << draw.randrange(8)]) + data[place + 1:]
+        elif what == 3:  # a piece comes twice
+            data = data[:end] + data[start:]
+        elif what == 4:  # a line comes twice, or is missing
+            lines = data.splitlines(keepends=True) or [b'']
+            place = draw.randrange(len(lines))
+            lines[place:place + 1] = draw.choice(([lines[place]] * 2, []))
+            data = b''.join(lines)
+        else:  # a number is another one
+            places = [n for n, mark in enumerate(data) if 48 <= mark <= 57] or [0]
+            place = draw.choice(places)
+            data = data[:place] + draw.choice((b'-', b'1e9', b'nan', b'0', b'9')) + data[place + 1:]
+    return data
+
+
+def judged(path: Path) -> tuple[int, str, float]:
+    """Return the exit status of the program, what it prints, and the time of this process [s]."""
+    out, start = io.StringIO(), time.process_time()
+    with redirect_stdout(out), redirect_stderr(out):
+        status = inspect.main([str(path)])
+    return status, out.getvalue(), time.process_time() - start
+
+
+@pytest.mark.parametrize('name', SEEDS)
+def test_mutants(name: str, tmp_path: Path) -> None:
+    """A ship whose segments are fewer or more than UNT counts is not sound."""
+    draw = random.Random(name)
+    path = tmp_path / name
+    for n in range(COUNT // len(SEEDS)):
+        data = mutated(SEEDS[name].encode(), draw)
+        path.write_bytes(data)
+        status, printed, seconds = judged(path)
+        assert status in (0, 1, 2) and printed.endswith('\n'), (n, data)
+        assert status != 2 or printed.count('\n') == 1, (n, printed)
+        assert seconds < LONGEST, (n, seconds, data)
+        if status == 0 and name == 'ship.edi':
+            tags = [part.strip()[:3] for part in data.split(b"'") if part.strip()]
+            assert tags.index(b'UNT') == UNT, (n, data)
+            told = any(kind in printed for kind in ('left out', 'mass ', 'dimension ', 'slot '))
+            assert told or printed.startswith('18 boxes'), (n, printed, data)
