@@ -25,8 +25,8 @@ COMPILER = os.environ.get('CXX', 'c++').split()
 os.environ['PATH'] += os.pathsep + sysconfig.get_path('scripts')
 
 PROGRAMS = {'bench': 'bench.bench', 'contact_node': 'node.contact_node',
-            'crane': 'demo.crane_node', 'markers': 'view.markers',
-            'soup_node': 'node.soup_node', 'view': 'view.view'}
+            'crane': 'demo.crane_node', 'inspect': 'plans.inspect',
+            'markers': 'view.markers', 'soup_node': 'node.soup_node', 'view': 'view.view'}
 """The module of each program, whose `main` starts it."""
 
 # colcon and bloom run `setup.py install` or `develop`. `ros2 run` needs programs under their bare
@@ -166,7 +166,7 @@ setup(
         'bag': ['rosbags'],
         'soup': ['python-fcl'],
         # The statics of plans.
-        'plans': ['clarabel', 'scipy', 'tqdm'],
+        'plans': ['clarabel', 'defusedxml', 'scipy', 'tqdm'],
         'train': ['torch==2.13.0', 'tqdm'],
         'report': ['matplotlib', 'tqdm'],
         'fuzz': ['gmpy2', 'mpmath', 'tqdm'],

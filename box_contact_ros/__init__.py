@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .node.contact_node import ContactNode as ContactNode  # noqa: F401
     from .plans.inspect_plan import inspect_plan
     from .plans.plan import Plan
+    from .plans.read_plan import read_plan
     from .scene.scene import Box, Frame, Pair, Scene
     from .scene.scene_file import read_scene
     from .scene.scene_solver import SceneSolver
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
 
 __all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Frame', 'Nearest', 'Nearests',
            'Pair', 'PatchForces', 'Plan', 'ReadContacts', 'Scene', 'SceneSolver', 'contacts_of',
-           'inspect_plan', 'make_model', 'patch_area', 'patch_areas', 'read_contacts', 'read_scene',
-           'support']
+           'inspect_plan', 'make_model', 'patch_area', 'patch_areas', 'read_contacts', 'read_plan',
+           'read_scene', 'support']
 # `ContactNode` needs ROS, and `import *` does without.
 
 _LOADED_WHEN_USED = {
@@ -39,6 +40,7 @@ _LOADED_WHEN_USED = {
     'node.contact_node': ('ContactNode',),
     'plans.inspect_plan': ('inspect_plan',),
     'plans.plan': ('Plan',),
+    'plans.read_plan': ('read_plan',),
     'scene.scene_file': ('read_scene',),
     'scene.scene': ('Box', 'Frame', 'Pair', 'Scene'),
     'scene.scene_solver': ('SceneSolver',),

@@ -102,8 +102,8 @@ sys.path.append(str(Path(__file__).resolve().parents[1]))
 os.environ.pop('PYTEST_ADDOPTS', None)
 
 PROGRAMS = {'bench': 'bench.bench', 'contact_node': 'node.contact_node',
-            'crane': 'demo.crane_node', 'markers': 'view.markers',
-            'soup_node': 'node.soup_node', 'view': 'view.view'}
+            'crane': 'demo.crane_node', 'inspect': 'plans.inspect',
+            'markers': 'view.markers', 'soup_node': 'node.soup_node', 'view': 'view.view'}
 """The module of each program, as setup.py has them."""
 EXTRAS = {
     'ros': ('rclpy', 'box_contact_msgs', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs',
@@ -111,6 +111,7 @@ EXTRAS = {
     'sim': ('mujoco',), 'bag': ('rosbags',), 'soup': ('fcl',), 'view': ('viser',),
     'train': ('safetensors', 'torch', 'tqdm'), 'report': ('matplotlib', 'tqdm'),
     'peers': ('coal', 'pybullet'), 'fuzz': ('mpmath',),
+    'plans': ('clarabel', 'defusedxml', 'scipy', 'tqdm'),
     'test': ('catkin_pkg', 'gmpy2', 'hypothesis')}
 """The modules of each extra of setup.py that tests import."""
 

@@ -90,7 +90,7 @@ def main(args: Sequence[str] | None = None) -> int:
             if options.picture:
                 found.plot().savefig(options.picture, dpi=120)
         except (OSError, ValueError, MissingExtra) as error:
-            print(_line(error), file=sys.stderr)
+            print(one_line(error), file=sys.stderr)
             worst = NOT_READ
             continue
         worst = max(worst, SOUND if found.sound else NOT_SOUND)
@@ -116,7 +116,7 @@ def _with_progress(paths: Sequence[str]) -> Iterable[str]:
     return tqdm(paths, unit='file', delay=PATIENT, leave=False, disable=None)
 
 
-def _line(error: Exception) -> str:
+def one_line(error: Exception) -> str:
     """Return what went wrong in one line, with the file."""
     if isinstance(error, OSError) and error.filename is not None:
         return f'{error.filename}: {error.strerror}'

@@ -4,7 +4,6 @@
 """What is wrong with a plan, and what each of its boxes carries: the answer of `inspect_plan`."""
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,7 +14,7 @@ from .plan import Plan
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-UNSOUND_FAULTS = ('gap', 'twice')
+UNSOUND_FAULTS = ('gap', 'twice', 'cut')
 """Faults of a file with which a plan is not sound. The others are told."""
 CAUSES = ('hangs', 'unsupported', 'tips under its load', 'slides', 'goes with what falls',
           'overloaded')
@@ -74,8 +73,9 @@ class Inspection:
                     or any(fault.kind in UNSOUND_FAULTS for fault in self.plan.faults))
 
     def __str__(self) -> str:
-        """Return a line for each fault, and one for the whole plan."""
-        return '\n'.join((*self._lines(), self._summary()))
+        """Return a line for each fault, the worst first, and one for the whole plan."""
+        from .report import rows_of, summary_of
+        return '\n'.join((*map(str, rows_of(self)), summary_of(self)))
 
     def plot(self) -> Figure:
         """Return a figure of the plan, coloured by cause, with the load on each box in kN.
@@ -84,34 +84,3 @@ class Inspection:
         """
         from .plot import plot
         return plot(self)
-
-    def _lines(self) -> Iterator[str]:
-        names = self.plan.names
-        for fault in self.plan.faults:
-            yield f'{fault.kind:<20}  {"  ".join(fault.names)}  {fault.text}'
-        for (a, b), depth in zip(self.overlaps.tolist(), self.depths.tolist()):
-            yield f'{"overlap":<20}  {names[a]}  {names[b]}  {1e3 * depth:.1f} mm deep'
-        on_top = self.load / np.linalg.norm(self.acceleration)
-        for cause in CAUSES:
-            for box in np.flatnonzero(self.cause == cause).tolist():
-                text = (f'{on_top[box]:.0f} kg on top' if cause == 'overloaded' else
-                        f'share {self.share[box]:.2f}, centre {_side(self.margin[box])}')
-                if cause == 'tips under its load':
-                    text += f', under its load {_side(self.loaded_margin[box])}'
-                yield f'{cause:<20}  {names[box]}  {text}'
-
-    def _summary(self) -> str:
-        free = len(self.plan) - len(self.plan.ground)
-        words = ['1 box' if free == 1 else f'{free:,} boxes']
-        if np.isfinite(self.mass):
-            words.append(f'{self.mass / 1e3:,.0f} t' if self.mass >= 1e4 else
-                         f'{self.mass:,.1f} kg')
-        if np.isfinite(self.centre_of_mass).all():
-            words.append('centre of mass {:.3f} {:.3f} {:.3f} m'.format(*self.centre_of_mass))
-        return f'{", ".join(words)}: {"sound" if self.sound else "not sound"}'
-
-
-def _side(margin: float) -> str:
-    if not np.isfinite(margin):
-        return 'on nothing'
-    return f'{1e3 * abs(margin):.0f} mm {"inside" if margin > 0.0 else "outside"}'

@@ -16,7 +16,6 @@ MOST_NAMES = 3
 """Names that a line shows of a fault with more."""
 LEFT_OUT = ('slot', 'size type', 'pose', 'dimension')
 """Faults for which a box is not in the plan."""
-NOTHING = 'nothing can touch'
 
 
 class Row(NamedTuple):
@@ -70,13 +69,9 @@ def summary_of(found: Inspection) -> str:
     lost = {name for fault in plan.faults if fault.kind in LEFT_OUT for name in fault.names}
     if lost := lost.difference(plan.names):
         words.append(f'{len(lost):,} left out')
-    verdict = ('not sound' if not found.sound else 'sound' if can_touch(found) else NOTHING)
-    return f'{", ".join(words)}: {verdict}'
-
-
-def can_touch(found: Inspection) -> bool:
-    """Return whether there is something that moves, and something to touch."""
-    return len(found.plan) > 1 and len(found.plan.ground) < len(found.plan)
+    if len(plan) < 2 or not boxes:
+        words.append('nothing can touch')
+    return f'{", ".join(words)}: {"sound" if found.sound else "not sound"}'
 
 
 def as_json(found: Inspection) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from xml.sax.handler import ContentHandler
 import numpy as np
 
 from ..core import MASS_MAX
+from ..extras import require
 from .bodies import HERE, Solid, Weight, plan_of_bodies, total, within
 from .plan import Fault, Plan
 
@@ -57,6 +58,7 @@ class _Tree(ContentHandler):
 
 def parse_xml(data: bytes) -> Element:
     """Return the root of an XML file, without entities. Raises ValueError for what is no XML."""
+    require('plans')
     from defusedxml import sax
 
     # As Gazebo's reader, it takes comments with `--` within, and blanks before the declaration.
