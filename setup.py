@@ -26,7 +26,7 @@ os.environ['PATH'] += os.pathsep + sysconfig.get_path('scripts')
 
 PROGRAMS = {'bench': 'bench.bench', 'contact_node': 'node.contact_node',
             'crane': 'demo.crane_node', 'inspect': 'plans.inspect',
-            'markers': 'view.markers', 'soup_node': 'node.soup_node', 'view': 'view.view'}
+            'markers': 'view.live.markers', 'soup_node': 'node.soup_node', 'view': 'view.view'}
 """The module of each program, whose `main` starts it."""
 
 # colcon and bloom run `setup.py install` or `develop`. `ros2 run` needs programs under their bare

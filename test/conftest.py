@@ -103,7 +103,7 @@ os.environ.pop('PYTEST_ADDOPTS', None)
 
 PROGRAMS = {'bench': 'bench.bench', 'contact_node': 'node.contact_node',
             'crane': 'demo.crane_node', 'inspect': 'plans.inspect',
-            'markers': 'view.markers', 'soup_node': 'node.soup_node', 'view': 'view.view'}
+            'markers': 'view.live.markers', 'soup_node': 'node.soup_node', 'view': 'view.view'}
 """The module of each program, as setup.py has them."""
 EXTRAS = {
     'ros': ('rclpy', 'box_contact_msgs', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs',

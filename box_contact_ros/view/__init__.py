@@ -1,8 +1,4 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What shows a scene: the page in the browser, and markers for RViz."""
-
-from ..extras import require
-
-require('ros')
+"""What shows boxes: running nodes, or the plan of a file."""

@@ -28,7 +28,7 @@ from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
 from box_contact_ros.node.topics import ARRAY_DEPTH, MOST_PAIRS_WITH_TOPICS
 from box_contact_ros.scene.scene import ALONE
-from box_contact_ros.view.listener import read_answer
+from box_contact_ros.view.live.listener import read_answer
 
 MS = 1_000_000  # ns
 SCENE = """\

@@ -38,7 +38,7 @@ from box_contact_ros.stream.cdr import MessageError
 from box_contact_ros.stream.read_contacts import read_contacts
 from box_contact_ros.stream.read_poses import PoseReader
 from box_contact_ros.stream.write_contacts import ContactWriter, aligned, header_bytes
-from box_contact_ros.view.listener import read_answer
+from box_contact_ros.view.live.listener import read_answer
 
 STAMPS = st.integers(-2**31 * 10**9, 2**31 * 10**9 - 1)
 # U+FFFD is what rclpy puts in place of bytes that are not UTF-8.

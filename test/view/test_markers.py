@@ -25,8 +25,8 @@ from box_contact_ros.node.messages import make_header
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.scene import Box, Pair, Scene
 from box_contact_ros.solver.contact import Contact
-from box_contact_ros.view.listener import DrawnTick, SceneRows, read_touching
-from box_contact_ros.view.markers import LABELLED, MarkersNode, scene_markers
+from box_contact_ros.view.live.listener import DrawnTick, SceneRows, read_touching
+from box_contact_ros.view.live.markers import LABELLED, MarkersNode, scene_markers
 
 NAMESPACES = ('boxes', 'points', 'normals', 'patches', 'depths')
 SLAB, CUBE = (2.0, 4.0, 1.0), (2.0, 2.0, 2.0)

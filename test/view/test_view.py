@@ -43,8 +43,10 @@ from box_contact_ros.node.topics import contact_qos
 from box_contact_ros.scene.scene import Box, Pair, Scene, two_boxes
 from box_contact_ros.solver.pose import rotation_matrix
 from box_contact_ros.stream.cdr import NANOSECONDS, MessageError
-from box_contact_ros.view import listener
-from box_contact_ros.view.listener import (
+from box_contact_ros.view.drawing import CUBE as CUBE_CORNERS
+from box_contact_ros.view.drawing import camera_position
+from box_contact_ros.view.live import listener
+from box_contact_ros.view.live.listener import (
     SCENE_PARAMETERS,
     DrawnTick,
     Listener,
@@ -52,10 +54,10 @@ from box_contact_ros.view.listener import (
     Track,
     read_touching,
 )
-from box_contact_ros.view.page import CUBE as CUBE_CORNERS
-from box_contact_ros.view.page import Page, Server, camera_position, figures, legend
+from box_contact_ros.view.live.page import Page, figures, legend
+from box_contact_ros.view.live.view_node import ViewNode
+from box_contact_ros.view.server import Server
 from box_contact_ros.view.style import BOX_A, BOX_B, CONTACT, patch_axes, patch_sides
-from box_contact_ros.view.view import ViewNode
 
 ORIGIN = poses.IDENTITY
 TOUCHING = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])

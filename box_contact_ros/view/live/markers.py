@@ -20,12 +20,12 @@ from rclpy.context import Context
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ..arguments import parse_command_line
-from ..node.messages import make_header, set_pose
-from ..node.runtime import run_node
-from ..node.topics import contact_qos
-from ..solver.contact import Contacts
-from . import style
+from ...arguments import parse_command_line
+from ...node.messages import make_header, set_pose
+from ...node.runtime import run_node
+from ...node.topics import contact_qos
+from ...solver.contact import Contacts
+from .. import style
 from .listener import SCENE_PARAMETERS, DrawnTick, Listener
 
 PERIOD = 1 / 30  # time [s] between marker arrays

@@ -9,140 +9,32 @@ draw in float32, which is half a metre coarse in map coordinates.
 from __future__ import annotations
 
 import contextlib
-import gzip
 import html
 import io
-import logging
 import math
-import socket
 from collections import deque
-from collections.abc import Iterator, Sequence
-from http import HTTPStatus
-from ipaddress import ip_address
+from collections.abc import Sequence
 from typing import Any
-from urllib.parse import urlsplit
 
 import numpy as np
-import viser
-import websockets.asyncio.server
-from websockets import Headers
 
-from ..scene.scene_solver import Answer
-from ..solver.pose import rotation_matrix
-from ..stream.cdr import NANOSECONDS
-from . import style
+from ...scene.scene_solver import Answer
+from ...solver.pose import rotation_matrix
+from ...stream.cdr import NANOSECONDS
+from .. import style
+from ..drawing import NARROW, add_cubes, add_light, camera_position
+from ..server import Server
 from .listener import DrawnTick, SceneRows
 
 HISTORY = 12.0  # length [s] of the charts
 ROOM = 0.1  # above the values of a chart, as a share of them
 LEAST_DEPTH, LEAST_FORCE = 1.0, 1.0
 """[mm], [kN]: what charts show at least, not to magnify noise."""
-MESSAGE_LIMIT, CONNECTION_LIMIT = 8 << 10, 32
-"""Longest message [bytes] of a browser, which sends a few hundred; most pages open at a time."""
 NAMES_SHOWN = 3  # of boxes of one colour, in the legend
 PANEL_WIDTH, CHART_HEIGHT, TIMES_HEIGHT = 300, 110, 45  # pixels; the last is that of the axis
 GROUND, LINES, SECTIONS, ROPE = (236, 238, 241), (206, 211, 217), (176, 183, 191), (70, 70, 80)
-SKYLIGHT = 2.6  # intensity
-FROM_BELOW = (120, 120, 120)  # colour of what the ground reflects
 NO_LINES = np.zeros((0, 2, 3))
 GROUND_SIZE = 60.0  # length [m] of the ground at least
-VIEWPOINT = np.array([-0.55, -0.78, 0.42])
-"""Direction from the boxes to the camera at first."""
-NARROW = 0.85  # width divided by height of the view that all boxes are in, however they lie
-CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-CUBE_FACES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
-                       [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]])
-_ENDS = np.array([(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit])
-CUBE_EDGES = np.concatenate([CUBE[_ENDS], 1.0001 * CUBE[_ENDS[:, :1]]], axis=1)
-"""Corners (12, 3, 3) of a triangle an edge, so thin that its wireframe is the edge."""
-TITLE = b'<title>Contacts of boxes: box_contact_ros</title>'
-GAMMA = 2.2  # of the colours of screens
-
-
-class Server(viser.ViserServer):
-    """A viser server that serves its own page alone.
-
-    It opens no public tunnel, which any browser could ask for.
-    """
-
-    def __init__(self, host: str, port: int) -> None:
-        """Serve at a port, or the next that is free. Raises OSError."""
-        # viser would wait for ever for a server that cannot start.
-        with socket.create_server((host, 0), family=socket.getaddrinfo(host, 0)[0][0]):
-            pass
-        # Browsers open connections on suspicion, and close them unused; that is no error.
-        logging.getLogger('websockets').setLevel(logging.CRITICAL)
-        with contextlib.redirect_stdout(io.StringIO()), closed_to_other_sites(host):
-            super().__init__(host, port, 'box_contact_ros', verbose=False)  # viser greets
-
-    def request_share_url(self, verbose: bool = True) -> None:
-        """Do nothing."""
-
-
-@contextlib.contextmanager
-def closed_to_other_sites(host: str) -> Iterator[None]:
-    """Let a server that viser starts refuse other sites' pages, large messages and many pages.
-
-    viser has no option for these, so its way to serve is wrapped while it starts. Raises
-    RuntimeError if it serves in another way.
-    """
-    serve, wrapped = websockets.asyncio.server.serve, False
-
-    def serve_own_page(*arguments: Any, process_request: Any, **options: Any) -> Any:
-        def answer(connection: Any, request: Any) -> Any:
-            if not names_own_page(request.headers, host):
-                return connection.respond(HTTPStatus.FORBIDDEN,
-                                          'Origin or Host is not of this page\n')
-            if len(connection.server.connections) >= CONNECTION_LIMIT:
-                return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE,
-                                          f'{CONNECTION_LIMIT} pages are open: close one\n')
-            return with_title(process_request(connection, request))
-
-        nonlocal wrapped
-        wrapped = True
-        return serve(*arguments, **options | {'process_request': answer,
-                                              'max_size': MESSAGE_LIMIT})
-
-    websockets.asyncio.server.serve = serve_own_page
-    try:
-        yield
-    finally:
-        websockets.asyncio.server.serve = serve
-    if not wrapped:
-        raise RuntimeError('this viser does not serve by websockets.asyncio.server.serve, so '
-                           'its page would be open to every site')
-
-
-def with_title(response: Any) -> Any:
-    """Return viser's response with the title of its page replaced: that of the browser's tab."""
-    headers = response.headers if response else {}
-    if headers.get('Content-Type', '').startswith('text/html'):
-        is_packed = headers['Content-Encoding'] == 'gzip'
-        text = gzip.decompress(response.body) if is_packed else response.body
-        text = text.replace(b'<title>Viser</title>', TITLE, 1)
-        response.body = gzip.compress(text, 1) if is_packed else text
-        del headers['Content-Length']
-        headers['Content-Length'] = str(len(response.body))
-    return response
-
-
-def names_own_page(headers: Headers, host: str) -> bool:
-    """Return whether Host and Origin, where given, both name the page; host: what it serves at.
-
-    The page of another site sends its own Origin. A site whose name leads here sends its name as
-    Host, too. No site can take over an address, `localhost`, or this machine's name.
-    """
-    urls = [f'//{name}' for name in headers.get_all('Host')] + headers.get_all('Origin')
-    if not urls:
-        return True
-    try:
-        netloc, = {urlsplit(url).netloc for url in urls}
-        name = urlsplit(f'//{netloc}').hostname or ''
-        if name not in (host.lower(), 'localhost', socket.gethostname().lower()):
-            ip_address(name)
-    except ValueError:  # two names, or one of a stranger
-        return False
-    return True
 
 
 class Page:
@@ -189,11 +81,7 @@ class Page:
         scene, place = self._server.scene, np.zeros((1, 2, 3))
         edge = float(np.median(rows.sizes.max(axis=1)))
         radius, self._normal_length = style.POINT_RADIUS * edge, style.NORMAL_LENGTH * edge
-        # viser's lights, among them a picture of a hall, take seconds of rendering in software.
-        scene.configure_environment_map(hdri=None)
-        scene.configure_default_lights(enabled=False)
-        scene.add_light_hemisphere('/sky', ground_color=FROM_BELOW, intensity=SKYLIGHT,
-                                   position=(0.0, 0.0, 1.0))
+        add_light(scene)
         self._ground = scene.add_grid('/ground', GROUND_SIZE, GROUND_SIZE, cell_size=1.0,
                                       section_size=5.0, cell_color=LINES, section_color=SECTIONS,
                                       plane_color=GROUND, plane_opacity=1.0, shadow_opacity=0.0,
@@ -210,22 +98,7 @@ class Page:
         self._ropes = scene.add_line_segments('/ropes', place, ROPE, thickness=2.0,
                                               thickness_units='screen', visible=False)
         colours = np.where(rows.is_a[:, None], style.BOX_A, style.BOX_B)
-        count = len(rows.sizes)
-        no_turn, nothing = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.zeros((count, 3))
-
-        def add(path: str, corners: np.ndarray, triangles: np.ndarray, shades: np.ndarray,
-                **look: Any) -> Any:
-            # viser takes the colours of single instances as light.
-            light = (255.0 * (shades / 255.0) ** GAMMA).astype(np.uint8)
-            return self._server.scene.add_batched_meshes_simple(
-                path, corners, triangles, no_turn, nothing, batched_scales=nothing,
-                batched_colors=light, lod='off', cast_shadow=False, receive_shadow=False, **look)
-
-        # The steps of toons would cross a face, dark on one side.
-        self._faces = add('/boxes', CUBE, CUBE_FACES, colours, opacity=style.BOX_OPACITY,
-                          flat_shading=True)
-        self._edges = add('/edges', CUBE_EDGES.reshape(-1, 3), np.arange(36).reshape(12, 3),
-                          colours // 2, wireframe=True)
+        self._faces, self._edges = add_cubes(scene, colours, style.BOX_OPACITY)
 
     def _draw_boxes(self, tick: DrawnTick, known: np.ndarray) -> None:
         """Move the boxes; those without a pose shrink to nothing."""
@@ -375,15 +248,6 @@ def _depth(answer: Answer | None) -> float:
     """Return the depth [m] of the deepest contact, 0 without one."""
     touching = answer is not None and len(answer.pairs)
     return -float(answer.contacts.separation[0]) if touching else 0.0
-
-
-def camera_position(radius: float, fov: float, aspect: float) -> np.ndarray:
-    """Return where a camera (3,) towards the origin has a sphere about it in view, from VIEWPOINT.
-
-    radius: [m]; fov: vertical angle of view [rad]; aspect: width of the view divided by its height.
-    """
-    half_angle = math.atan(min(1.0, aspect) * math.tan(0.5 * fov))
-    return radius / math.sin(half_angle) * VIEWPOINT / np.linalg.norm(VIEWPOINT)
 
 
 def _text(value: float, form: str, unit: str) -> str:

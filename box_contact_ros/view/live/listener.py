@@ -23,19 +23,19 @@ from rclpy.qos import QoSProfile
 
 from box_contact_msgs.msg import Contacts as ContactsMessage
 
-from ..node.contact_node import PARAMETERS as CONTACT_PARAMETERS
-from ..node.contact_node import scene_of
-from ..node.parameters import Setting, declare, warn_of_unknown
-from ..node.runtime import GuardedNode
-from ..node.topics import pose_qos
-from ..scene.scene import ALONE, Scene
-from ..scene.scene_solver import Answer
-from ..solver.checks import are_poses, short_repr
-from ..stream.cdr import MessageError
-from ..stream.pairing import StampedPose
-from ..stream.read_contacts import ReadContacts, read_contacts
-from ..stream.read_poses import PoseReader
-from ..stream.streams import ALL_BOXES, topics_of
+from ...node.contact_node import PARAMETERS as CONTACT_PARAMETERS
+from ...node.contact_node import scene_of
+from ...node.parameters import Setting, declare, warn_of_unknown
+from ...node.runtime import GuardedNode
+from ...node.topics import pose_qos
+from ...scene.scene import ALONE, Scene
+from ...scene.scene_solver import Answer
+from ...solver.checks import are_poses, short_repr
+from ...stream.cdr import MessageError
+from ...stream.pairing import StampedPose
+from ...stream.read_contacts import ReadContacts, read_contacts
+from ...stream.read_poses import PoseReader
+from ...stream.streams import ALL_BOXES, topics_of
 
 KEPT = 1000  # poses kept per topic: a second at 1 kHz
 UNANSWERED = 0.5
