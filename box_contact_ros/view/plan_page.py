@@ -1,0 +1,184 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""A page in the browser that shows the plan of a file, and what is wrong with it.
+
+Boxes have the colour of their cause. A click on a box shows its row, its mass and what is on it.
+"""
+from __future__ import annotations
+
+import contextlib
+import html
+import io
+import math
+import signal
+import sys
+import threading
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..arguments import program_parser, within
+from ..extras import MissingExtra, require
+from ..plans.inspect import NOT_READ, one_line
+from ..plans.inspect_plan import inspect_plan
+from ..plans.inspection import CAUSES, Inspection
+from ..plans.read_plan import read_any
+from ..plans.report import rows_of, summary_of
+from ..solver.pose import rotation_matrix
+from .style import Colour, unit_poses
+
+SOUND: Colour = (143, 168, 191)
+GROUND: Colour = (217, 217, 217)
+OVERLAP: Colour = (122, 0, 25)
+COLOURS: dict[str, Colour] = dict(zip(CAUSES, (
+    (193, 18, 31), (230, 57, 70), (244, 162, 97), (209, 73, 91), (155, 93, 229), (255, 209, 102))))
+"""By cause."""
+OPACITY = 0.9
+PANEL_WIDTH, MOST_ROWS = 420, 200
+"""Width of the panel [pixels], and rows that it shows."""
+CLICK_HINT = 'Click on a box to see its row.'
+
+
+def words_of(found: Inspection) -> np.ndarray:
+    """Return the word (n,) by which each box is coloured: a cause, 'overlap', 'ground', 'sound'."""
+    words = np.where(found.cause == '', 'sound', found.cause).astype('U24')
+    words[found.overlaps.ravel()] = 'overlap'
+    words[found.plan.ground] = 'ground'
+    return words
+
+
+class PlanPage:
+    """A page of one plan, which stays as it is."""
+
+    def __init__(self, host: str, port: int, title: str, found: Inspection) -> None:
+        """Serve a plan at a port, or the next that is free. Raises OSError."""
+        from .server import Server
+
+        self.found, self.words = found, words_of(found)
+        self._server = Server(host, port)
+        self.url = f'http://{host}:{self._server.get_port()}'
+        gui = self._server.gui
+        gui.configure_theme(show_logo=False, show_share_button=False, control_width='large')
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(PANEL_WIDTH)
+        self._clicked = gui.add_html(_section('clicked', CLICK_HINT), order=0.0)
+        gui.add_html(table(title, found, self.words), order=1.0)
+        self._draw()
+
+    def close(self) -> None:
+        """End the server."""
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._server.stop()
+
+    def select(self, box: int) -> None:
+        """Show what is known of a box, by index."""
+        self._clicked.content = _section('clicked', '<br>'.join(
+            html.escape(line) for line in lines_of(self.found, box)))
+
+    def _draw(self) -> None:
+        """Draw all boxes around the origin: browsers compute in float32."""
+        from .drawing import NARROW, add_cubes, add_light, camera_position
+
+        plan, scene = self.found.plan, self._server.scene
+        add_light(scene)
+        if not len(plan):
+            return
+        colours = {'sound': SOUND, 'ground': GROUND, 'overlap': OVERLAP, **COLOURS}
+        poses = unit_poses(plan.poses)
+        half = 0.5 * np.einsum('nij,nj->ni', np.abs(rotation_matrix(poses[:, 3:])), plan.sizes)
+        # A floor that is far larger than what is on it must not be what is in view.
+        free = np.setdiff1d(np.arange(len(plan)), plan.ground)
+        seen = free if len(free) else np.arange(len(plan))
+        low = (poses[seen, :3] - half[seen]).min(axis=0)
+        high = (poses[seen, :3] + half[seen]).max(axis=0)
+        middle, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+        meshes = add_cubes(scene, np.array([colours[word] for word in self.words]), OPACITY)
+        for mesh in meshes:
+            mesh.batched_positions = poses[:, :3] - middle
+            mesh.batched_wxyzs = np.roll(poses[:, 3:], 1, axis=1)
+            mesh.batched_scales = plan.sizes
+
+        @meshes[0].on_click
+        def _(event: Any) -> None:
+            box = hit_by(plan.sizes, poses, np.array(event.ray_origin) + middle,
+                         np.array(event.ray_direction))
+            if box is not None:
+                self.select(box)
+
+        camera = self._server.initial_camera
+        camera.position = camera_position(radius, camera.fov, NARROW)
+        camera.look_at = np.zeros(3)
+
+
+def hit_by(sizes: np.ndarray, poses: np.ndarray, origin: np.ndarray, direction: np.ndarray,
+           ) -> int | None:
+    """Return the first box that a ray hits, by index, or None."""
+    axes = rotation_matrix(poses[:, 3:])
+    start = np.einsum('nij,ni->nj', axes, origin - poses[:, :3])
+    along = np.einsum('nij,i->nj', axes, direction)
+    with np.errstate(divide='ignore', invalid='ignore'):
+        ends = np.stack(((-sizes / 2.0 - start) / along, (sizes / 2.0 - start) / along))
+    near = np.nanmax(ends.min(axis=0), axis=1)
+    far = np.nanmin(ends.max(axis=0), axis=1)
+    near[(near > far) | (far < 0.0)] = np.inf
+    return int(near.argmin()) if np.isfinite(near).any() else None
+
+
+def lines_of(found: Inspection, box: int) -> list[str]:
+    """Return what is known of a box: its rows, or that nothing is wrong, mass, and load on top."""
+    plan = found.plan
+    name = plan.names[box]
+    lines = [str(row) for row in rows_of(found) if name in row.names] or [f'{name}: sound']
+    if plan.masses is not None:
+        lines.append(f'{plan.masses[box]:,.0f} kg')
+    on_top = found.load[box] / np.linalg.norm(found.acceleration)
+    if math.isfinite(on_top):
+        lines.append(f'{on_top:,.0f} kg on top')
+    lines.append('{:.3f} × {:.3f} × {:.3f} m'.format(*plan.sizes[box]))
+    return lines
+
+
+def table(title: str, found: Inspection, words: np.ndarray) -> str:
+    """Return the summary, a legend of the colours that are there, and the rows, as HTML."""
+    colours = {'sound': SOUND, 'overlap': OVERLAP, **COLOURS, 'ground': GROUND}
+    legend = ' &ensp;'.join(
+        f'<span style="white-space:nowrap"><span style="color:rgb{colours[word]}">■</span> {word} '
+        f'({np.count_nonzero(words == word):,})</span>' for word in colours if word in words)
+    rows = rows_of(found)
+    shown = ''.join(f'<div>{html.escape(str(row))}</div>' for row in rows[:MOST_ROWS])
+    more = f'<div>and {len(rows) - MOST_ROWS:,} more</div>' if len(rows) > MOST_ROWS else ''
+    return (_section('file', html.escape(title)) + _section('verdict', html.escape(
+        summary_of(found)), 'font-weight:600') + _section('legend', legend)
+        + _section('rows', shown + more, 'font-family:monospace;white-space:pre-wrap'))
+
+
+def _section(name: str, content: str, style: str = '') -> str:
+    return (f'<div id="{name}" style="padding:0.3em 0.7em;font-size:0.85em;{style}">{content}'
+            '</div>')
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Serve the plan of a file until SIGINT or SIGTERM; return 2 for what is no plan."""
+    parser = program_parser('view', __doc__)
+    parser.add_argument('file', metavar='FILE')
+    parser.add_argument('--host', default='127.0.0.1', help='address to serve at; everybody who '
+                        'reaches it sees the page')
+    parser.add_argument('--port', type=within(1, 65535), default=8080, help='port to serve at, or '
+                        'the next that is free')
+    options = parser.parse_args(args)
+    ended = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ended.set())
+    try:
+        require('view')
+        plan, bears = read_any(options.file)
+        page = PlanPage(options.host, options.port, options.file, inspect_plan(plan, bears=bears))
+    except (OSError, ValueError, MissingExtra) as error:
+        print(one_line(error), file=sys.stderr)
+        return NOT_READ
+    print(f'view: {page.url}', flush=True)
+    ended.wait()
+    page.close()
+    return 0

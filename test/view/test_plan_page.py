@@ -1,0 +1,117 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The page of a plan: its words, what a click hits, the program, and the page in a real browser."""
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from patience import PATIENCE
+
+pytest.importorskip('viser')
+pytest.importorskip('clarabel')
+
+from browser import chromium, open_page
+
+from box_contact_ros import inspect_plan, read_plan
+from box_contact_ros.solver.pose import rotation_matrix
+from box_contact_ros.view.plan_page import CLICK_HINT, PlanPage, hit_by, lines_of, words_of
+
+SHIP = Path(__file__).resolve().parents[2] / 'docs' / 'examples' / 'files' / 'ship.edi'
+
+
+@pytest.fixture(scope='module')
+def found():
+    """Return what is wrong with a ship."""
+    return inspect_plan(read_plan(SHIP), bears='corners')
+
+
+def test_each_box_has_a_word(found):
+    words = words_of(found)
+    assert words[found.plan.names.index('0100304')] == 'unsupported'
+    assert (words == 'ground').sum() == len(found.plan.ground) and 'sound' in words
+
+
+def test_what_is_known_of_a_box(found):
+    assert lines_of(found, found.plan.names.index('0100304'))[0].startswith('unsupported')
+    lines = lines_of(found, found.plan.names.index('0090102'))
+    assert lines[:2] == ['0090102: sound', '21,000 kg'] and lines[-1] == '6.058 × 2.438 × 2.591 m'
+
+
+def test_a_ray_hits_the_first_box():
+    """As steps of a millimetre along the ray find it, in random boxes."""
+    rng = np.random.default_rng(3)
+    for _ in range(30):
+        sizes = rng.uniform(0.5, 2.0, (6, 3))
+        poses = np.hstack((rng.uniform(-3, 3, (6, 3)), rng.normal(size=(6, 4))))
+        origin = rng.uniform(8, 9, 3)
+        direction = poses[0, :3] - origin
+        points = origin + np.arange(0, 25, 1e-3)[:, None] * direction / np.linalg.norm(direction)
+        local = np.einsum('nij,pni->pnj', rotation_matrix(poses[:, 3:]),
+                          points[:, None] - poses[:, :3])
+        inside = (np.abs(local) < sizes / 2).all(axis=2)
+        assert inside[inside.any(axis=1).argmax(), hit_by(sizes, poses, origin, direction)]
+    assert hit_by(np.ones((1, 3)), np.array([[0, 0, 0, 0, 0, 0, 1.0]]), np.array([0, 0, 5.0]),
+                  np.array([0, 0, 1.0])) is None
+    assert hit_by(np.ones((1, 3)), np.array([[0, 0, 0, 0, 0, 0, 1.0]]), np.array([0, 0, 5.0]),
+                  np.array([0, 0, -1.0])) == 0
+
+
+def test_the_program(program, tmp_path):
+    running = program('view', str(SHIP), '--port', '8460')
+    running.wait_for_output('view: http://127.0.0.1:')
+    running.process.send_signal(signal.SIGTERM)
+    assert running.process.wait(PATIENCE) == 0
+    done = subprocess.run([sys.executable, '-m', 'box_contact_ros.view.view', str(tmp_path / 'no')],
+                          capture_output=True, text=True, timeout=PATIENCE)
+    assert done.returncode == 2 and done.stderr == f'{tmp_path / "no"}: No such file or directory\n'
+
+
+@contextmanager
+def busy_loops():
+    """Run two loops that never sleep for each processor, and this process at low priority."""
+    loops = [subprocess.Popen([sys.executable, '-c', 'while True: pass'])
+             for _ in range(2 * (os.cpu_count() or 1))]
+    try:
+        yield
+    finally:
+        for loop in loops:
+            loop.kill()
+            loop.wait()
+
+
+@pytest.mark.skipif(chromium() is None, reason='no browser is installed')
+@pytest.mark.parametrize('is_busy', [False, True])
+def test_the_page_in_a_browser(found, is_busy, tmp_path):
+    """It says what is wrong, draws in the colours of causes, and a click shows the box's row."""
+    image = pytest.importorskip('PIL.Image')
+    with closing(PlanPage('127.0.0.1', 8470, 'ship.edi', found)) as page, (
+            busy_loops() if is_busy else closing(open(os.devnull))), open_page(page.url) as tab:
+        tab.wait_for('document.getElementById("verdict")')
+        assert tab.text('verdict').endswith(': not sound') and tab.text('file') == 'ship.edi'
+        assert 'unsupported           0100304' in tab.text('rows')
+        assert 'unsupported (1)' in tab.text('legend')
+        assert tab.text('clicked') == CLICK_HINT
+
+        def red() -> np.ndarray:
+            (tmp_path / 'page.png').write_bytes(tab.picture())
+            pixels = np.asarray(image.open(tmp_path / 'page.png').convert('RGB')).astype(int)
+            return np.argwhere((pixels[:, :850, 0] > 150) & (pixels[:, :850, 1] < 110)
+                               & (pixels[:, :850, 2] < 110))
+        for _ in range(100):
+            spots = red()
+            if len(spots) > 200:
+                break
+        y, x = spots[len(spots) // 2].tolist()
+        for kind in ('mouseMoved', 'mousePressed', 'mouseReleased'):
+            tab.command('Input.dispatchMouseEvent', type=kind, x=x, y=y, button='left',
+                        clickCount=1)
+        tab.wait_for(f'document.getElementById("clicked").innerText != {CLICK_HINT!r}')
+        assert tab.text('clicked').startswith('unsupported')
