@@ -152,7 +152,7 @@ class BenchNode(GuardedNode):
             read = read_contacts(data) if kind == 'contacts' else None
             if read is None or not read.stale:
                 log.received[kind][row] = received
-            if read is not None and read.touching:
+            if read is not None and read.names:
                 log.depths[row] = -read.contacts.separation[0]
             if kind == 'point' and log.node != 'echo':
                 point = deserialize_message(data, PointStamped).point

@@ -164,7 +164,7 @@ class CraneNode(GuardedNode):
             return
         latency = (received - answer.stamp) * 1e-9
         touches = {name: contact for (name, _, _), contact in zip(
-            answer.names, answer.contacts[:answer.touching])}
+            answer.names, answer.contacts)}
         if touches:
             self.latencies.append(latency)
         if not all(math.isfinite(contact.volume) for contact in touches.values()):

@@ -9,7 +9,7 @@ from box_contact_msgs.srv import Check
 from ..models.make_model import most_near
 from ..scene.scene_check import SceneCheck
 from ..scene.scene_solver import SceneSolver
-from .messages import KeptMessages, check_frame, pose_of, size_of
+from .messages import KeptMessages, check_frame, near_messages, pose_of, size_of
 
 MOST_CONTACTS = 4096
 """Of a response: all pairs of 91 boxes, 0.8 MB."""
@@ -41,16 +41,17 @@ class Checker:
         """Fill in contacts; raise ValueError, with field and value, for what is refused."""
         check_frame(request.header.frame_id, self.solver.scene)
         boxes = request.boxes
-        pairs, contacts = self._check(
+        found = self._check(
             [box.name for box in boxes], [pose_of(box) for box in boxes],
             [size_of(box) for box in boxes],
             [(pair.box_a, pair.box_b) for pair in request.pairs], request.margin)
-        if len(pairs) > MOST_CONTACTS:
-            raise ValueError(f'contacts: {len(pairs)} pairs touch or are near, and a response has '
+        count = len(found.pairs) + len(found.near_pairs)
+        if count > MOST_CONTACTS:
+            raise ValueError(f'contacts: {count} pairs touch or are near, and a response has '
                              f'at most {MOST_CONTACTS}: ask for fewer boxes, or name pairs')
-        messages = self._kept.fill([self._check.names_of(a, b) for a, b in pairs.tolist()],
-                                   contacts)
-        touching = contacts.colliding.tobytes().count(True)
-        listed = response.contacts
+        listed, names_of = response.contacts, self._check.names_of
         listed.header = request.header
-        listed.contacts, listed.near = messages[:touching], messages[touching:]
+        listed.contacts = self._kept.fill([names_of(a, b) for a, b in found.pairs.tolist()],
+                                          found.contacts)
+        listed.near = near_messages([names_of(a, b) for a, b in found.near_pairs.tolist()],
+                                    found.near)

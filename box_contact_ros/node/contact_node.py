@@ -88,7 +88,7 @@ PARAMETERS = {
     'max_age': Setting(1.0, 'a box whose newest stamp is older than this is reported as stale; '
                             'with pairing latest, its pairs get no contact; 0: never [s]',
                        number(0.0, LONGEST)),
-    'margin': Setting(0.0, 'pairs apart are listed as near up to this separation [m]',
+    'margin': Setting(0.0, 'pairs apart are listed as near up to this distance [m]',
                       number(0.0, LENGTH_MAX)),
     'pair_topics': Setting(True, 'whether pairs have topics of their own next to contacts', flag),
     'autostart': Setting(True, 'whether the node configures and activates itself', flag),

@@ -17,14 +17,17 @@ from std_msgs.msg import Header
 
 from box_contact_msgs.msg import Box
 from box_contact_msgs.msg import Contact as ContactMessage
+from box_contact_msgs.msg import Near as NearMessage
 
 from ..core import native
 from ..scene.scene import Scene
 from ..scene.scene_check import Row
 from ..solver.checks import name_fault
 from ..solver.contact import Contacts
+from ..solver.nearest import Nearests
 from ..stream.cdr import NANOSECONDS
 from ..stream.pairing import frames_differ
+from ..stream.write_contacts import near_numbers
 
 
 def make_header(stamp: int, frame_id: str) -> Header:
@@ -69,6 +72,18 @@ def set_pose(pose: Any, numbers: np.ndarray) -> None:
     """Write a pose `x y z qx qy qz qw` into a geometry_msgs/Pose."""
     p, q = pose.position, pose.orientation
     p.x, p.y, p.z, q.x, q.y, q.z, q.w = map(float, numbers)
+
+
+def near_messages(names: Sequence[tuple[str, str, str]], near: Nearests) -> list[NearMessage]:
+    """Return the messages of pairs that are near, by the names of the pair and its boxes."""
+    messages = []
+    for name, row in zip(names, near_numbers(near).tolist()):
+        message = NearMessage()
+        message.pair, message.box_a, message.box_b = name
+        n, p, q = message.normal, message.point_a, message.point_b
+        message.distance, n.x, n.y, n.z, p.x, p.y, p.z, q.x, q.y, q.z = row
+        messages.append(message)
+    return messages
 
 
 class KeptMessages:

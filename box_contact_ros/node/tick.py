@@ -217,9 +217,9 @@ class TickAnswerer:
         took = time.perf_counter_ns() - started
         header = header_bytes(tick.stamp, tick.frame_id)
         head, end = aligned(header), 0
-        touching, of_pair = answer.touching, revision.of_pair
+        of_pair = revision.of_pair
         points, normals = answer.contacts.point.tobytes(), answer.contacts.normal.tobytes()
-        for a, b in answer.pairs.tolist()[:touching] if of_pair else ():
+        for a, b in answer.pairs.tolist() if of_pair else ():
             begin, end = end, end + VECTOR_BYTES
             if (a, b) not in of_pair:  # of a box that came later
                 continue
@@ -236,7 +236,7 @@ class TickAnswerer:
         is_array = answer.scene.pose_array
         self._monitor.evaluated(took, age, [] if is_array else answer.named_stale())
         counts = self._counts
-        counts['contacts'] += touching
+        counts['contacts'] += len(answer.pairs)
         counts['evaluations'] += 1
         counts['stale pairs'] += len(answer.stale)
 

@@ -24,9 +24,8 @@ from ..solver.checks import (
     short_repr,
     size_fault,
 )
-from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver
-from ..solver.contacts_of import in_contact
+from ..solver.contacts_of import Found, touching_and_near
 from .scene_solver import SceneSolver
 
 MOST_BOXES = 256
@@ -85,8 +84,8 @@ class SceneCheck:
 
     def __call__(self, names: Sequence[str], poses: Sequence[Row], sizes: Sequence[Row],
                  pairs: Sequence[tuple[str, str]] = (), margin: float = 0.0,
-                 ) -> tuple[np.ndarray, Contacts]:
-        """Return boxes a and b (k, 2) of the pairs in contact, or apart by margin [m] at most.
+                 ) -> Found:
+        """Return which boxes touch, and which are apart by the distance `margin` [m] at most.
 
         names, poses (n, 7), sizes (n, 3): of the boxes and bodies of a question. A size of zeros is
         that of the scene's box; bodies have no other. What is fixed in the scene has NO_POSE, or
@@ -109,10 +108,11 @@ class SceneCheck:
                                  "the node's model answers no more per request: name those that "
                                  'matter')
             contacts = solver.batch(self._poses, sizes=self._sizes, pairs=places)
+            found = touching_and_near(places, contacts, solver, self._sizes, self._poses, margin)
         finally:
             native.write_poses(self._rows, moving, [None] * len(moving))
             self._place_bodies()
-        return in_contact(places, contacts, margin)
+        return found
 
     def names_of(self, a: int, b: int) -> tuple[str, str, str]:
         """Return the name of a pair of the last answer, and those of its boxes."""

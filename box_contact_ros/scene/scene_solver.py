@@ -20,8 +20,9 @@ from ..core import native
 from ..solver.checks import as_floats, as_margin, as_whole, short_repr
 from ..solver.contact import Contact, Contacts
 from ..solver.contact_solver import ContactSolver
-from ..solver.contacts_of import find_contacts, in_contact
+from ..solver.contacts_of import find_contacts, touching_and_near
 from ..solver.model import Model
+from ..solver.nearest import Nearest, Nearests
 from .changes import checked_changes
 from .scene import NOWHERE, Box, Pair, Scene
 
@@ -30,11 +31,12 @@ class Answer(NamedTuple):
     """What one tick found, as arrays. Boxes are their indices in `scene`."""
 
     pairs: np.ndarray
-    """(k, 2) boxes a and b of the pairs in contact: those listed, then the others by index. Behind
-    them, in the same order, the pairs apart whose separation is at most the solver's margin."""
-    contacts: Contacts
-    """(k,) their contacts; those of pairs apart are not colliding."""
-    near: int  # how many pairs the broad phase left to the solver
+    """(k, 2) boxes a and b of the pairs in contact: those listed, then the others by index."""
+    contacts: Contacts  # (k,)
+    near_pairs: np.ndarray
+    """(l, 2) pairs apart whose distance is at most the solver's margin, in the same order."""
+    near: Nearests  # (l,) their nearest points
+    candidates: int  # how many pairs the broad phase left to the solver
     stale: np.ndarray
     """(m, 2) boxes of the listed pairs that could not be evaluated, because one has no pose that is
     recent enough. (box, ALONE): all pairs of a box that patterns ask for."""
@@ -43,13 +45,18 @@ class Answer(NamedTuple):
 
     @property
     def touching(self) -> int:
-        """Return how many pairs are in contact: the first rows."""
-        return self.contacts.colliding.tobytes().count(True)  # numpy takes three times as long
+        """Return how many pairs are in contact."""
+        return len(self.pairs)
 
     def named(self) -> list[tuple[Pair, Contact]]:
         """Return each pair with its contact, by name."""
         return [(self.scene.pair_of(a, b), contact)
                 for (a, b), contact in zip(self.pairs.tolist(), self.contacts)]
+
+    def named_near(self) -> list[tuple[Pair, Nearest]]:
+        """Return each pair that is near with its nearest points, by name."""
+        return [(self.scene.pair_of(a, b), nearest)
+                for (a, b), nearest in zip(self.near_pairs.tolist(), self.near)]
 
     def named_stale(self) -> list[Pair]:
         """Return the stale pairs by name; a box whose pairs all are is paired with itself."""
@@ -67,7 +74,7 @@ class SceneSolver:
                  margin: float = 0.0, most_near: int = sys.maxsize) -> None:
         """Begin without poses.
 
-        margin: up to which separation pairs apart are listed [m].
+        margin: up to which distance pairs apart are listed as near [m].
         most_near: pairs that a tick may leave to the model; of more, it raises TooManyNear.
         """
         if not isinstance(scene, Scene):
@@ -163,11 +170,12 @@ class SceneSolver:
         self._set_poses(poses)
         if self.scene.bodies:
             self.scene.place_boxes(self._rows[:-1])
-        near, contacts, stale = find_contacts(
+        pairs, contacts, stale = find_contacts(
             self._broad_phase, self._solver, self.scene.sizes, self._poses,
             lambda box: f'pose of {self.scene.names[box]}:', most_near=self._most_near)
-        pairs, contacts = in_contact(near, contacts, self.margin)
-        return Answer(pairs, contacts, len(near), stale, self.scene, self.revision)
+        found = touching_and_near(pairs, contacts, self._solver, self.scene.sizes, self._poses,
+                                  self.margin)
+        return Answer(*found, len(pairs), stale, self.scene, self.revision)
 
     def _set_poses(self, poses: Sequence[np.ndarray | None] | ArrayLike) -> None:
         """Take the poses of the boxes and bodies that move."""

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +21,16 @@ from .checks import as_boxes, as_margin, as_places, pose_fault, short_repr
 from .contact import Contacts
 from .contact_solver import ContactSolver
 from .faces import as_tolerance
+from .nearest import Nearests
+
+
+class Found(NamedTuple):
+    """Pairs of boxes by their indices: what touches, and what is near."""
+
+    pairs: np.ndarray  # (k, 2)
+    contacts: Contacts  # (k,)
+    near_pairs: np.ndarray  # (m, 2)
+    near: Nearests  # (m,)
 
 
 class TooManyNear(ValueError):
@@ -113,3 +124,22 @@ def in_contact(pairs: np.ndarray, contacts: Contacts, margin: float = 0.0,
     if margin:
         rows = rows[np.argsort(~contacts.colliding[rows], kind='stable')]
     return pairs[rows], contacts[rows]
+
+
+def touching_and_near(pairs: np.ndarray, contacts: Contacts, solver: ContactSolver,
+                      sizes: np.ndarray, poses: np.ndarray, margin: float) -> Found:
+    """Return the pairs in contact, and those whose distance is `margin` [m] at most.
+
+    contacts: of all pairs by `solver`. The separation is at most the distance, so few are asked.
+    """
+    touching = in_contact(pairs, contacts)
+    if not margin:
+        return Found(*touching, _NO_PAIRS, _NO_NEARESTS)
+    pairs = pairs[~contacts.colliding & (contacts.separation <= margin)]
+    near = solver.distance_batch(poses, sizes=sizes, pairs=pairs)
+    rows = near.distance <= margin
+    return Found(*touching, pairs[rows], near[rows])
+
+
+_NO_PAIRS = np.zeros((0, 2), np.int64)
+_NO_NEARESTS = ContactSolver((1, 1, 1), (1, 1, 1)).distance_batch(*np.zeros((2, 0, 7)))

@@ -28,6 +28,8 @@ FRAME_AT = HEAD.size + 4
 """Where frame_id's characters are: behind stamp and length."""
 CONTACT_BYTES = 8 * 15
 """Of a contact behind its names: point, normal, depth, volume, area and covariance."""
+NEAR_BYTES = 8 * 10
+"""Of a pair that is near: distance, normal and both points."""
 MOST_NAMES = 2**16
 """Pairs whose names are kept as bytes, some 10 MB."""
 

@@ -14,12 +14,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..solver.contact import Contacts
+from ..solver.nearest import Nearests
 from .cdr import (
     CONTACT_BYTES,
     ENCAPSULATION,
     FRAME_AT,
     MOST_NAMES,
     NANOSECONDS,
+    NEAR_BYTES,
     PADDING,
     MessageError,
     parse_frame,
@@ -28,7 +30,7 @@ from .cdr import (
 
 UPPER = np.triu_indices(3)
 """Places of the six numbers of a message's covariance: xx xy xz yy yz zz."""
-NAMES = 3  # that a contact begins with: those of the pair and of its boxes
+NAMES = 3  # that an entry begins with: those of the pair and of its boxes
 
 
 class ReadContacts(NamedTuple):
@@ -37,10 +39,13 @@ class ReadContacts(NamedTuple):
     stamp: int  # of the header [ns]
     frame_id: str
     names: list[tuple[str, str, str]]
-    """(k,) of each pair: its name, and those of its boxes A and B."""
+    """(k,) of each pair in contact: its name, and those of its boxes A and B."""
     contacts: Contacts
-    """(k,) those of pairs in contact, then those of pairs that are near; `axis` is -1."""
-    touching: int  # how many are in contact: the first rows
+    """(k,) their contacts; `axis` is -1."""
+    near_names: list[tuple[str, str, str]]
+    """(m,) of each pair apart by no more than the node's margin."""
+    near: Nearests
+    """(m,) their nearest points."""
     stale: list[str]  # names of the pairs, or boxes, that could not be answered
     revision: int  # of the node's scene
 
@@ -51,13 +56,13 @@ def read_contacts(data: bytes) -> ReadContacts:
     order, sec, nanosec, length = parse_head(data, 'Contacts')
     frame_id = parse_frame(data, length, 'Contacts')
     count_at = struct.Struct(f'{order}I').unpack_from
-    names: list[Any] = []  # of three each
-    starts, touching = [], 0
+    names: tuple[list[Any], list[Any]] = [], []  # of three each
+    starts: tuple[list[int], list[int]] = [], []
     at = FRAME_AT + length
     at += (ENCAPSULATION - at) % 8
     try:
         (revision,), at = struct.unpack_from(f'{order}Q', data, at), at + 8
-        for number_of_list in range(2):  # `contacts` and `near`
+        for listed, places, size in zip(names, starts, (CONTACT_BYTES, NEAR_BYTES)):
             at += -at % 4
             (count,), at = count_at(data, at), at + 4
             for _ in range(count):
@@ -65,11 +70,10 @@ def read_contacts(data: bytes) -> ReadContacts:
                 for _ in range(NAMES):
                     at += 4 + count_at(data, at)[0]
                     at += -at % 4
-                names.append(_texts(data[begin:at], order, NAMES))
+                listed.append(_texts(data[begin:at], order, NAMES))
                 at += (ENCAPSULATION - at) % 8  # doubles are aligned behind the encapsulation
-                starts.append(at)
-                at += CONTACT_BYTES
-            touching = touching if number_of_list else count
+                places.append(at)
+                at += size
         (count,), at = count_at(data, at), at + 4
         stale: list[str] = []
         for _ in range(count):
@@ -82,16 +86,26 @@ def read_contacts(data: bytes) -> ReadContacts:
     if not -PADDING <= len(data) - at <= PADDING:
         raise MessageError('not a Contacts', f'{len(data)} bytes, where {at} are told')
     body = np.frombuffer(data, f'{order}f8', (len(data) - ENCAPSULATION) // 8, ENCAPSULATION)
-    places = (np.array(starts, np.int64)[:, None] - ENCAPSULATION) // 8
-    rows = body[places + np.arange(CONTACT_BYTES // 8)].astype(np.float64)
+    touching, near = (
+        body[(np.array(places, np.int64)[:, None] - ENCAPSULATION) // 8 + np.arange(size // 8)
+             ].astype(np.float64) for places, size in zip(starts, (CONTACT_BYTES, NEAR_BYTES)))
+    return ReadContacts(sec * NANOSECONDS + nanosec, frame_id, names[0], _contacts(touching),
+                        names[1], _nearests(near), stale, revision)
+
+
+def _contacts(rows: np.ndarray) -> Contacts:
+    """Return contacts by their rows (n, 15)."""
     covariance = np.empty((len(rows), 3, 3))
     for column, (i, j) in enumerate(zip(*UPPER)):
         covariance[:, i, j] = covariance[:, j, i] = rows[:, 9 + column]
-    point, normal = rows[:, :3].copy(), rows[:, 3:6].copy()
-    contacts = Contacts(~np.isnan(point[:, 0]), -rows[:, 6], normal, point, rows[:, 7].copy(),
-                        covariance, np.full(len(rows), -1, np.int32))
-    return ReadContacts(sec * NANOSECONDS + nanosec, frame_id, names, contacts, touching, stale,
-                        revision)
+    return Contacts(np.ones(len(rows), bool), -rows[:, 6], rows[:, 3:6].copy(), rows[:, :3].copy(),
+                    rows[:, 7].copy(), covariance, np.full(len(rows), -1, np.int32))
+
+
+def _nearests(rows: np.ndarray) -> Nearests:
+    """Return nearest points by their rows (n, 10)."""
+    return Nearests(np.zeros(len(rows), bool), *(rows[:, part].copy() for part in (
+        0, slice(1, 4), slice(4, 7), slice(7, 10))))
 
 
 @lru_cache(MOST_NAMES)  # the same in each message

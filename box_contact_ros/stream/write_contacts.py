@@ -6,9 +6,12 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+import numpy as np
+
 from ..core import native
 from ..scene.scene import Pair, Scene
 from ..scene.scene_solver import Answer
+from ..solver.nearest import Nearests
 from .cdr import (
     CONTACT_BYTES,
     COUNT,
@@ -17,6 +20,7 @@ from .cdr import (
     LITTLE,
     MOST_NAMES,
     NANOSECONDS,
+    NEAR_BYTES,
     REVISION,
 )
 
@@ -35,19 +39,25 @@ class ContactWriter:
         contacts = answer.contacts
         numbers = native.message_numbers(contacts.point, contacts.normal, contacts.separation,
                                          contacts.volume, contacts.covariance).tobytes()
-        pairs, touching = answer.pairs.tolist(), answer.touching
-        parts, at, end = [aligned(header), REVISION.pack(answer.revision)], 0, 0
-        for listed in (pairs[:touching], pairs[touching:]):  # `contacts` and `near`
-            parts.append(COUNT.pack(len(listed)))
-            at = (at + COUNT.size) % 8
-            for a, b in listed:
-                begin, end = end, end + CONTACT_BYTES
-                parts += self._names_of(a, b, at), numbers[begin:end]
-                at = 0  # doubles end each contact, so the next one begins at a multiple of 8
+        parts, at = [aligned(header), REVISION.pack(answer.revision)], 0
+        for pairs, body, size in (
+                (answer.pairs, numbers, CONTACT_BYTES),
+                (answer.near_pairs, near_numbers(answer.near).tobytes(), NEAR_BYTES)):
+            parts.append(COUNT.pack(len(pairs)))
+            at, end = (at + COUNT.size) % 8, 0
+            for a, b in pairs.tolist():
+                begin, end = end, end + size
+                parts += self._names_of(a, b, at), body[begin:end]
+                at = 0  # doubles end each entry, so the next one begins at a multiple of 8
         stale = answer.named_stale()
         parts.append(COUNT.pack(len(stale)))
         parts.append(b''.join([_string(pair.label) for pair in stale]))
         return b''.join(parts)
+
+
+def near_numbers(near: Nearests) -> np.ndarray:
+    """Return rows (n, 10) as `Near` has them: distance, normal, point_a, point_b."""
+    return np.column_stack((near.distance, near.normal, near.point_a, near.point_b))
 
 
 def header_bytes(stamp: int, frame_id: str) -> bytes:
@@ -71,7 +81,7 @@ def _string(text: str) -> bytes:
 
 
 def _names(pair: Pair, at: int) -> bytes:
-    """Return the names that a contact begins with, padded so that doubles may follow.
+    """Return the names that an entry begins with, padded so that doubles may follow.
 
     at: where they begin, by the distance from a multiple of 8: 0 or 4.
     """

@@ -13,12 +13,14 @@ Colour = tuple[int, int, int]  # red, green, blue, 0 to 255
 BOX_A: Colour = (238, 150, 50)
 BOX_B: Colour = (70, 120, 170)
 CONTACT: Colour = (230, 20, 110)
+NEAR: Colour = (20, 150, 90)
 BOX_OPACITY = 0.4  # the contact is inside the boxes, so they are translucent
 POINT_RADIUS, NORMAL_LENGTH = 0.015, 0.15
 """Lengths of what has no size of its own, as shares of the box's longest edge."""
 ELLIPSE_SIGMAS = math.sqrt(3.0)
 """Semi-axes of a patch's ellipse in standard deviations. A uniform rectangle l × w has l/√12 and
 w/√12, so its ellipse has l/2 and w/2 and touches its edges. Two would reach out of the boxes."""
+DASHES = 12  # of the line between two nearest points
 _CIRCLE = np.linspace(0.0, 2.0 * math.pi, 49)
 
 
@@ -45,6 +47,13 @@ def patch_sides(points: np.ndarray, normals: np.ndarray, covariances: np.ndarray
     outlines = points[:, None] + np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1) @ axes
     outlines = outlines[~np.isnan(outlines[:, 0, 0])]
     return np.stack([outlines[:, :-1], outlines[:, 1:]], axis=2).reshape(-1, 2, 3)
+
+
+def dashes(starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Return the ends (m, 2, 3) [m] of the dashes of lines between points (k, 3) [m]."""
+    share = np.linspace(0.0, 1.0, 2 * DASHES)[:, None]
+    points = starts[:, None] + share * (ends - starts)[:, None]
+    return points.reshape(-1, 2, 3)
 
 
 def unit_poses(poses: np.ndarray) -> np.ndarray:

@@ -86,8 +86,8 @@ def main() -> None:
     for tick in range(1, 6):
         # 5 ms of simulated time per step
         answer = client.ask(tick * 5_000_000, load, stack)
-        depth = -1e3 * answer.contacts.separation[0] if answer.touching else 0.0
-        print(f'{5 * tick} ms: {"contact" if answer.touching else "no contact"}, '
+        depth = -1e3 * answer.contacts.separation[0] if answer.names else 0.0
+        print(f'{5 * tick} ms: {"contact" if answer.names else "no contact"}, '
               f'{depth:.1f} mm deep')
         load[2] -= 1e-3
     rclpy.shutdown()

@@ -23,10 +23,12 @@ from std_msgs.msg import Header
 
 from box_contact_msgs.msg import Box, BoxPair, Contacts
 from box_contact_msgs.msg import Contact as ContactMessage
+from box_contact_msgs.msg import Near as NearMessage
 from box_contact_ros.node.messages import make_header
 from box_contact_ros.scene.scene import Pair
 from box_contact_ros.solver.checks import pose_fault
 from box_contact_ros.solver.contact import FIELDS, Contact, patch_area
+from box_contact_ros.solver.nearest import Nearest
 from box_contact_ros.stream.cdr import NANOSECONDS, MessageError
 from box_contact_ros.stream.pairing import StampedPose
 from box_contact_ros.stream.read_contacts import UPPER, ReadContacts, read_contacts
@@ -103,12 +105,13 @@ def make_normal(header: Header, contact: Contact) -> Vector3Stamped:
 
 
 def make_contacts(header: Header, listed: Iterable[tuple[Pair, Contact]],
-                  stale: Iterable[str] = ()) -> Contacts:
+                  stale: Iterable[str] = (), near: Iterable[tuple[Pair, Nearest]] = ()) -> Contacts:
     """Return `contacts`: the pairs in contact, those near, and the names of the stale."""
-    pairs = list(listed)
-    return Contacts(header=header, stale=list(stale),
-                    contacts=_entries(pair for pair in pairs if pair[1].colliding),
-                    near=_entries(pair for pair in pairs if not pair[1].colliding))
+    return Contacts(header=header, stale=list(stale), contacts=_entries(listed),
+                    near=[NearMessage(pair=pair.label, box_a=pair.a, box_b=pair.b,
+                                      distance=float(n.distance), normal=_vector(n.normal),
+                                      point_a=_point(n.point_a), point_b=_point(n.point_b))
+                          for pair, n in near])
 
 
 def read(message: Contacts) -> ReadContacts:
@@ -120,7 +123,7 @@ def contacts_by_pair(message: Contacts) -> dict[str, Contact]:
     """Return what touches by a message, by the names of the pairs."""
     answer = read(message)
     return {name: contact for (name, _, _), contact in zip(
-        answer.names, answer.contacts[:answer.touching])}
+        answer.names, answer.contacts)}
 
 
 def _entries(listed: Iterable[tuple[Pair, Contact]]) -> list[ContactMessage]:
@@ -131,9 +134,9 @@ def _entries(listed: Iterable[tuple[Pair, Contact]]) -> list[ContactMessage]:
 
 
 def contacts_at(stamp: int, touching: Mapping[Pair, Contact], stale: Sequence[str] = (),
-                ) -> Contacts:
-    """Return `contacts` of what touches at a stamp [ns], in the frame `yard`."""
-    return make_contacts(make_header(stamp, 'yard'), touching.items(), stale)
+                near: Mapping[Pair, Nearest] | None = None) -> Contacts:
+    """Return `contacts` of what touches and what is near at a stamp [ns], in the frame `yard`."""
+    return make_contacts(make_header(stamp, 'yard'), touching.items(), stale, (near or {}).items())
 
 
 def changed(contact: Contact, **numbers: Any) -> Contact:

@@ -184,11 +184,12 @@ def test_a_question_is_answered_as_a_tick_of_the_scene_that_it_makes(margin: flo
                       scene.pairs, patterns=(('guest*', '*'), *patterns), pose_array=True)
         poses_of = {name: place for name, (place, _) in guests.items()} | named
         answer = SceneSolver(whole, margin=margin)([poses_of.get(name) for name in whole.moving])
-        listed = [*response.contacts.contacts, *response.contacts.near]
+        listed, near = response.contacts.contacts, response.contacts.near
         assert [entry.pair for entry in listed] == [pair.label for pair, _ in answer.named()]
         assert [entry.depth for entry in listed] == (-answer.contacts.separation).tolist()
-        assert len(response.contacts.contacts) == answer.touching
-        count += len(listed)
+        assert [entry.pair for entry in near] == [pair.label for pair, _ in answer.named_near()]
+        assert [entry.distance for entry in near] == answer.near.distance.tolist()
+        count += len(listed) + len(near)
     assert count > 500
 
 
@@ -242,8 +243,9 @@ def test_near_is_what_is_apart_within_the_margin(checker: Checker) -> None:
         answer = asked(checker, *boxes, margin=margin).contacts
         assert [entry.pair for entry in answer.contacts] == ['load_lorry']
         assert [entry.pair for entry in answer.near] == near and not answer.stale
-    assert answer.near[0].depth == -0.5 and answer.near[0].normal.z == -1.0
-    assert math.isnan(answer.near[0].point.x)
+    near, = answer.near
+    assert (near.distance, near.normal.z) == (0.5, -1.0)
+    assert near.point_a.z - near.point_b.z == 0.5
 
 
 NAN = math.nan

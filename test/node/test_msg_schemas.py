@@ -15,7 +15,6 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import yaml
 from geometry_msgs.msg import PoseArray, PoseStamped
@@ -224,9 +223,9 @@ def test_live_messages_validate(live):
         assert len(messages) > 1
     texts = {message.status[0].message for message in live['/diagnostics']}
     assert {'no poses', 'poses refused: bad pose'} <= {text.split(',')[0] for text in texts}
-    for name, sign in (('contacts', 1.0), ('near', -1.0)):
-        assert {np.sign(entry.depth) for message in live['contacts']
-                for entry in getattr(message, name)} == {sign}
+    for name, field in (('contacts', 'depth'), ('near', 'distance')):
+        assert {getattr(entry, field) > 0.0 for message in live['contacts']
+                for entry in getattr(message, name)} == {True}
 
 
 @pytest.mark.parametrize('boxes, success', [

@@ -156,7 +156,7 @@ def test_a_stale_pair_is_named_and_never_an_old_contact(client, scene_node):
 
 
 def test_near_pairs_are_listed_within_the_margin(client, scene_node):
-    """Before the touch, without a point and without topics of their own."""
+    """Before the touch, with their nearest points and without topics of their own."""
     lorry = (7.0, 0, 1.0, 0, 0, 0, 1)
     with scene_node(margin=0.3):
         client.offer_until_answered(ON_FLOOR, lorry)
@@ -164,8 +164,8 @@ def test_near_pairs_are_listed_within_the_margin(client, scene_node):
         stamp = client.ask((0, 0, 1.25, 0, 0, 0, 1), lorry)
         assert not client.contacts[stamp].contacts
         near, = client.contacts[stamp].near
-        assert (near.pair, near.depth, near.volume, near.normal.z) == (FLOOR, -0.25, 0.0, 1.0)
-        assert np.isnan(near.point.x)
+        assert (near.pair, near.distance, near.normal.z) == (FLOOR, 0.25, 1.0)
+        assert near.point_b.z - near.point_a.z == 0.25
         assert client.answer(ON_FLOOR, lorry)[FLOOR].colliding
         assert stamp not in client.points_of[FLOOR]
 

@@ -71,7 +71,7 @@ def test_a_model_of_41_boxes_has_no_pair_of_its_own():
                   patterns=EVERY_PAIR, bodies={'truck': Frame()})
     assert scene.pair_count == 41 and scene.moving == ('truck',)
     answer = SceneSolver(scene)([[0, 0, 0.4, 0, 0, 0, 1]])
-    assert answer.near == answer.touching == 41 and (answer.pairs[:, 0] == 0).all()
+    assert answer.candidates == answer.touching == 41 and (answer.pairs[:, 0] == 0).all()
     assert SceneSolver(scene)([None]).stale.tolist() == [[box, ALONE] for box in range(1, 42)]
 
 

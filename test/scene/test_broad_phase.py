@@ -332,7 +332,7 @@ def test_bad_poses_are_refused_among_many():
     with pytest.raises(ValueError, match='pose of m4: position'):
         solver(rows)
     rows[4, 0] = 3.0
-    assert solver(rows).near == 89 * 88 // 2
+    assert solver(rows).candidates == 89 * 88 // 2
 
 
 CROWD = """

@@ -48,7 +48,6 @@ def alone(scene, given_poses, model='exact'):
 
 
 def assert_same(answer, wanted):
-    assert answer.touching == len(answer.pairs)
     assert {pair for pair, _ in answer.named()} == set(wanted)
     for pair, contact in answer.named():
         other = wanted[pair]
@@ -84,14 +83,14 @@ def test_a_tick_is_every_pair_alone(model, origin):
         assert answer.named_stale() == [pair for pair in pairs if missing in (pair.a, pair.b)]
         contacts += answer.touching
         stale += len(answer.stale)
-        left_out += len(pairs) - len(answer.stale) - answer.near
+        left_out += len(pairs) - len(answer.stale) - answer.candidates
     assert contacts > 50 and stale > 30 and left_out > 50
 
 
 @pytest.mark.parametrize('patterns', [(), EVERY_PAIR])
 @pytest.mark.parametrize('origin', [0.0, 5e6])
 def test_close_pairs_are_those_within_the_margin(patterns, origin):
-    """Of every pair alone: apart, and by at most the margin. Pairs in contact stay as they are."""
+    """Of every pair alone: apart, by a distance up to the margin. Those in contact stay."""
     rng = np.random.default_rng(5)
     close = 0
     for margin in (0.1, 0.5, 1.0):
@@ -103,18 +102,15 @@ def test_close_pairs_are_those_within_the_margin(patterns, origin):
         scene = Scene(boxes, () if patterns else pairs, patterns=patterns)
         solver = SceneSolver(scene, model='exact', margin=margin)
         answer, plain = solver(where), SceneSolver(scene, model='exact')(where)
-        touching = plain.touching
-        assert len(plain.pairs) == touching and not answer.contacts.colliding[touching:].any()
-        assert np.array_equal(answer.pairs[:touching], plain.pairs)
-        assert (abs(np.linalg.norm(answer.contacts.normal, axis=1) - 1) < 1e-12).all()
-        found = {frozenset(pair[1:]): contact.separation
-                 for pair, contact in answer.named()[touching:]}
+        assert not len(plain.near) and not answer.near.colliding.any()
+        assert np.array_equal(answer.pairs, plain.pairs)
+        found = {frozenset(pair[1:]): nearest.distance for pair, nearest in answer.named_near()}
         wanted = {}
         for pair in pairs:
             a, b = int(pair.a[1:]), int(pair.b[1:])
-            contact = ContactSolver(sizes[a], sizes[b], model='exact')(where[a], where[b])
-            if not contact.colliding and contact.separation <= margin:
-                wanted[frozenset(pair[1:])] = contact.separation
+            nearest = ContactSolver(sizes[a], sizes[b]).distance(where[a], where[b])
+            if not nearest.colliding and nearest.distance <= margin:
+                wanted[frozenset(pair[1:])] = nearest.distance
         assert found.keys() == wanted.keys()
         assert found == pytest.approx(wanted, rel=1e-9, abs=1e-8 if origin else 1e-15)
         close += len(found)
@@ -127,7 +123,7 @@ def test_the_only_pair_is_close_up_to_the_margin():
     for gap, listed in ((0.25, 1), (np.nextafter(2.25, 3) - 2.0, 0), (0.0, 0)):
         answer = SceneSolver(scene, model='exact', margin=0.25)(
             [poses.IDENTITY, np.array([2.0 + gap, 0, 0, 0, 0, 0, 1])])
-        assert len(answer.pairs) == max(listed, answer.touching)
+        assert len(answer.near) == listed
         assert answer.touching == (gap == 0.0)
     with pytest.raises(ValueError, match='margin must lie within 0 and 1e.50 m, not -1'):
         SceneSolver(scene, margin=-1.0)
@@ -138,10 +134,10 @@ def test_a_yard_leaves_few_pairs():
     scene = yard()
     solver = SceneSolver(scene, model='exact')
     high = np.array([63.0, 27.0, 20.0, 0, 0, 0, 1.0])
-    assert solver([high]).near == 0
+    assert solver([high]).candidates == 0
     down = np.array([63.5, 27.0, 4.5 * 2.591 + 0.5 * 2.591 - 0.01, 0, 0, 0, 1.0])
     answer = solver([down])
-    assert 0 < answer.near < 10
+    assert 0 < answer.candidates < 10
     assert_same(answer, alone(scene, {'load': down}))
     assert answer.touching == 1
 
@@ -180,7 +176,7 @@ def test_numbers_that_are_no_pose_are_refused(pose, words):
     with pytest.raises(ValueError, match=f'pose of load: .*{words}'):
         solver([np.array(pose, dtype=float)])
     assert len(solver([None]).stale) == len(scene.pairs)
-    assert solver([np.array([63.0, 27.0, 20.0, 0, 0, 0, 1.0])]).near == 0
+    assert solver([np.array([63.0, 27.0, 20.0, 0, 0, 0, 1.0])]).candidates == 0
 
 
 @pytest.mark.parametrize('bad', [
@@ -288,7 +284,7 @@ def test_a_solver_can_be_copied_and_pickled():
     solver = SceneSolver(scene, model='exact', margin=1.0)
     where = [poses.IDENTITY, np.array([2.5, 0, 0, 0, 0, 0, 1])]
     for twin in (copy.deepcopy(solver), pickle.loads(pickle.dumps(solver))):
-        assert twin(where).named()[0][1].separation == solver(where).contacts.separation[0] == 0.5
+        assert twin(where).named_near()[0][1].distance == solver(where).near.distance[0] == 0.5
 
 
 def test_models_that_do_not_know_a_size_refuse_the_scene():

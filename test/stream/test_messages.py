@@ -34,6 +34,7 @@ from box_contact_ros.node.messages import make_header
 from box_contact_ros.scene.scene import Pair, two_boxes
 from box_contact_ros.scene.scene_solver import Answer
 from box_contact_ros.solver.contact import Contact, Contacts
+from box_contact_ros.solver.nearest import Nearests
 from box_contact_ros.stream.cdr import MessageError
 from box_contact_ros.stream.read_contacts import read_contacts
 from box_contact_ros.stream.read_poses import PoseReader
@@ -52,7 +53,9 @@ POSE = (1, 2, 3, 0, 0, 0, 1)
 STAMP = 5_000_000_007
 GOOD = bytes(serialize_message(pose_stamped(POSE, 'map', STAMP)))
 ARRAY = bytes(serialize_message(pose_array([POSE] * 2, 'map', STAMP)))
-APART = Contact(False, 0.5, np.full(3, np.nan), np.full(3, np.nan), 0.0, np.full((3, 3), np.nan))
+NEAR = Nearests(np.zeros(1, bool), np.array([0.5]), np.array([[0.0, 0.6, 0.8]]),
+                np.array([[1.0, 2.0, 3.0]]), np.array([[1.0, 2.3, 3.4]]))
+NO_NEAR, NONE = NEAR[:0], np.empty((0, 2), np.int64)
 
 
 # --- poses in -------------------------------------------------------------------------------------
@@ -189,6 +192,12 @@ def test_bytes_that_are_no_pose_array_are_refused(data):
 # --- contacts out ---------------------------------------------------------------------------------
 
 
+def some_near(draw, count):
+    numbers = np.array(draw(st.lists(st.tuples(*[FLOATS] * 10), min_size=count, max_size=count)))
+    distance, *vectors = np.split(numbers.reshape(count, 10), [1, 4, 7], axis=1)
+    return Nearests(np.zeros(count, bool), distance[:, 0], *vectors)
+
+
 def a_contact(draw):
     three = st.tuples(*[BOUNDED] * 3)
     return Contact(True, draw(BOUNDED), np.array(draw(three)), np.array(draw(three)),
@@ -204,14 +213,16 @@ def test_answers_are_written_alike(data, stamp, frame_id, touching, close, stale
     """
     pairs = [Pair(*data.draw(st.tuples(*[NAMES] * 3))) for _ in range(touching + close + stale)]
     names: Any = SimpleNamespace(pair_of=lambda row, _: pairs[row])
-    contacts = [*(a_contact(data.draw) for _ in range(touching)), *[APART] * close]
+    contacts, near = [a_contact(data.draw) for _ in range(touching)], some_near(data.draw, close)
     rows = np.array([(row, 0) for row in range(len(pairs))], np.int64).reshape(-1, 2)
-    listed, stale_rows = np.split(rows, [len(contacts)])
-    answer = Answer(listed, Contacts.of(contacts), 0, stale_rows, names, stamp % 2**64)
+    listed, near_rows, stale_rows = np.split(rows, [touching, touching + close])
+    answer = Answer(listed, Contacts.of(contacts), near_rows, near, 0, stale_rows, names,
+                    stamp % 2**64)
     writer, header, typed_header = (
         ContactWriter(names), header_bytes(stamp, frame_id), make_header(stamp, frame_id))
     wanted = make_contacts(typed_header, zip(pairs, contacts),
-                           [pair.label for pair in pairs[len(contacts):]])
+                           [pair.label for pair in pairs[touching + close:]],
+                           zip(pairs[touching:], near))
     wanted.revision = answer.revision
     for _ in range(2):  # the second time the writer knows the names
         written = deserialize_message(writer.contacts(header, answer), ContactsMessage)
@@ -221,12 +232,16 @@ def test_answers_are_written_alike(data, stamp, frame_id, touching, close, stale
         with pytest.raises(MessageError):
             read_contacts(said[:length])
     read = read_contacts(said)
-    assert read[:2] == (stamp, frame_id) and read.touching == touching
-    assert read.names == [(pair.label, pair.a, pair.b) for pair in pairs[:len(contacts)]]
-    assert read.stale == [pair.label for pair in pairs[len(contacts):]]
+    assert read[:2] == (stamp, frame_id)
+    assert read.names + read.near_names == [
+        (pair.label, pair.a, pair.b) for pair in pairs[:touching + close]]
+    assert len(read.names) == touching
+    assert read.stale == [pair.label for pair in pairs[touching + close:]]
+    for field in ('distance', 'normal', 'point_a', 'point_b'):
+        assert np.array_equal(getattr(read.near, field), getattr(near, field), equal_nan=True)
     assert_same_bits(read.contacts, answer.contacts, 'separation', 'volume', 'point', 'normal',
                      'colliding')
-    for c in contacts[:touching]:
+    for c in contacts:
         point, normal = (aligned(header) + vector.tobytes() for vector in (c.point, c.normal))
         assert deserialize_message(point, PointStamped) == make_point(typed_header, c)
         assert deserialize_message(normal, Vector3Stamped) == make_normal(typed_header, c)
@@ -235,16 +250,18 @@ def test_answers_are_written_alike(data, stamp, frame_id, touching, close, stale
 def test_what_a_client_reads_is_the_contact_again():
     """Every number to the bit, the covariance symmetric again; the answer of the scene, too."""
     scene = two_boxes((2, 3, 1), (1, 2, 2))
-    rows, none = np.array([[0, 1]]), np.empty((0, 2), np.int64)
+    rows = np.array([[0, 1]])
     overlap = ContactSolver((2, 3, 1), (1, 2, 2), model='exact')(
         (0, 0, 0, 0, 0, 0, 1), (0.3, 0.4, 1.2, 0.1, 0.2, 0.3, 0.9))
-    for answer in (Answer(rows, Contacts.of([overlap]), 1, none, scene),
-                   Answer(rows, Contacts.of([APART]), 1, none, scene),
-                   Answer(none, Contacts.of([]), 0, rows, scene)):
+    for answer in (Answer(rows, Contacts.of([overlap]), NONE, NO_NEAR, 1, NONE, scene),
+                   Answer(NONE, Contacts.of([]), rows, NEAR, 1, NONE, scene),
+                   Answer(NONE, Contacts.of([]), NONE, NO_NEAR, 0, rows, scene)):
         read = read_answer(
             read_contacts(ContactWriter(scene).contacts(header_bytes(0, 'map'), answer)), scene)
         assert np.array_equal(read.stale, answer.stale)
         assert np.array_equal(read.pairs, answer.pairs)
+        assert np.array_equal(read.near_pairs, answer.near_pairs)
+        assert np.array_equal(read.near.point_b, answer.near.point_b)
         assert_same_bits(read.contacts, answer.contacts, *TOLD)
     message = make_contacts(make_header(0, 'map'), [(Pair('p', 'a', 'b'), overlap)])
     with pytest.raises(MessageError, match="'p' is no pair of the scene"):
@@ -253,8 +270,8 @@ def test_what_a_client_reads_is_the_contact_again():
 
 def test_contacts_in_the_other_order_of_bytes_are_read():
     """As a big-endian middleware sends them; what is no message of contacts is refused."""
-    message = make_contacts(make_header(5 * 10**9 + 7, 'map'), [
-        (Pair('p', 'a', 'bcd'), APART)], ['stale'])
+    message = make_contacts(make_header(5 * 10**9 + 7, 'map'), [], ['stale'],
+                            [(Pair('p', 'a', 'bcd'), NEAR[0])])
     message.revision = 258
     little = serialize_message(message)
     big = bytearray(little)
@@ -262,10 +279,10 @@ def test_contacts_in_the_other_order_of_bytes_are_read():
     for size, at in ((4, 4), (4, 8), (4, 12), (8, 20), (4, 28), (4, 32), (4, 36), (4, 44), (4, 52)):
         big[at:at + size] = little[at:at + size][::-1]
     at = 60
-    assert little[at:at + 8] == np.array([APART.point[0]]).tobytes()
-    for start in range(at, at + 120, 8):
+    assert little[at:at + 8] == np.array([0.5]).tobytes()
+    for start in range(at, at + 80, 8):
         big[start:start + 8] = little[start:start + 8][::-1]
-    for start in (at + 120, at + 124):
+    for start in (at + 80, at + 84):
         big[start:start + 4] = little[start:start + 4][::-1]
     for one, other in zip(read_contacts(bytes(big)), read_contacts(little)):
         assert str(one) == str(other)

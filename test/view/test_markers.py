@@ -25,10 +25,11 @@ from box_contact_ros.node.messages import make_header
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.scene import Box, Pair, Scene
 from box_contact_ros.solver.contact import Contact
-from box_contact_ros.view.live.listener import DrawnTick, SceneRows, read_touching
+from box_contact_ros.solver.nearest import Nearest
+from box_contact_ros.view.live.listener import DrawnTick, SceneRows, read_sorted
 from box_contact_ros.view.live.markers import LABELLED, MarkersNode, scene_markers
 
-NAMESPACES = ('boxes', 'points', 'normals', 'patches', 'depths')
+NAMESPACES = ('boxes', 'points', 'normals', 'patches', 'depths', 'near', 'distances')
 SLAB, CUBE = (2.0, 4.0, 1.0), (2.0, 2.0, 2.0)
 STAMP = 1_500_000_000
 HEADER = make_header(STAMP, 'yard')
@@ -46,11 +47,11 @@ def xyz(values):
     return values.x, values.y, values.z
 
 
-def drawing(touching, scene=YARD):
+def drawing(touching, scene=YARD, near=None):
     """Return the markers of a scene, and those of each namespace."""
     rows = SceneRows(scene)
     poses = np.where(np.isnan(rows.poses), [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0], rows.poses)
-    answer = read_touching(read(contacts_at(STAMP, touching)), scene)
+    answer = read_sorted(read(contacts_at(STAMP, touching, near=near)), scene)
     markers = scene_markers(DrawnTick(rows, STAMP, 'yard', poses, answer, 0.0))
     return markers, {name: [m for m in markers if m.ns == name] for name in NAMESPACES}
 
@@ -107,6 +108,23 @@ def test_all_contacts_are_drawn_and_the_deepest_labelled():
     assert [m.text for m in found['depths']] == [
         f'depth {n:.2f} mm' for n in range(29, 29 - LABELLED, -1)]
     assert len(found['patches'][0].points) == 30 * 48 * 2
+
+
+def test_a_pair_that_is_near_has_a_dashed_line_and_its_distance():
+    """From point to point; the distance is written at its middle, the nearest first."""
+    pairs = [Pair.between('slab', 's1'), Pair.between('slab', 's2')]
+    near = Nearest(False, 0.5, (0.0, 0.6, 0.8), (1.0, 2.0, 3.0), (1.0, 2.3, 3.4))
+    far = Nearest(False, 2.0, (0.0, 0.6, 0.8), (1.0, 2.0, 3.0), (1.0, 3.2, 4.6))
+    _, found = drawing({}, near={pairs[0]: far, pairs[1]: near})
+    (line,), (nearest, second) = found['near'], found['distances']
+    ends = np.array([xyz(end) for end in line.points]).reshape(2, -1, 3)
+    for dashes, pair in zip(ends, (near, far)):
+        assert dashes[0] == pytest.approx(pair.point_a)
+        assert dashes[-1] == pytest.approx(pair.point_b)
+        lengths = np.linalg.norm(np.diff(dashes, axis=0), axis=1)
+        assert lengths == pytest.approx(pair.distance / len(lengths))
+    assert (nearest.text, second.text) == ('0.500 m', '2.000 m')
+    assert xyz(nearest.pose.position) == pytest.approx((1.0, 2.15, 3.2))
 
 
 def test_the_rviz_config_names_topics_and_namespaces_that_exist():
@@ -193,7 +211,7 @@ def test_draws_what_the_contact_node_answers(client, node, contact_node):
     stamp = client.ask(poses.IDENTITY, TOUCHING, frames=('yard', 'yard'))
     assert client.spin(lambda: client.arrays[-1].markers[0].header == client.contacts[stamp].header)
     markers = {marker.ns: marker for marker in client.arrays[-1].markers}
-    assert set(markers) == set(NAMESPACES)
+    assert set(markers) == {'boxes', 'points', 'normals', 'patches', 'depths'}
     wanted = ContactSolver(CUBE, CUBE, model='exact')(poses.IDENTITY, TOUCHING)
     assert xyz(markers['points'].points[0]) == tuple(wanted.point)
     client.arrays.clear()

@@ -41,6 +41,7 @@ from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
 from box_contact_ros.node.topics import contact_qos
 from box_contact_ros.scene.scene import Box, Pair, Scene, two_boxes
+from box_contact_ros.solver.nearest import Nearest
 from box_contact_ros.solver.pose import rotation_matrix
 from box_contact_ros.stream.cdr import NANOSECONDS, MessageError
 from box_contact_ros.view.drawing import CUBE as CUBE_CORNERS
@@ -52,7 +53,7 @@ from box_contact_ros.view.live.listener import (
     Listener,
     SceneRows,
     Track,
-    read_touching,
+    read_sorted,
 )
 from box_contact_ros.view.live.page import Page, figures, legend
 from box_contact_ros.view.live.view_node import ViewNode
@@ -201,21 +202,23 @@ def test_poses_come_while_they_are_looked_up():
 def test_contacts_of_another_scene_are_refused():
     for message in (contacts_at(1, {Pair.between('a', 'c'): EXACT}), contacts_at(1, {}, ['a_c'])):
         with pytest.raises(MessageError, match="'a_c' is no pair of the scene"):
-            read_touching(read(message), BOTH)
+            read_sorted(read(message), BOTH)
 
 
 def test_the_deepest_contact_comes_first():
-    """Near pairs are left out; a model without a patch gives NaN."""
+    """And the nearest of the pairs that are near; a model without a patch gives NaN."""
     pairs = tuple(Pair.between('a', b) for b in 'bcd')
     scene = Scene({name: Box(CUBE, pose_topic=name) for name in 'abcd'}, pairs)
     nothing = changed(EXACT, volume=math.nan, covariance=np.full((3, 3), math.nan))
-    apart = changed(EXACT, point=np.full(3, math.nan), separation=0.1)
-    message = contacts_at(1, {pairs[0]: EXACT, pairs[1]: changed(nothing, separation=-1.0)})
-    message.near = contacts_at(1, {pairs[2]: apart}).contacts
-    answer = read_touching(read(message), scene)
+    apart = [Nearest(False, distance, *np.eye(3)) for distance in (0.2, 0.1)]
+    message = contacts_at(1, {pairs[0]: EXACT, pairs[1]: changed(nothing, separation=-1.0)}, (),
+                          dict(zip(pairs[1:], apart)))
+    answer = read_sorted(read(message), scene)
     assert answer.pairs.tolist() == [[0, 2], [0, 1]]
     assert answer.contacts.separation.tolist() == [-1.0, -0.125]
     assert np.isnan(answer.contacts.volume).tolist() == [True, False]
+    assert answer.near_pairs.tolist() == [[0, 3], [0, 2]]
+    assert answer.near.distance.tolist() == [0.1, 0.2]
 
 
 @pytest.fixture
@@ -311,7 +314,7 @@ def test_all_corners_are_in_view_whatever_its_shape(aspect, extents):
 def tick_of(stamp, pose_b, contacts):
     """Return a tick of two boxes with contacts by pair, box a at the origin."""
     return DrawnTick(ROWS, stamp, 'yard', np.array([ORIGIN, pose_b], dtype=float),
-                     read_touching(read(contacts_at(stamp, contacts)), BOTH), 2e-3)
+                     read_sorted(read(contacts_at(stamp, contacts)), BOTH), 2e-3)
 
 
 def shown(text):
@@ -330,6 +333,10 @@ def test_no_figure_is_made_up():
     apart = tick_of(START, APART, {})
     found = shown(figures(apart, math.nan, model='exact'))
     assert (found['verdict'], found['volume'], found['force']) == ('no contact', '0 L', '–')
+    near = {PAIR: Nearest(False, 0.125, (0, 0, 1), (0, 0, 1), (0, 0, 1.125))}
+    answer = read_sorted(read(contacts_at(START, {}, near=near)), BOTH)
+    assert shown(figures(replace(apart, answer=answer), math.nan, model=''))['verdict'] == (
+        'no contact, 0.125 m apart')
     alone = replace(apart, answer=None, latency=math.nan)
     found = shown(figures(alone, math.nan, model=''))
     assert found['verdict'] == 'poses come, but no contacts'
@@ -597,7 +604,7 @@ def test_two_hundred_boxes_in_a_browser():
     message = contacts_at(START, contacts, [pairs[99].label])
     with closing(Page('127.0.0.1', 8450, rows)) as page, open_page(page.url, 640, 360) as tab:
         known = np.where(np.isnan(rows.poses), np.r_[placed, placed], rows.poses)
-        answer = read_touching(read(message), scene)
+        answer = read_sorted(read(message), scene)
         bring(page, DrawnTick(rows, START, 'yard', known, answer, 1e-3))
         tab.wait_for('document.getElementById("pairs")?.innerText == "99 of 100"')
         assert tab.text('stale') == '1'

@@ -65,19 +65,20 @@ class DrawnTick:
     stamp: int  # [ns]
     frame_id: str
     poses: np.ndarray  # (n, 7), NaN for a box that has none
-    answer: Answer | None  # what touches, the deepest first; None if nobody answers
+    answer: Answer | None  # the deepest and the nearest first; None if nobody answers
     latency: float  # time [s] from the stamp to the contacts, NaN if nobody answers
 
 
-def read_touching(read: ReadContacts, scene: Scene) -> Answer:
-    """Return what touches by a box_contact_msgs/Contacts, the deepest first.
+def read_sorted(read: ReadContacts, scene: Scene) -> Answer:
+    """Return the answer that a message tells, the deepest contacts and the nearest pairs first.
 
     Raises MessageError for a pair that is not in the scene.
     """
     answer = read_answer(read, scene)
-    touching = np.flatnonzero(answer.contacts.colliding)
-    rows = touching[np.argsort(answer.contacts.separation[touching], kind='stable')]
-    return answer._replace(pairs=answer.pairs[rows], contacts=answer.contacts[rows])
+    rows = np.argsort(answer.contacts.separation, kind='stable')
+    near = np.argsort(answer.near.distance, kind='stable')
+    return answer._replace(pairs=answer.pairs[rows], contacts=answer.contacts[rows],
+                           near_pairs=answer.near_pairs[near], near=answer.near[near])
 
 
 def read_answer(read: ReadContacts, scene: Scene) -> Answer:
@@ -88,16 +89,18 @@ def read_answer(read: ReadContacts, scene: Scene) -> Answer:
     index, rows = scene.index_of, {pair.label: row for pair, row in zip(scene.pairs, scene.rows)}
     if scene.patterns:
         rows = {name: (number, ALONE) for name, number in index.items()} | rows
-    pairs = [(index.get(a, ALONE), index.get(b, ALONE)) for _, a, b in read.names]
+    listed = [*read.names, *read.near_names]
+    pairs = [(index.get(a, ALONE), index.get(b, ALONE)) for _, a, b in listed]
     for name, is_known in (*((names[0], min(pair) >= 0 and scene.has_pair(*pair))
-                             for names, pair in zip(read.names, pairs)),
+                             for names, pair in zip(listed, pairs)),
                            *((name, name in rows) for name in read.stale)):
         if not is_known:
             raise MessageError('unknown pair', f'{short_repr(name)} is no pair of the scene: read '
                                                'the scene file that the node has')
     boxes, stale = (np.array(part, np.int64).reshape(-1, 2)
                     for part in (pairs, [rows[name] for name in read.stale]))
-    return Answer(boxes, read.contacts, len(boxes), stale, scene)
+    touching, near = np.split(boxes, [len(read.names)])
+    return Answer(touching, read.contacts, near, read.near, len(boxes), stale, scene)
 
 
 class PoseTopic(NamedTuple):
@@ -202,7 +205,7 @@ class Listener(GuardedNode):
     def _on_contacts(self, data: bytes) -> None:
         read = read_contacts(data)
         latency = 1e-9 * (self.get_clock().now().nanoseconds - read.stamp)
-        self._answer = read.stamp, read_touching(read, self.rows.scene), latency
+        self._answer = read.stamp, read_sorted(read, self.rows.scene), latency
         self._unanswered = math.inf
 
     def tick(self) -> DrawnTick | None:

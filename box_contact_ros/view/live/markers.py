@@ -1,8 +1,10 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Markers for RViz and Foxglove: all boxes of a scene; point, normal, patch, depth of contacts.
+"""Markers for RViz and Foxglove: all boxes of a scene, contacts, and distances.
 
+A contact has its point, normal, patch and depth. Boxes that are near have a dashed line between
+their nearest points, with the distance.
 Subscribes to the poses of all that moves and to the contact node's contacts. Publishes markers
 (visualization_msgs/MarkerArray) 30 times a second while poses come. RViz with config/contact.rviz
 shows them, Foxglove with config/contact.foxglove.json. A patch is an ellipse that touches the edges
@@ -25,11 +27,13 @@ from ...node.messages import make_header, set_pose
 from ...node.runtime import run_node
 from ...node.topics import contact_qos
 from ...solver.contact import Contacts
+from ...solver.nearest import Nearests
 from .. import style
 from .listener import SCENE_PARAMETERS, DrawnTick, Listener
 
 PERIOD = 1 / 30  # time [s] between marker arrays
-LABELLED = 10  # contacts whose depth is written beside them, the deepest
+LABELLED = 10
+"""Contacts whose depth is written beside them, the deepest; and pairs near, the nearest."""
 TEXT_HEIGHT = 0.04  # of the longest edge
 WHITE: style.Colour = (255, 255, 255)
 
@@ -55,10 +59,17 @@ def scene_markers(tick: DrawnTick) -> list[Marker]:
     """Return what draws a tick: boxes by their row as id, contacts the deepest first."""
     header = make_header(tick.stamp, tick.frame_id)
     markers = list(_boxes(header, tick))
-    if tick.answer is not None and len(tick.answer.pairs):
-        edges = tick.rows.sizes[tick.answer.pairs].max(axis=2).min(axis=1)
-        markers += _contacts(header, tick.answer.contacts, edges)
+    answer, sizes = tick.answer, tick.rows.sizes
+    if answer is not None and len(answer.pairs):
+        markers += _contacts(header, answer.contacts, _edges(sizes, answer.pairs))
+    if answer is not None and len(answer.near):
+        markers += _near(header, answer.near, _edges(sizes, answer.near_pairs))
     return markers
+
+
+def _edges(sizes: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Return the longest edge (k,) of each pair's smaller box [m]."""
+    return np.asarray(sizes[pairs].max(axis=2).min(axis=1))
 
 
 def _boxes(header: Header, tick: DrawnTick) -> Iterator[Marker]:
@@ -100,6 +111,18 @@ def _contacts(header: Header, contacts: Contacts, edges: np.ndarray) -> Iterator
     sides = style.patch_sides(contacts.point, contacts.normal, contacts.covariance)
     if len(sides):
         yield line_marker(header, 'patches', sides, width=0.5 * radii[0], colour=style.CONTACT)
+
+
+def _near(header: Header, near: Nearests, edges: np.ndarray) -> Iterator[Marker]:
+    """Yield the dashed lines between nearest points, and the distances of the nearest pairs."""
+    yield line_marker(header, 'near', style.dashes(near.point_a, near.point_b),
+                      width=0.5 * style.POINT_RADIUS * edges[0], colour=style.NEAR)
+    for row, middle in enumerate(0.5 * (near.point_a + near.point_b)[:LABELLED]):
+        distance = make_marker(header, 'distances', Marker.TEXT_VIEW_FACING, WHITE, number=row)
+        _set(distance.pose.position, middle)
+        distance.scale.z = TEXT_HEIGHT * float(edges[row])
+        distance.text = f'{near.distance[row]:.3f} m'
+        yield distance
 
 
 def _set(xyz: Any, values: Sequence[float] | np.ndarray) -> Any:

@@ -95,6 +95,9 @@ class Page:
         self._patches = scene.add_line_segments('/contact/patches', place, style.CONTACT,
                                                 thickness=3.0, thickness_units='screen',
                                                 visible=False)
+        self._near = scene.add_line_segments('/near', place, style.NEAR, thickness=2.0,
+                                             thickness_units='screen', visible=False)
+        self._distance = scene.add_label('/near/distance', '', visible=False)
         self._ropes = scene.add_line_segments('/ropes', place, ROPE, thickness=2.0,
                                               thickness_units='screen', visible=False)
         colours = np.where(rows.is_a[:, None], style.BOX_A, style.BOX_B)
@@ -122,6 +125,17 @@ class Page:
             self._normals.points = np.stack([points, tips], axis=1)
         if len(sides):
             self._patches.points = sides
+        self._draw_near(answer)
+
+    def _draw_near(self, answer: Answer | None) -> None:
+        """Draw dashed lines between nearest points; the distance of the nearest is written."""
+        is_near = answer is not None and len(answer.near) > 0
+        self._near.visible = self._distance.visible = is_near
+        if answer is not None and is_near:
+            a, b = answer.near.point_a - self._origin, answer.near.point_b - self._origin
+            self._near.points = style.dashes(a, b)
+            self._distance.text = f'{answer.near.distance[0]:.3f} m'
+            self._distance.position = 0.5 * (a[0] + b[0])
 
     # --- the camera -------------------------------------------------------------------------------
 
@@ -236,11 +250,16 @@ def figures(tick: DrawnTick | None, force: float, *, model: str, lands_again: bo
 
 
 def in_words(answer: Answer | None) -> str:
-    """Return in words whether there is contact, and how deep; of several contacts the deepest."""
+    """Return in words whether there is contact, and how deep or how far.
+
+    Of several contacts the deepest counts, of several pairs that are near the nearest.
+    """
     if answer is None:
         return 'poses come, but no contacts'
     if len(answer.pairs):
         return f'contact, {1e3 * _depth(answer):.2f} mm deep'
+    if len(answer.near):
+        return f'no contact, {answer.near.distance[0]:.3f} m apart'
     return 'not evaluated' if len(answer.stale) else 'no contact'
 
 
