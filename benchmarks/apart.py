@@ -162,7 +162,7 @@ def prove(pairs: Pairs, found: Nearests) -> Proof:
         for part in (found.distance, found.normal, found.point_a, found.point_b))
     boxes = [_Box(pose[:3], _axes(pose[3:]), size / 2)
              for pose, size in zip(parts[:2], parts[2:])]
-    # From any point of a box to the nearest one of the other box is a bound from above, whatever was
+    # From any point of a box to the nearest one of the other is a bound from above, whatever was
     # wrong with a point. This way is across a face or an edge to the last digit.
     starts = boxes[0].nearest(point_b), boxes[1].nearest(point_a)
     ways = boxes[1].nearest(starts[0]) - starts[0], starts[1] - boxes[0].nearest(starts[1])

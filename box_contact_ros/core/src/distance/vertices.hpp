@@ -89,26 +89,29 @@ BC_INLINE T squared_distance(const Vec<T>& x, const Vec<T>& half) {
 // first axis, then along the second, then along the third.
 template <class T, class = std::enable_if_t<!is_scalar<T>>>
 BC_INLINE Vertex<T> nearest_vertex(const View<T>& view) {
-  Vec<T> corners[8] = {view.offset}, signed_half[4];
-  T nearest[8];
-  for (int j = 0, count = 1; j < 3; ++j, count *= 2) {
-    Vec<T> edge = view.other_half[j] * view.axes[j];
-    for (int c = 0; c < count; ++c) {
-      corners[count + c] = corners[c] - edge;
-      corners[c] = corners[c] + edge;
+  Vec<T> edges[3];
+  for (int j = 0; j < 3; ++j) edges[j] = view.other_half[j] * view.axes[j];
+  T nearest = splat<T>(infinity), number{};
+  for (int first = 0; first < 2; ++first) {
+    Vec<T> on_first = first ? view.offset - edges[0] : view.offset + edges[0];
+    for (int second = 0; second < 2; ++second) {
+      Vec<T> on_second = second ? on_first - edges[1] : on_first + edges[1];
+      for (int third = 0; third < 2; ++third) {
+        T found =
+            squared_distance<T>(third ? on_second - edges[2] : on_second + edges[2], view.half);
+        number = select<T>(found < nearest, splat<T>(4 * first + 2 * second + third), number);
+        nearest = min(found, nearest);
+      }
     }
   }
-  for (int c = 0; c < 8; ++c) nearest[c] = squared_distance<T>(corners[c], view.half);
-  // Of each two that differ along axis j alone, keep the nearer one.
-  for (int j = 2, count = 4; j >= 0; --j, count /= 2)
-    for (int c = 0; c < count; ++c) {
-      Mask<T> minus = nearest[count + c] < nearest[c];
-      nearest[c] = min(nearest[count + c], nearest[c]);
-      for (int k = j + 1; k < 3; ++k)
-        signed_half[c][k] = select<T>(minus, signed_half[count + c][k], signed_half[c][k]);
-      signed_half[c][j] = select<T>(minus, -view.other_half[j], view.other_half[j]);
-    }
-  return {nearest[0], signed_half[0]};
+  Vec<T> place;
+  for (int j = 0; j < 3; ++j) {
+    double bit = 4 >> j;
+    Mask<T> minus = number >= bit;
+    place[j] = select<T>(minus, -view.other_half[j], view.other_half[j]);
+    number = select<T>(minus, number - bit, number);
+  }
+  return {nearest, place};
 }
 
 // Numbers side by side in a register of this machine.
