@@ -35,7 +35,7 @@ BC_INLINE void try_winning_edges(const Pair<T>& pair, const SeparatingAxis<T>& a
   T length = abs(dot(between, normal));
   Mask<T> within = (abs(place_a) <= part_along(along_a, pair.half_a)) &
                    (abs(place_b) <= part_along(along_b, pair.half_b));
-  Mask<T> are_edges = axis.axis >= splat<Place<T>>(first_edge_axis);
+  Mask<T> are_edges = axis.axis >= splat<Index<T>>(first_edge_axis);
   best.take(are_edges & within & (length < best.distance),
             {length, choose(along_a, uniform(place_a), on_a),
              choose(along_b, uniform(place_b), on_b), length * normal});

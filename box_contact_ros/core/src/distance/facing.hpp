@@ -12,7 +12,7 @@ namespace box_contact::BOX_CONTACT_SET {
 
 namespace apart {
 
-using clipping::Place3;
+using clipping::Point3;
 using clipping::Polygon;
 using clipping::Slab;
 
@@ -43,23 +43,23 @@ inline bool middle_on_face(const Place2& middle, const Place2& edge, double half
 inline bool centroid_on_face(const Place2& middle, const Place2 (&edges)[2], const Place2& face,
                              double slack, Place2& found) {
   const auto& [u, w] = edges;
-  Place3 centre = clipping::place(middle.x, middle.y, 0.0);
-  Place3 one = clipping::place(u.x, u.y, 0.0), other = clipping::place(w.x, w.y, 0.0);
+  Point3 centre = clipping::point3(middle.x, middle.y, 0.0);
+  Point3 one = clipping::point3(u.x, u.y, 0.0), other = clipping::point3(w.x, w.y, 0.0);
   Polygon whole{
       4, {centre - one - other, centre + one - other, centre + one + other, centre - one + other}};
   Polygon half_way, part;
   clipping::clip(whole, {0, -face.x, face.x}, half_way);
   clipping::clip(half_way, {1, -face.y, face.y}, part);
   if (part.count == 0) return false;
-  const Place3& first = part.corners[0];
-  Place3 mean{}, moment{}, extent{};
+  const Point3& first = part.corners[0];
+  Point3 mean{}, moment{}, extent{};
   double area = 0.0;
   for (int i = 0; i < part.count; ++i) {
     mean += (1.0 / part.count) * (part.corners[i] - first);
     extent = max(extent, abs(part.corners[i] - first));
   }
   clipping::each_triangle(part,
-                          [&](double twice, const Place3& a, const Place3& b, const Place3& c) {
+                          [&](double twice, const Point3& a, const Point3& b, const Point3& c) {
                             area += twice;
                             moment += twice * ((b - a) + (c - a));
                           });

@@ -4,6 +4,7 @@
 // Distances of pairs and of rows: apart by the nearest points, in contact by model `exact`.
 #pragma once
 
+#include "../overlap/exact.hpp"
 #include "../pair.hpp"
 #include "../queue.hpp"
 #include "nearest_points.hpp"

@@ -72,7 +72,7 @@ BC_INLINE NearestPoints<T> nearest_points(const SeparatingAxis<T>& axis, unsigne
     apart::cut_to_slices(parallel, shared, pair);
   }
   NearestPoints<T> found = apart::try_vertices(pair);
-  if (any(axis.axis >= splat<Place<T>>(first_edge_axis)))
+  if (any(axis.axis >= splat<Index<T>>(first_edge_axis)))
     apart::try_winning_edges(pair, axis, found);
   Mask<T> proved = apart::is_proved(pair, axis, found);
   for (unsigned left = (~bits(proved) | bits(facing)) & wanted; left; left &= left - 1) {
