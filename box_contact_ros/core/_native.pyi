@@ -96,7 +96,8 @@ class BroadPhase:
 
 class PatchForces:
     def __init__(self, mass: np.ndarray, inertia: np.ndarray, centre: np.ndarray, substeps: int,
-                 iterations: int, relaxations: int, threads: int, friction: float, /) -> None: ...
+                 iterations: int, relaxations: int, threads: int, friction: float,
+                 most_depth: float, /) -> None: ...
     def set_bodies(self, mass: np.ndarray, inertia: np.ndarray, centre: np.ndarray, /) -> None: ...
     def hold(self, pairs: ArrayLike, separation: ArrayLike, normal: ArrayLike, point: ArrayLike,
              volume: ArrayLike, covariance: ArrayLike, poses: ArrayLike,

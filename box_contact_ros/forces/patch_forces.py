@@ -161,6 +161,8 @@ class Loads(NamedTuple):
     may reach beyond the rim."""
     corner_loads: np.ndarray
     """(k, 4) the part of `pressing` at each corner, never below 0 [N]: bilinear about `centre`."""
+    too_deep: np.ndarray
+    """(k,) bool, whether the patch is deeper than `most_depth`."""
 
 
 class PatchForces:
@@ -177,7 +179,8 @@ class PatchForces:
     """
 
     def __init__(self, bodies: Sequence[Body], *, friction: float = FRICTION, substeps: int = 4,
-                 iterations: int = 4, relaxations: int = 2, threads: int = 1) -> None:
+                 iterations: int = 4, relaxations: int = 2, threads: int = 1,
+                 most_depth: float = 1e-3) -> None:
         """Begin without patches.
 
         friction: Coulomb's μ of pairs without one of their own.
@@ -186,6 +189,9 @@ class PatchForces:
         iterations: of sequential impulses in a sub-step, at most.
         relaxations: further iterations, which remove the speed of pushing out.
         threads: at most. They change no bit.
+        most_depth: how deep what rests may be [m], where a load is large for the lighter body. With
+        contacts of one's own, its island makes up to 64 times as many sub-steps. `loads` tells where
+        that is not enough.
         substeps, iterations and relaxations may be 1,000 each.
         ValueError: names the field and its value.
         """
@@ -193,7 +199,8 @@ class PatchForces:
             *_columns(bodies), as_whole(substeps, 'substeps', 1, ITERATIONS_MAX),
             as_whole(iterations, 'iterations', 1, ITERATIONS_MAX),
             as_whole(relaxations, 'relaxations', 0, ITERATIONS_MAX),
-            as_whole(threads, 'threads', 1, THREADS_MAX), as_number(friction, 'friction'))
+            as_whole(threads, 'threads', 1, THREADS_MAX), as_number(friction, 'friction'),
+            as_number(most_depth, 'most_depth'))
 
     def set_bodies(self, bodies: Sequence[Body]) -> None:
         """Change masses, add bodies at the end, or drop bodies there with their patches."""

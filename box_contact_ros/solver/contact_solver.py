@@ -128,6 +128,9 @@ class ContactSolver(native.PairSolver):
         """
         if not isinstance(patch, (bool, np.bool_)):
             raise ValueError(f'patch must be True or False, not {short_repr(patch)}')
+        plain = _as_plain(pairs, poses_b, size_a, size_b)
+        if plain is not pairs:
+            return self.batch(poses_a, sizes=sizes, pairs=plain, threads=threads, patch=patch)
         return self._solve(self._rows(poses_a, poses_b, size_a, size_b, sizes, pairs, threads),
                            bool(patch))
 
@@ -140,6 +143,9 @@ class ContactSolver(native.PairSolver):
                                 sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
                                 threads: int = 1) -> Nearests:
         """Return what `distance_batch` does, for arguments of any kind; ValueError likewise."""
+        plain = _as_plain(pairs, poses_b, size_a, size_b)
+        if plain is not pairs:
+            return self.distance_batch(poses_a, sizes=sizes, pairs=plain, threads=threads)
         return self._find_distances(
             self._rows(poses_a, poses_b, size_a, size_b, sizes, pairs, threads))
 
@@ -159,7 +165,6 @@ class ContactSolver(native.PairSolver):
             if poses_b is not None or size_a is not None or size_b is not None:
                 raise ValueError('pairs are places in poses and sizes: batch(poses, sizes=…, '
                                  'pairs=…) has neither poses_b nor size_a nor size_b')
-            pairs = as_pairs(pairs, 'pairs')
             poses = as_floats(poses_a, 'poses', 'poses (m, 7) of rows x y z qx qy qz qw', (None, 7))
             rows_a = self._sizes(sizes, 'sizes', self._size_a, len(poses))
             rows_b = self._sizes(sizes, 'sizes', self._size_b, len(poses))
@@ -221,6 +226,16 @@ class ContactSolver(native.PairSolver):
         fault = self._size_fault(asked.size_a[of_a % len(asked.size_a)],
                                  asked.size_b[of_b % len(asked.size_b)])
         return fault or f'model {short_repr(self.model)} refuses row {of_a}'
+
+
+def _as_plain(pairs: ArrayLike | None, *others: ArrayLike | None) -> ArrayLike | None:
+    """Return pairs as C++ reads them, which often are all that it could not read.
+
+    others: what goes with no pairs; where one is given, a refusal follows.
+    """
+    if pairs is None or any(other is not None for other in others):
+        return pairs
+    return as_pairs(pairs, 'pairs')
 
 
 def _known(size: np.ndarray | None, name: str) -> np.ndarray:

@@ -312,7 +312,7 @@ def random_calls(seed: int, rounds: int) -> None:
         (native.message_numbers, [np.ones((4, 3)), np.ones((4, 3)), np.ones(4), np.ones(4),
                                   np.ones((4, 3, 3))], {}),
         (native.patch_areas, [np.ones((4, 3)), np.ones((4, 3, 3))], {}),
-        (native.PatchForces, [np.ones(2), np.ones((2, 3)), np.zeros((2, 3)), 2, 5, 2, 1, 0.5],
+        (native.PatchForces, [np.ones(2), np.ones((2, 3)), np.zeros((2, 3)), 2, 5, 2, 1, 0.5, 1e-3],
          {}),
         (law.hold, held(), {}), (law.forget, [[1]], {}),
         (law.advance, [0.001, rows(2), np.zeros((2, 6)), None], {})]

@@ -39,9 +39,9 @@ inline std::vector<bc_body> read_bodies(PyObject* masses, PyObject* inertias, Py
 inline PyObject* forces_new(PyTypeObject* type, PyObject* args, PyObject*) {
   PyObject *masses, *inertias, *centres;
   bc_force_options options = BC_DEFAULT_FORCE_OPTIONS;
-  if (!PyArg_ParseTuple(args, "OOOiiiid:PatchForces", &masses, &inertias, &centres,
+  if (!PyArg_ParseTuple(args, "OOOiiiidd:PatchForces", &masses, &inertias, &centres,
                         &options.substeps, &options.iterations, &options.relaxations,
-                        &options.threads, &options.friction))
+                        &options.threads, &options.friction, &options.most_depth))
     return nullptr;
   std::vector<bc_body> bodies = read_bodies(masses, inertias, centres);
   bc_patch_forces* forces;
@@ -174,6 +174,7 @@ inline PyObject* forces_loads(PyObject* self, PyObject*) {
   auto pressing = make<double>({n}), friction = make<double>({n, 3}), torsion = make<double>({n});
   auto centre = make<double>({n, 3}), corners = make<double>({n, 4, 3});
   auto corner_loads = make<double>({n, 4});
+  auto too_deep = make<bool>({n});
   for (npy_intp k = 0; k < n; ++k) {
     const bc_load& load = loads[size_t(k)];
     pairs.numbers[2 * k] = load.box_a;
@@ -184,8 +185,10 @@ inline PyObject* forces_loads(PyObject* self, PyObject*) {
     std::memcpy(centre.numbers + 3 * k, load.centre, sizeof load.centre);
     std::memcpy(corners.numbers + 12 * k, load.corners, sizeof load.corners);
     std::memcpy(corner_loads.numbers + 4 * k, load.corner_loads, sizeof load.corner_loads);
+    too_deep.numbers[k] = load.is_too_deep != 0;
   }
-  return pack(&PyTuple_Type, pairs, pressing, friction, torsion, centre, corners, corner_loads);
+  return pack(&PyTuple_Type, pairs, pressing, friction, torsion, centre, corners, corner_loads,
+              too_deep);
 }
 
 inline PyObject* forces_forget(PyObject* self, PyObject* bodies) {
@@ -234,7 +237,7 @@ inline PyMethodDef forces_methods[] = {
     {nullptr, nullptr, 0, nullptr}};
 inline PyType_Slot forces_slots[] = {
     {Py_tp_doc, const_cast<char*>("PatchForces(mass, inertia, centre, substeps, iterations, "
-                                  "relaxations, threads, friction)\n--\n\nPatches as velocity constraints. See force.h.")},
+                                  "relaxations, threads, friction, most_depth)\n--\n\nPatches as velocity constraints. See force.h.")},
     {Py_tp_new, slot<forces_new>()},
     {Py_tp_dealloc, reinterpret_cast<void*>(Holder<Forces>::dealloc)},
     {Py_tp_methods, forces_methods},

@@ -84,9 +84,12 @@ typedef struct bc_force_options {
   int relaxations; /* iterations more, at most, which remove the speed of pushing out; 0 to 1,000 */
   int threads;     /* 1 to 1,024; bodies that patches join are moved by one of them */
   double friction; /* Coulomb's μ [1] */
+  double most_depth; /* how deep what rests may be at most [m], where a load is large for the lighter
+                        body: with contacts of one's own, its island makes up to 64 times as many
+                        sub-steps. bc_load tells where that is not enough */
 } bc_force_options;
 
-#define BC_DEFAULT_FORCE_OPTIONS {sizeof(bc_force_options), 4, 4, 2, 1, 0.5}
+#define BC_DEFAULT_FORCE_OPTIONS {sizeof(bc_force_options), 4, 4, 2, 1, 0.5, 1e-3}
 
 /* What an advance leads to: arrays of a row for each body; NULL: not wanted. The poses and velocities
  * may be those that are given. */
@@ -111,6 +114,7 @@ typedef struct bc_load {
                              within 0.1 mm; else it has the moments of the overlap, which at rest is a
                              wedge, and may reach beyond the rim */
   double corner_loads[4]; /* the part of `pressing` at each corner; never below 0 [N] */
+  int is_too_deep;        /* whether the patch is deeper than `most_depth` */
 } bc_load;
 
 typedef struct bc_patch_forces bc_patch_forces;

@@ -64,12 +64,13 @@ class PatchForces {
     int relaxations = 2;    // iterations more, at most, which remove the speed of pushing out
     int threads = 1;        // at most
     double friction = 0.5;  // Coulomb's μ
+    double most_depth = 1e-3;  // of what rests [m], where a load is large for the lighter body
   };
 
   explicit PatchForces(Span<const Body> bodies) : PatchForces(bodies, Options()) {}
   PatchForces(Span<const Body> bodies, const Options& options) {
     bc_force_options plain{sizeof(bc_force_options), options.substeps, options.iterations,
-                           options.relaxations,      options.threads,  options.friction};
+                           options.relaxations,      options.threads,  options.friction, options.most_depth};
     bc_patch_forces* made;
     detail::check(bc_patch_forces_create(plain_of(bodies), std::int64_t(bodies.size()), &plain, &made));
     forces_.reset(made);

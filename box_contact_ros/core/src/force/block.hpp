@@ -22,6 +22,7 @@ constexpr double slow_damping_ratio = 2.0;
 constexpr double push_out_limit = 0.1;
 // The same where answers are late, which bear nothing that is as hard.
 constexpr double late_push_out_limit = 1.0;
+
 // A body in a step.
 struct Moving {
   Vec<double> linear, angular;
@@ -33,6 +34,8 @@ struct Moving {
   Placed placed;
   Vec<double> impulse, angular_impulse;  // of contacts, since the advance began [N s], [N m s]
   Motion pushed;  // its velocities before relaxation, at the end of the advance
+  double load;    // weights that it bears and its own [N]
+  int carriers;   // how many patches bear it
 
   // Move by the velocities for a time.
   void move(double h) {
@@ -56,6 +59,9 @@ struct Block {
   Vec<double> arm_a, arm_b, normal, surface;
   Rectangle shape;
   double friction;
+  double depth;  // [m]
+  double height, rises,
+      load;  // of its point; of its normal, upward; of the weights above [m], [1], [N]
   double normal_compliance;    // how much an impulse N alone changes the closing speed [1/kg]
   double least_friction_mass;  // of any row of friction and torsion
   NormalRows pushing, relaxed;
@@ -98,7 +104,7 @@ inline Mat<double> softened(Mat<double> compliance, const Vec<double>& softness)
 // Catto's soft step: a spring and a damper, implicit in time. Relaxation is without them, but for a
 // stiffness of the patch's own. Rocking is soft where answers are late: the wedge of the overlap,
 // which levels a body, is late then.
-inline void soften(const Patch& patch, const SubStep& step, double depth, const Moving& a,
+inline void soften(const Patch& patch, const SubSteps& step, double depth, const Moving& a,
                    const Moving& b, const Mat<double>& compliance, Block& block) {
   bool is_apart = depth < 0.0;
   double h = step.length;
@@ -140,7 +146,7 @@ inline Vec<double> arm_of(const Moving& body, const Vec<double>& point, double h
 }
 
 // Make the rows of a patch, where its bodies are now.
-inline void prepare(const Patch& patch, const Moving& a, const Moving& b, const SubStep& step,
+inline void prepare(const Patch& patch, const Moving& a, const Moving& b, const SubSteps& step,
                     Block& block) {
   const Rectangle& shape = patch.shape;
   // The patch goes with the body that no force moves, or with the mean of two that are free.
@@ -168,6 +174,7 @@ inline void prepare(const Patch& patch, const Moving& a, const Moving& b, const 
                     {cross(arm_b, patch.normal), shape.axis_1, shape.axis_2}, {patch.normal});
   block.normal_compliance = across[0][0];
   double depth = patch.depth + dot(way_a - way_b, patch.normal);
+  block.depth = depth;
   soften(patch, step, depth, a, b, across, block);
 }
 
@@ -230,7 +237,9 @@ inline void warm_start(const Patch& patch, double share, Block& block, Moving& a
 }
 
 // Keep the impulses of this step, and a share of those before.
-inline void store(Block& block, double kept, Patch& patch) {
+inline void store(Block& block, const SubSteps& steps, Patch& patch) {
+  double kept = steps.kept(patch.window);
+  patch.window = steps.window;
   block.normal_sum += block.normal_impulses;
   block.friction_sum += block.friction_impulses;
   if (kept > 0.0) {

@@ -51,22 +51,35 @@ inline double frequency_of(double late, double period) {
   return late_frequency / (late + 0.5 * period);
 }
 
-// What all patches of a sub-step share.
-struct SubStep {
-  double length;  // [s]
-  double window;  // the time in which the impulses that patches keep were given [s]
-  double again;   // share of the impulses of the window before that is given at first [1]
-  double kept;    // share of them that stays in the window [1]
-  double share;   // of the window in the longest step [1]: answers are late in comparison with that
-  double period;  // from one answer to the next [s]
-  double overdue;  // age of an answer that is overdue [s]
-};
-
-// The sub-steps of an advance.
+// The equal sub-steps of an advance.
 struct SubSteps {
   double dt, length;  // of all, and of each [s]
   int count, rounds;  // how many, and how many times all iterations are in each
-  SubStep first, later;
+  double window;      // the time in which the impulses that patches keep are given [s]
+  double share;       // of the window in the longest step [1]: answers are late compared with that
+  double period;      // from one answer to the next [s]
+  double overdue;     // age of an answer that is overdue [s]
+
+  static int count_of(double dt, double window) {
+    return std::max(1, int(std::ceil(dt / window - sub_step_slack)));
+  }
+  // With windows shorter by a factor.
+  SubSteps finer(int factor) const {
+    SubSteps steps = *this;
+    steps.window = window / factor;
+    steps.share = share / factor;
+    steps.count = count_of(dt, steps.window);
+    steps.length = dt / steps.count;
+    return steps;
+  }
+  // Which share of the impulses of a window `before` is given again at first, and which stays in this
+  // one [1].
+  double again(double before) const {
+    return before > 0.0 ? std::min(length / before, most_again) : 1.0;
+  }
+  double kept(double before) const {
+    return before > 0.0 ? std::max(0.0, window - length) / before : 0.0;
+  }
 };
 
 // The longest step of the last while, in two halves of it.
@@ -118,12 +131,9 @@ class Clock {
     // A late answer bears no stiffer patches in shorter sub-steps: all iterations are in one.
     bool is_late = frequency_of(late_, period_) < soft_frequency / longest;
     double window = is_late ? longest : std::min(longest / substeps, sub_step_limit);
-    int count = std::max(1, int(std::ceil(dt / window - sub_step_slack)));
-    SubSteps steps{dt, dt / count, count, is_late ? substeps : 1, {}, {}};
-    double share = window / longest;
-    steps.first = sub_step(steps, window, share);
-    steps.later = sub_step(steps, window, share);
-    return steps;
+    int count = SubSteps::count_of(dt, window);
+    return {dt,     dt / count,       count,   is_late ? substeps : 1,
+            window, window / longest, period_, overdue_periods * std::max(period_, dt)};
   }
   void end(double dt) {
     if (since_ >= 0.0) since_ += dt;
@@ -139,24 +149,10 @@ class Clock {
       if (interval > 0.0 && (least == 0.0 || interval < least)) least = interval;
     return least;
   }
-  // A sub-step of an advance. Its window begins the next one.
-  SubStep sub_step(const SubSteps& steps, double window, double share) {
-    double before = window_, h = steps.length;
-    window_ = window;
-    return {h,
-            window,
-            before > 0.0 ? std::min(h / before, most_again) : 1.0,
-            before > 0.0 ? std::max(0.0, window - h) / before : 0.0,
-            share,
-            period_,
-            overdue_periods * std::max(period_, steps.dt)};
-  }
-
   LongestStep longest_;
   double since_ = -1.0;                    // the last answer [s]; below 0: there was none
   double period_ = 0.0;                    // between answers [s]
   double late_ = 0.0;                      // age of the last answer when it came [s]
-  double window_ = 0.0;                    // in which the patches' impulses were given [s]
   double advance_ = 0.0;                   // length of the last one [s]
   double intervals_[intervals_kept] = {};  // between answers, the last one first; 0: none [s]
 };

@@ -60,9 +60,9 @@ struct Polygon {
 
 // Area and first and second moments of a polygon about a point, per density.
 struct Moments {
-  double area = 0.0;                        // [m²]
-  Point first = {0.0, 0.0};                 // ∫x, ∫y [m³]
-  double xx = 0.0, yy = 0.0, xy = 0.0;      // [m⁴]
+  double area = 0.0;                    // [m²]
+  Point first = {0.0, 0.0};             // ∫x, ∫y [m³]
+  double xx = 0.0, yy = 0.0, xy = 0.0;  // [m⁴]
 };
 inline Moments moments_of(const Polygon& polygon, const Point& about) {
   Moments sum;

@@ -11,7 +11,9 @@
 #include <vector>
 
 #include "clock.hpp"
+#include "fineness.hpp"
 #include "islands.hpp"
+#include "own_contacts.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
@@ -29,7 +31,7 @@ constexpr int iterations_max = 1000;
 
 struct Options {
   int substeps, iterations, relaxations, threads;
-  double friction;
+  double friction, most_depth;
 };
 
 // The velocities with which a body ended the last advance: before relaxation, and after it. Of a body
@@ -45,14 +47,16 @@ struct Advance {
   const bc_velocity* velocities;
   const bc_wrench* outside;
   const bc_motion& motion;
-  bool came_by_wrenches;  // whether those of the last advance moved the bodies
+  bool came_by_wrenches;   // whether those of the last advance moved the bodies
+  const OwnContacts* own;  // none: contacts are those of an answer
+  SolvePair solve_pair;
 };
 
 class IslandStep {
  public:
   IslandStep(const Options& options, const std::vector<Body>& bodies, const Advance& step,
-             std::vector<Ended>& ended, std::vector<Patch>& patches, std::vector<Load>& loads,
-             Islands& islands)
+             std::vector<Ended>& ended, std::vector<Fineness>& fineness,
+             std::vector<Patch>& patches, std::vector<Load>& loads, Islands& islands)
       : options_(options),
         bodies_(bodies),
         step_(step),
@@ -60,22 +64,25 @@ class IslandStep {
         patches_(patches),
         loads_(loads),
         moving_(islands.moving),
-        blocks_(islands.blocks) {}
+        blocks_(islands.blocks),
+        fineness_(fineness),
+        fineness_of_(bodies, step.outside, options.most_depth, patches, islands) {}
 
   void advance(const Island& island) const {
     for (size_t k = island.body; k < island.body_end; ++k) begin(moving_[k]);
     for (size_t k = island.block; k < island.block_end; ++k)
       blocks_[k].normal_sum = blocks_[k].friction_sum = {};
-    const SubSteps& steps = step_.steps;
+    int factor = step_.own ? fineness_of_(island, step_.steps, fineness_) : 1;
+    const SubSteps steps = factor > 1 ? step_.steps.finer(factor) : step_.steps;
     for (int number = 1; number <= steps.count; ++number) {
-      const SubStep& now = number == 1 ? steps.first : steps.later;
-      for (size_t k = island.body; k < island.body_end; ++k) drive(moving_[k], number);
+      if (factor > 1 && number > 1 && number % parts_of_a_contact == 1) ask_again(island);
+      for (size_t k = island.body; k < island.body_end; ++k) drive(moving_[k], number, steps);
       for (size_t k = island.block; k < island.block_end; ++k) {
         Block& block = blocks_[k];
         const Patch& patch = patches_[size_t(block.patch)];
         Moving &a = moving_[size_t(block.a)], &b = moving_[size_t(block.b)];
-        prepare(patch, a, b, now, block);
-        warm_start(patch, now.again, block, a, b);
+        prepare(patch, a, b, steps, block);
+        warm_start(patch, steps.again(patch.window), block, a, b);
       }
       bool is_last = number == steps.count;
       solve(island, steps.rounds * options_.iterations, &Block::pushing);
@@ -84,7 +91,7 @@ class IslandStep {
       solve(island, steps.rounds * options_.relaxations, &Block::relaxed);
       if (!is_last && step_.motion.wrenches) count_impulses(island);
       for (size_t k = island.block; k < island.block_end; ++k)
-        store(blocks_[k], now.kept, patches_[size_t(blocks_[k].patch)]);
+        store(blocks_[k], steps, patches_[size_t(blocks_[k].patch)]);
     }
   }
 
@@ -140,12 +147,22 @@ class IslandStep {
     moving.angular_impulse = moving.placed.axes * (transposed_times(moving.placed.axes, calmer) /
                                                    bodies_[k].inverse_inertia);
   }
+  // Solve the contacts of an island anew, where its bodies are within the advance.
+  void ask_again(const Island& island) const {
+    for (size_t k = island.block; k < island.block_end; ++k) {
+      Patch& patch = patches_[size_t(blocks_[k].patch)];
+      const Moving &a = moving_[size_t(blocks_[k].a)], &b = moving_[size_t(blocks_[k].b)];
+      step_.own->solve_again(step_.solve_pair, pose_of(a), pose_of(b), a.placed, b.placed,
+                             is_lighter_b(bodies_, patch), patch);
+    }
+  }
+
   // Change velocities by all but contacts, for sub-step `number`.
-  void drive(Moving& moving, int number) const {
+  void drive(Moving& moving, int number, const SubSteps& steps) const {
     auto k = size_t(moving.body);
-    double h = step_.steps.length;
+    double h = steps.length;
     if (!bodies_[k].is_free()) {
-      carry(moving, (number - 0.5) / step_.steps.count - 0.5);
+      carry(moving, (number - 0.5) / steps.count - 0.5);
       return;
     }
     moving.inverse_inertia = inverse_inertia_of(bodies_[k], moving.placed);
@@ -239,23 +256,27 @@ class IslandStep {
       write(moving.linear, moving.angular, step_.motion.velocities[k].linear,
             step_.motion.velocities[k].angular);
   }
-  void write_pose(const Moving& moving) const {
-    if (!step_.motion.poses) return;
-    auto k = size_t(moving.body);
-    bc_pose& pose = step_.motion.poses[k];
-    const Vec<double> position = moving.placed.position - moving.placed.axes * bodies_[k].centre;
+  bc_pose pose_of(const Moving& moving) const {
+    bc_pose pose;
+    const Vec<double> position =
+        moving.placed.position - moving.placed.axes * bodies_[size_t(moving.body)].centre;
     std::copy_n(position.v, 3, pose.position);
     double scale = 1.0 / std::sqrt(squared_norm(moving.quaternion));
     for (int i = 0; i < 4; ++i) pose.quaternion[i] = scale * moving.quaternion[i];
+    return pose;
+  }
+  void write_pose(const Moving& moving) const {
+    if (step_.motion.poses) step_.motion.poses[size_t(moving.body)] = pose_of(moving);
   }
   void end(const Block& block) const {
     Patch& patch = patches_[size_t(block.patch)];
     const Moving& a = moving_[size_t(block.a)];
     patch.age += step_.steps.dt;
+    patch.force = block.normal_sum[0] / step_.steps.dt;
     loads_[size_t(block.patch)] = {patch.box_a,      patch.box_b,
                                    block.normal_sum, block.friction_sum,
                                    block.normal,     a.placed.position + block.arm_a,
-                                   block.shape};
+                                   block.shape,      block.depth > options_.most_depth};
   }
   static void write(const Vec<double>& v, const Vec<double>& w, double* linear, double* angular) {
     std::copy_n(v.v, 3, linear);
@@ -270,6 +291,8 @@ class IslandStep {
   std::vector<Load>& loads_;
   std::vector<Moving>& moving_;
   std::vector<Block>& blocks_;
+  std::vector<Fineness>& fineness_;  // of the bodies
+  FinenessOf fineness_of_;
 };
 
 }  // namespace box_contact::BOX_CONTACT_SET::force

@@ -22,8 +22,9 @@ struct Island {
 class Islands {
  public:
   std::vector<Island> all;
-  std::vector<Moving> moving;  // by island; a body that no force moves comes once for each
-  std::vector<Block> blocks;   // by island, then by pair
+  std::vector<Moving> moving;      // by island; a body that no force moves comes once for each
+  std::vector<Block> blocks;       // by island, then by pair
+  std::vector<int32_t> by_height;  // places of blocks, by island: room for an order of its own
 
   void make_room(size_t bodies, size_t patches) {
     for (auto* places : {&root_, &island_, &place_}) places->reserve(bodies);
@@ -32,9 +33,11 @@ class Islands {
     patches_.make_room(bodies, patches);
     moving.reserve(bodies + patches);
     blocks.reserve(patches);
+    by_height.reserve(patches);
   }
 
   void group(const std::vector<Body>& bodies, const std::vector<Patch>& patches) {
+    by_height.resize(patches.size());
     number(bodies, patches);
     bodies_.sort(bodies.size(), all.size(), [&](size_t body) { return island_[body]; });
     patches_.sort(patches.size(), all.size(), [&](size_t k) {

@@ -13,6 +13,9 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
+// Solves a pair alone; false: it is refused.
+using SolvePair = bool (*)(const detail::PairNumbers&, bc_contact&);
+
 class OwnContacts {
  public:
   // The boxes of the bodies; none: box k is body k, and nobody knows its size.
@@ -66,6 +69,24 @@ class OwnContacts {
     long refused = solve(rows, long(count()), found_.results(farthest));
     return refused >= 0 ? refused : solve_near(solve, reach);
   }
+  // Solve the pair of a patch anew, with its bodies at other places. A pair that is apart now keeps its
+  // patch, which goes with the bodies.
+  void solve_again(SolvePair solve, const bc_pose& body_a, const bc_pose& body_b,
+                   const Placed& at_a, const Placed& at_b, bool is_lighter_b, Patch& patch) const {
+    const bc_body_box &a = boxes_[size_t(patch.box_a)], &b = boxes_[size_t(patch.box_b)];
+    bc_pose pose_a = in_common_frame(body_a, a.box.pose),
+            pose_b = in_common_frame(body_b, b.box.pose);
+    bc_contact found;
+    detail::PairNumbers pair{pose_a.position, pose_b.position, a.box.size.extent,
+                             b.box.size.extent};
+    if (!solve(pair, found) || !found.colliding) return;
+    Patch placed = patch;
+    placed.place(at_a, at_b, vector(found.normal), found.point, found.covariance[0], found.volume,
+                 found.separation,
+                 [&] { return rotation_matrix((is_lighter_b ? pose_b : pose_a).quaternion); });
+    if (placed.has_area()) patch = placed;
+  }
+
   // What was solved last.
   bc_patches answer() const {
     return {sizeof(bc_patches),

@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <utility>
+#include <vector>
 
 #include "../../include/box_contact/force.h"
 #include "rectangle.hpp"
@@ -32,15 +33,36 @@ struct Patch {
   double late;          // from the question to the answer [s]
   double age;           // since the answer was taken [s]
 
-  double normal_impulse, torsion_impulse;         // N [N s], m [N m s]
+  double force;                            // pressing: mean of the last advance [N]
+  double lasting;                          // what of it lasts: a part of an impact is not that [N]
+  double window;                           // in which the impulses were given [s]
+  double normal_impulse, torsion_impulse;  // N [N s], m [N m s]
   Vec<double> friction_impulse, rocking_impulse;  // f [N s], τ [N m s]
   Vec<double> impulse_arm;                        // from A's centre of mass to where they acted [m]
 
   BoxPair pair() const { return {box_a, box_b}; }
 
+  // Take the geometry of a contact, whose boxes are where the bodies are. `box_axes()`: see rectangle_of.
+  template <class BoxAxes>
+  void place(const Placed& at_a, const Placed& at_b, const Vec<double>& from_a, const double* at,
+             const double* covariance, double volume, double separation, const BoxAxes& box_axes) {
+    asked_a = at_a;
+    asked_b = at_b;
+    normal = from_a;
+    point = vector_at(at);
+    shape = rectangle_of(normal, covariance, box_axes);
+    // Of the mere touch on a large floor, whose volume is that of a box pressed in to 1e-9 of the size.
+    depth = std::min(volume / (4.0 * shape.half_1 * shape.half_2), -separation);
+  }
+
   // Whether area and depth are numbers: what no limit of an answer alone makes sure of.
   bool has_area() const { return shape.has_area() && std::fabs(depth) <= place_max; }
 };
+
+// Whether a patch of two boxes alike is a face of B's: the lighter body's, which is more often the smaller.
+inline bool is_lighter_b(const std::vector<Body>& bodies, const Patch& patch) {
+  return bodies[size_t(patch.a)].inverse_mass < bodies[size_t(patch.b)].inverse_mass;
+}
 
 // What a patch carried in the last advance: the sums of its impulses after relaxation.
 struct Load {
@@ -48,6 +70,7 @@ struct Load {
   Vec<double> normal_impulses, friction_impulses;  // N, τ1, τ2 and f1, f2, m / r [N s], [N m s]
   Vec<double> normal, point;
   Rectangle shape;
+  bool is_too_deep;
 
   // Mean forces over a time [s]. Pressure is bilinear, so that no corner pulls.
   bc_load over(double time) const {
@@ -62,6 +85,7 @@ struct Load {
     double x = -normal_impulses[2] / pressing, y = normal_impulses[1] / pressing;
     Vec<double> centre = point + (x * shape.axis_1 + y * shape.axis_2);
     load.pressing = pressing / time;
+    load.is_too_deep = is_too_deep;
     load.torsion = shape.radius * friction_impulses[2] / time;
     for (int i = 0; i < 3; ++i) load.friction[i] = friction[i], load.centre[i] = centre[i];
     constexpr double sides[4][2] = {{1.0, 1.0}, {1.0, -1.0}, {-1.0, -1.0}, {-1.0, 1.0}};

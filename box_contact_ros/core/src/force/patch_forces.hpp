@@ -46,7 +46,11 @@ class PatchForces {
   enum class Held { all, pair_twice, no_patch };
 
   PatchForces(std::vector<Body> bodies, const Options& options)
-      : bodies_(std::move(bodies)), options_(options), ended_(bodies_.size()), poses_(bodies_.size()) {
+      : bodies_(std::move(bodies)),
+        options_(options),
+        ended_(bodies_.size()),
+        fineness_(bodies_.size()),
+        poses_(bodies_.size()) {
     make_room(0);
   }
 
@@ -58,9 +62,10 @@ class PatchForces {
     bc_load load = loads_[k].over(clock_.advance());
     if (boxes().empty() || !(load.pressing > 0.0)) return load;
     const bc_body_box &a = boxes()[size_t(load.box_a)], &b = boxes()[size_t(load.box_b)];
-    FacePatch patch = patch_of_faces(in_common_frame(poses_[size_t(a.body)], a.box.pose), a.box.size,
-                                     in_common_frame(poses_[size_t(b.body)], b.box.pose), b.box.size,
-                                     loads_[k].normal, face_tolerance);
+    FacePatch patch =
+        patch_of_faces(in_common_frame(poses_[size_t(a.body)], a.box.pose), a.box.size,
+                       in_common_frame(poses_[size_t(b.body)], b.box.pose), b.box.size,
+                       loads_[k].normal, face_tolerance);
     if (patch.polygon.count == 0) return load;
     auto corners = patch.rectangle();
     auto shares = corner_shares(corners, patch.flat(vector(load.centre) - patch.origin));
@@ -78,6 +83,7 @@ class PatchForces {
   void set_bodies(std::vector<Body> bodies) {
     bodies_ = std::move(bodies);
     ended_.resize(bodies_.size());
+    fineness_.resize(bodies_.size());
     poses_.resize(bodies_.size());
     auto count = int32_t(bodies_.size());
     make_room(patches_.size());
@@ -105,6 +111,7 @@ class PatchForces {
     patches_.clear();
     loads_.clear();
     ended_.assign(bodies_.size(), {});
+    fineness_.assign(bodies_.size(), {});
     moves_by_wrenches_ = false;
     clock_ = {};
     is_grouped_ = false;
@@ -147,7 +154,8 @@ class PatchForces {
   // all is as it was at the last `keep`.
   template <class InThreads>
   int64_t advance(double dt, const bc_pose* poses, const bc_velocity* velocities,
-                  const bc_wrench* outside, const bc_motion& motion, const InThreads& in_threads) {
+                  const bc_wrench* outside, const bc_motion& motion, SolvePair solve_pair,
+                  const InThreads& in_threads) {
     bc_motion all = motion;
     if (!all.poses) all.poses = poses_.data();
     Advance step{clock_.begin(dt, options_.substeps),
@@ -155,10 +163,12 @@ class PatchForces {
                  velocities,
                  outside,
                  all,
-                 moves_by_wrenches_};
+                 moves_by_wrenches_,
+                 own_.count() > 0 ? &own_ : nullptr,
+                 solve_pair};
     if (!is_grouped_) islands_.group(bodies_, patches_);
     is_grouped_ = true;
-    IslandStep islands(options_, bodies_, step, ended_, patches_, loads_, islands_);
+    IslandStep islands(options_, bodies_, step, ended_, fineness_, patches_, loads_, islands_);
     in_chunks(in_threads, [&](const Island& island) { islands.advance(island); });
     int64_t lost = islands.first_lost();
     if (lost >= 0) {
@@ -268,18 +278,13 @@ class PatchForces {
     patch.b = int32_t(body_of(patch.box_b));
     patch.age = is_stale ? -1.0 : 0.0;
     if (is_stale) return patch;
-    patch.asked_a = placed_at(poses[patch.a], bodies_[size_t(patch.a)].centre);
-    patch.asked_b = placed_at(poses[patch.b], bodies_[size_t(patch.b)].centre);
-    patch.normal = sign * vector_at(answer.normal + 3 * k);
-    patch.point = vector_at(answer.point + 3 * k);
-    patch.shape = rectangle_of(patch.normal, answer.covariance + 9 * k, [&] {
-      // The lighter body is more often the smaller one, whose face the patch is.
-      bool is_b = bodies_[size_t(patch.a)].inverse_mass < bodies_[size_t(patch.b)].inverse_mass;
-      return axes_of(is_b ? patch.box_b : patch.box_a, poses[is_b ? patch.b : patch.a]);
-    });
-    // Of the mere touch on a large floor, whose volume is that of a box pressed in to 1e-9 of the size.
-    patch.depth = std::min(answer.volume[k] / (4.0 * patch.shape.half_1 * patch.shape.half_2),
-                           -answer.separation[k]);
+    patch.place(placed_at(poses[patch.a], bodies_[size_t(patch.a)].centre),
+                placed_at(poses[patch.b], bodies_[size_t(patch.b)].centre),
+                sign * vector_at(answer.normal + 3 * k), answer.point + 3 * k,
+                answer.covariance + 9 * k, answer.volume[k], answer.separation[k], [&] {
+                  bool is_b = is_lighter_b(bodies_, patch);
+                  return axes_of(is_b ? patch.box_b : patch.box_a, poses[is_b ? patch.b : patch.a]);
+                });
     patch.friction = answer.friction ? answer.friction[k] : options_.friction;
     patch.stiffness = answer.stiffness ? answer.stiffness[k] : 0.0;
     if (answer.surface) patch.surface = sign * vector_at(answer.surface + 3 * k);
@@ -310,6 +315,9 @@ class PatchForces {
         next.friction_impulse = old->friction_impulse;
         next.rocking_impulse = old->rocking_impulse;
         next.impulse_arm = old->impulse_arm;
+        next.window = old->window;
+        next.force = old->force;
+        next.lasting = old->lasting;
       }
       *kept++ = next;
     }
@@ -337,6 +345,7 @@ class PatchForces {
   OwnContacts own_;
   std::vector<Ended> ended_;           // of the bodies
   bool moves_by_wrenches_ = false;     // whether the caller does so since the last advance
+  std::vector<Fineness> fineness_;     // of the bodies
   std::vector<bc_pose> poses_;         // of the bodies at the end of the last advance
   std::vector<Patch> patches_, next_;  // by pair
   std::vector<Load> loads_;            // of the last advance, by pair

@@ -139,6 +139,9 @@ bc_status check_options(const bc_force_options& all) {
   if (all.threads < 1 || all.threads > threads_max)
     return fail(BC_BAD_ARGUMENT, "threads must be within 1 and %d, not %d", threads_max,
                 all.threads);
+  if (!(all.most_depth > 0.0 && all.most_depth <= length_max))
+    return fail(BC_BAD_ARGUMENT, "most_depth must be above 0 and at most 1e50 m, not %g",
+                all.most_depth);
   if (!force::is_amount(all.friction))
     return fail(BC_BAD_ARGUMENT, "friction must be within 0 and 1e50, not %g", all.friction);
   return BC_OK;
@@ -173,6 +176,10 @@ bc_status explain(PatchForces::Held held) {
       break;
   }
   return BC_OK;
+}
+
+bool solve_exactly(const PairNumbers& pair, bc_contact& contact) {
+  return solve_pair({chosen_kernel(), Model::exact, nullptr}, pair, BC_COVARIANCE, 0.0, contact);
 }
 
 // Solve the contacts of one's own, and take them.
@@ -245,7 +252,7 @@ bc_status bc_patch_forces_create(const bc_body* bodies, int64_t count,
     if (bc_status status = read_bodies(bodies, count, read)) return status;
     *forces =
         handle(new PatchForces(std::move(read), {all.substeps, all.iterations, all.relaxations,
-                                                 all.threads, all.friction}));
+                                                 all.threads, all.friction, all.most_depth}));
     return BC_OK;
   });
 }
@@ -340,7 +347,7 @@ bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, const bc_p
     self.keep();
     if (bc_status status = solve_own(self, dt, poses, outside)) return status;
     int64_t lost = self.advance(
-        dt, poses, velocities, outside, all,
+        dt, poses, velocities, outside, all, solve_exactly,
         [](long threads, long chunks, const auto& work) { in_threads(threads, chunks, work); });
     if (lost < 0) return BC_OK;
     return fail(

@@ -1,0 +1,153 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// How much shorter the sub-steps of an island are, so that no patch is pressed deeper than wanted.
+//
+// A patch that bears a force F for long is F·c·w²/f² deep: c is what an impulse N alone changes the
+// closing speed by, w the window, and f `soft_frequency`. Of boxes alike that is little. Of a heavy body on
+// a light one, c is the inverse of the small mass, and F the weight of the large one.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+#include "islands.hpp"
+
+namespace box_contact::BOX_CONTACT_SET::force {
+
+// A patch is judged if its load would move its bodies apart by more than this [m/s²]: some 60 g. Towers of
+// up to 30 boxes alike are not.
+constexpr double least_push = 600.0;
+// Which part of the depth that is wanted is aimed at [1]: what moves presses more than what rests, and the
+// depths of a stack add up.
+constexpr double aimed_depth = 0.36;
+// A factor that grows is larger than needed by this share [1], so that it seldom grows again.
+constexpr double growth = 1.25;
+// Sub-steps are shorter by this factor at most.
+constexpr int finest = 64;
+// A factor that is this many times what is needed is halved after this time [s]: each change moves what
+// rests.
+constexpr int spare_factor = 4;
+constexpr double calm_time = 1.0;
+// What lasts of a force grows by e in this time [s]. An impact is over before.
+constexpr double lasting_time = 0.5;
+// Contacts are solved anew after so many sub-steps.
+constexpr int parts_of_a_contact = 4;
+
+// Of a body: its island's, as a patch may be lost for a step.
+struct Fineness {
+  int factor = 1;
+  double calm = 0.0;  // for how long less was needed [s]
+};
+
+// Chooses the factor of an island.
+class FinenessOf {
+ public:
+  FinenessOf(const std::vector<Body>& bodies, const bc_wrench* outside, double most_depth,
+             std::vector<Patch>& patches, Islands& islands)
+      : bodies_(bodies),
+        outside_(outside),
+        most_depth_(most_depth),
+        patches_(patches),
+        moving_(islands.moving),
+        blocks_(islands.blocks),
+        by_height_(islands.by_height) {}
+
+  int operator()(const Island& island, const SubSteps& steps, std::vector<Fineness>& all) const {
+    int needed = needed_by(island, steps), held = 1;
+    double calm = calm_time;
+    each_free(island, [&](size_t body) {
+      held = std::max(held, all[body].factor);
+      calm = std::min(calm, all[body].calm);
+    });
+    if (held == 1 && needed == 1) return 1;
+    bool is_spare = spare_factor * needed <= held;
+    int factor = needed > held                   ? std::min(finest, int(std::ceil(growth * needed)))
+                 : is_spare && calm >= calm_time ? held / 2
+                                                 : held;
+    each_free(island, [&](size_t body) {
+      all[body] = {factor, is_spare && factor == held ? all[body].calm + steps.dt : 0.0};
+    });
+    return factor;
+  }
+
+ private:
+  template <class Visit>
+  void each_free(const Island& island, const Visit& visit) const {
+    for (size_t k = island.body; k < island.body_end; ++k)
+      if (moving_[k].inverse_mass > 0.0) visit(size_t(moving_[k].body));
+  }
+
+  int needed_by(const Island& island, const SubSteps& steps) const {
+    Vec<double> total{0.0, 0.0, 0.0};
+    double lightest = 0.0;
+    each_free(island, [&](size_t body) {
+      if (outside_) total += vector(outside_[body].force);
+      lightest = std::max(lightest, bodies_[body].inverse_mass);
+    });
+    double weight = length(total), push = 0.0;
+    bool may_be_heavy = weight * 2.0 * lightest > least_push;
+    if (may_be_heavy) add_loads(island, (-1.0 / weight) * total);
+    for (size_t k = island.block; k < island.block_end; ++k) {
+      Patch& patch = patches_[size_t(blocks_[k].patch)];
+      double above = may_be_heavy ? blocks_[k].load : 0.0;
+      patch.lasting =
+          std::min(patch.force, std::max(patch.lasting, above) * (1.0 + steps.dt / lasting_time));
+      double closing =
+          moving_[size_t(blocks_[k].a)].inverse_mass + moving_[size_t(blocks_[k].b)].inverse_mass;
+      push = std::max(push, std::max(patch.lasting, above) * closing);
+    }
+    if (!(push > least_push)) return 1;
+    double ratio = steps.window * std::sqrt(push / (aimed_depth * most_depth_)) / soft_frequency;
+    return int(std::ceil(std::min(ratio, double(finest))));
+  }
+
+  // Weights from the top: each body hands what it bears to its patches below, in equal parts.
+  void add_loads(const Island& island, const Vec<double>& up) const {
+    for (size_t k = island.body; k < island.body_end; ++k) {
+      Moving& moving = moving_[k];
+      moving.carriers = 0;
+      moving.load = moving.inverse_mass > 0.0 && outside_
+                        ? std::fabs(dot(vector(outside_[moving.body].force), up))
+                        : 0.0;
+    }
+    for (size_t k = island.block; k < island.block_end; ++k) {
+      Block& block = blocks_[k];
+      const Patch& patch = patches_[size_t(block.patch)];
+      block.height = dot(patch.point, up);
+      block.rises = dot(patch.normal, up);
+      if (carries(block)) ++moving_[size_t(upper(block))].carriers;
+    }
+    auto first = by_height_.begin() + long(island.block),
+         last = by_height_.begin() + long(island.block_end);
+    std::iota(first, last, int32_t(island.block));
+    std::sort(first, last, [&](int32_t j, int32_t k) {
+      double a = blocks_[size_t(j)].height, b = blocks_[size_t(k)].height;
+      return a != b ? a > b : j < k;
+    });
+    for (auto at = first; at != last; ++at) {
+      Block& block = blocks_[size_t(*at)];
+      block.load = 0.0;
+      if (!carries(block)) continue;
+      const Moving& above = moving_[size_t(upper(block))];
+      block.load = above.load / above.carriers;
+      moving_[size_t(lower(block))].load += block.load;
+    }
+  }
+  static bool carries(const Block& block) { return std::fabs(block.rises) > 0.5; }
+  static int32_t upper(const Block& block) { return block.rises > 0.0 ? block.b : block.a; }
+  static int32_t lower(const Block& block) { return block.rises > 0.0 ? block.a : block.b; }
+
+  const std::vector<Body>& bodies_;
+  const bc_wrench* outside_;
+  double most_depth_;
+  std::vector<Patch>& patches_;
+  std::vector<Moving>& moving_;
+  std::vector<Block>& blocks_;
+  std::vector<int32_t>& by_height_;
+};
+
+}  // namespace box_contact::BOX_CONTACT_SET::force
