@@ -199,7 +199,8 @@ class ContactSolver(native.PairSolver):
                 size_a = size_a if len(size_a) == 1 else size_a[first]
                 size_b = size_b if len(size_b) == 1 else size_b[second]
                 a, b = a[first], b[second]
-            contacts, refused = self._model.solve(a, b, size_a, size_b, threads)
+            contacts, refused = _checked(self._model.solve(a, b, size_a, size_b, threads),
+                                         short_repr(self.model), len(a))
             contacts = contacts if patch else without_patch(contacts)
         if refused >= 0:
             raise ValueError(self._refusal(asked, refused))
@@ -236,6 +237,18 @@ def _as_plain(pairs: ArrayLike | None, *others: ArrayLike | None) -> ArrayLike |
     if pairs is None or any(other is not None for other in others):
         return pairs
     return as_pairs(pairs, 'pairs')
+
+
+def _checked(answer: object, model: str, count: int) -> tuple[Contacts, int]:
+    """Return the answer of a model for `count` pairs. ValueError: it is no such answer."""
+    if not (isinstance(answer, tuple) and len(answer) == 2 and isinstance(answer[0], Contacts)):
+        raise ValueError(f'model {model}: solve must return Contacts and the first refused row or '
+                         f'-1, not {short_repr(answer)}')
+    contacts, refused = answer
+    if len(contacts) != count:
+        raise ValueError(f'model {model}: solve must return {count} contacts, a row a pair, not '
+                         f'{len(contacts)}')
+    return contacts, int(refused)
 
 
 def _known(size: np.ndarray | None, name: str) -> np.ndarray:

@@ -15,7 +15,6 @@ from dataclasses import replace
 import numpy as np
 
 from box_contact_ros import Contacts, ContactSolver, make_model
-from box_contact_ros.solver.contact import without_patch
 
 
 class Between:
@@ -30,7 +29,9 @@ class Between:
         found, refused = self.exact.solve(a, b, size_a, size_b, threads)
         middle = (a[:, :3] + b[:, :3]) / 2.0
         point = np.where(found.colliding[:, None], middle, np.nan)
-        return replace(without_patch(found), point=point), refused
+        # It knows nothing of the patch: NaN, and no volume where the boxes are apart.
+        return replace(found, point=point, volume=np.where(found.colliding, np.nan, 0.0),
+                       covariance=np.full_like(found.covariance, np.nan)), refused
 
 
 if __name__ == '__main__':

@@ -57,6 +57,19 @@ def a_pair(box_a: str, box_b: str) -> BoxPair:
     return BoxPair(box_a=box_a, box_b=box_b)
 
 
+def unset(message: Any, name: str = 'message') -> list[str]:
+    """Return the fields of a message, and of its parts, that are 0 or empty as a new one's are."""
+    if isinstance(message, Sequence) and not isinstance(message, str):
+        return [f for row, part in enumerate(message) for f in unset(part, f'{name}[{row}]')] or (
+            [] if len(message) else [name])
+    if hasattr(message, 'get_fields_and_field_types'):
+        return [found for field in message.get_fields_and_field_types()
+                for found in unset(getattr(message, field), f'{name}.{field}')]
+    if isinstance(message, np.ndarray):
+        return [] if message.all() else [name]
+    return [] if message else [name]
+
+
 def _pose(numbers: Iterable[float]) -> Pose:
     x, y, z, qx, qy, qz, qw = map(float, numbers)
     return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))

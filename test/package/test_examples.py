@@ -171,10 +171,14 @@ def test_record(program, tmp_path: Path) -> None:
 ASK_ONCE = """
 import numpy, rclpy
 from lockstep_client import LockstepClient, PoseStamped
+from rclpy.serialization import deserialize_message
+from typed_messages import unset
+from box_contact_msgs.msg import Contacts
 stamps = set()
 class Client(LockstepClient):
     def receive(self, data):
         super().receive(data)
+        self.data = data
         stamps.add(self.answer.stamp)
 rclpy.init()
 client = Client()
@@ -186,6 +190,8 @@ for _ in range(10):  # the node may not have met this client yet
 stack = numpy.array([0, 0, 0, 0, 0, 0, 1])
 answer = client.ask(10**9, stack + numpy.array([0, 0, 2.581, 0, 0, 0, 0]), stack)
 print(answer.names[0][0], round(-answer.contacts.separation[0], 6), stamps)
+client.ask(2 * 10**9, [0.3, 0.2, 1.9, 0.2, 0.1, 0.4, 1], [0, 0, 0, 0.1, 0.2, 0.3, 0.9])
+print('left at 0:', unset(deserialize_message(client.data, Contacts).contacts))
 """
 
 
@@ -235,10 +241,11 @@ def test_cpp_node(cpp_with_ros: Path, name: str) -> None:
             asked = subprocess.run(
                 [sys.executable, '-c', ASK_ONCE], check=True, stdout=subprocess.PIPE, text=True,
                 env=os.environ | {'PYTHONPATH': os.pathsep.join(
-                    [str(EXAMPLES), os.environ.get('PYTHONPATH', '')])}, timeout=PATIENCE)
+                    [str(EXAMPLES), str(ROOT / 'test' / 'helpers'),
+                     os.environ.get('PYTHONPATH', '')])}, timeout=PATIENCE)
         finally:
             node.terminate()
-    assert asked.stdout == 'box_a_box_b 0.01 {1000000000}\n'
+    assert asked.stdout == 'box_a_box_b 0.01 {1000000000}\nleft at 0: []\n'
 
 
 def test_cpp_client(cpp_with_ros: Path, program) -> None:

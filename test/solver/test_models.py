@@ -47,6 +47,22 @@ class Lifted:
         return found, refused
 
 
+@pytest.mark.parametrize(('answer', 'words'), [
+    (None, 'must return Contacts and the first refused row or -1, not None'),
+    ((None, -1), 'must return Contacts and'),
+    (native.Exact().solve(*[np.array([poses.IDENTITY])] * 2, *[np.ones((1, 3))] * 2, 1),
+     'must return 3 contacts, a row a pair, not 1')])
+def test_an_answer_that_is_none_is_refused(answer, words):
+    """By the model's name, not by an error deep in the solver."""
+    class Mine:
+        def solve(self, *_):
+            return answer
+
+    with pytest.raises(ValueError, match=f'model <.*Mine.*: solve {re.escape(words)}'):
+        ContactSolver(poses.CUBE, poses.CUBE, model=Mine()).batch(
+            [poses.IDENTITY] * 3, [HIGHER] * 3)
+
+
 def test_an_object_is_a_model():
     """Single calls, batches and rows by place answer with it, for any threads, and when copied."""
     exact, solver = (ContactSolver(poses.CUBE, poses.CUBE, model=model)
