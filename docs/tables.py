@@ -42,15 +42,14 @@ class Choice(NamedTuple):
 
 
 CHOICES = (
-    Choice("polygon soup on FCL, the paper's rival", 'soup-8'),
-    Choice("`paper`, the paper's network", 'paper', 'paper', rest='settled cubes'),
-    Choice('`mlp`, a network for boxes of any sizes', 'mlp', 'mlp volume'),
-    Choice('`exact`, the default', 'exact', 'exact volume'),
+    Choice('`exact`', 'exact', 'exact volume'),
     Choice('MuJoCo', 'MuJoCo mj_collision', 'mjc_BoxBox'),
-    Choice('Bullet', 'PyBullet getContactPoints', 'Bullet btBoxBoxDetector'),
-    Choice('Coal', 'Coal ComputeCollision, contact patch', 'Coal ComputeContactPatch'),
+    Choice('Bullet', 'PyBullet getContactPoints'),
+    Choice('Drake, hydroelastic', 'Drake hydroelastic'),
+    Choice("the paper's network", 'paper', 'paper', rest='settled cubes'),
+    Choice('polygon soup', 'soup-8'),
 )
-"""From what the paper replaced to what this package has, then the engines."""
+"""This package, the engines, and what the source paper compares."""
 SHOWN = {'avx512': 'AVX-512', 'avx2': 'AVX2'}
 """Instruction sets as native.csv and frontier.csv call them, the README's first."""
 AT_REST, SWAY = 'settled by PatchForces', 'containers'  # sets of native.csv
@@ -103,17 +102,6 @@ def from_c(choice: Choice, way: str, of_set: str) -> str:
     return cell(row, 'p50_ns', digits=3) if row else '–'
 
 
-def by_mujoco(finds: str, of_set: str) -> str:
-    """Return a call's time of `exact` from C relative to MuJoCo's, and its range.
-
-    finds: what the call finds beside the point, volume or covariance.
-    """
-    row = fastest(rows('native.csv', set=of_set, contestant=f'exact {finds}, single'))
-    assert row
-    ratio, low, high = (float(row[column]) for column in ('by_unit', 'by_unit_low', 'by_unit_high'))
-    return f'{ratio:.2f} [{low:.2f}, {high:.2f}]'
-
-
 def models() -> str:
     """Return what each way to find the contact point costs, and how far it is off."""
     body = []
@@ -122,33 +110,34 @@ def models() -> str:
                             **{'class': 'all'}))
         assert call
         body.append([choice.name, cell(call, 'call_p50', 1e3),
-                     *(from_c(choice, way, of_set) for way in ('single', 'batch')
-                       for of_set in (AT_REST, SWAY)),
+                     *(from_c(choice, 'single', of_set) for of_set in (AT_REST, SWAY)),
                      *(point_error(choice, of_set) for of_set in (choice.rest, 'landings'))])
     table = markdown_table(
-        ['', 'Python [µs]', 'C [ns], at rest', 'C [ns], swaying', 'C in a batch [ns], at rest',
-         'C in a batch [ns], swaying', 'Error [%], at rest', 'Error [%], landing'], body)
+        ['one pair', 'Python [µs]', 'C, no covariance [ns], at rest', 'moving',
+         'point error [%], at rest', 'landing'], body)
     where = fastest(rows('native.csv', set=SWAY, contestant='exact volume, single'))
     assert where
-    return (f'{table}\n\nMedians of one pair on one core with '
-            f'{SHOWN[where["instruction_set"]]}, {where["processor"]}. Goods rest '
-            '(cubes for `paper`), containers sway or land. The error is what 99 % of the points '
-            "are within, in % of the smaller box's longest edge. A dash: no such call or "
-            'network. PyBullet needs five detections for a new pose.\n\n'
-            f'Relative to MuJoCo from C, `exact` takes {by_mujoco("volume", AT_REST)} at rest and '
-            f'{by_mujoco("volume", SWAY)} swaying for point and volume, with the covariance '
-            f'{by_mujoco("covariance", AT_REST)} and {by_mujoco("covariance", SWAY)}.')
+    return (f'{table}\n\nMedians on one core, {SHOWN[where["instruction_set"]]}, '
+            f'{where["processor"]}. The error is within what 99 % of the points are, in % of the '
+            "smaller box's longest edge. MuJoCo from Python is `mj_kinematics` and `mj_collision`. "
+            'A dash: no such call, or two boxes that the network is not trained for.')
 
 
 def bench() -> str:
-    """Return the command of the bench with the ratios that it printed for `mlp`."""
-    found = RATIOS.search((RESULTS / 'bench_mlp.md').read_text('utf-8'))
+    """Return what the node's answers take beside an echo's, by the reports of the bench."""
+    found = {model: RATIOS.search((RESULTS / f'bench_{model}.md').read_text('utf-8'))
+             for model in ('exact', 'mlp')}
     median = MEDIAN.search((RESULTS / 'bench_exact.md').read_text('utf-8'))
-    assert found and median
-    return (f'`box_contact_bench --model mlp` compares latencies over ROS of the contact node, '
-            f'an echo of poses, and the soup. At 1 kHz it printed '
-            f'`{found[0]}`, with 95 % intervals: see [the report](docs/results/bench_mlp.md). With '
-            f'`exact`, the median answer takes {median[1]} ms.')
+    assert median and all(found.values())
+    exact, mlp = (line and line[0] for line in found.values())
+    soup = str(exact).partition('soup / contact ')[2].partition(' ')[0]
+    of_mlp = str(mlp).removeprefix('contact / echo ').partition(',')[0].partition(' ')[0]
+    ratio, _, rest = str(exact).removeprefix('contact / echo ').partition(' ')
+    return (f'Over ROS, an answer takes {ratio} times as long as that of an echo node, which sends '
+            f'each pose back and computes nothing (95 % interval {rest.partition("]")[0]}]; with '
+            f'`mlp` {of_mlp}). The median answer at 1 kHz takes {median[1]} ms; that of a node '
+            f'with the polygon soup takes {soup} times as long. See [the '
+            'report](docs/results/bench_exact.md).')
 
 
 def mlp_errors() -> str:

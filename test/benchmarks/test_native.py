@@ -146,13 +146,15 @@ def test_quick_run(tmp_path: Path, program: tuple[Path, list[str]],
             for end in ('', '_low', '_high')} == {'1'}
     assert all(float(row['by_exact_low']) <= float(row['by_exact']) <= float(row['by_exact_high'])
                for row in rows if row['contestant'] == 'mlp covariance, batch')
+    assert (tmp_path / 'native.png').stat().st_size > 20_000
     text = (tmp_path / 'native.md').read_text('utf-8')
     for call in ('bc_collide(', 'bc_collide_rows(', 'mj_geomDistance(', 'box_box('):
         assert call in text
     tables = runpy.run_path(str(native.ROOT / 'docs' / 'tables.py'))
     monkeypatch.setitem(tables['rows'].__globals__, 'RESULTS', tmp_path)
-    shown = tables['by_mujoco']('covariance', tables['SWAY'])
-    assert re.fullmatch(r'[\d.]+ \[[\d.]+, [\d.]+\]', shown) and f' {shown} ' in text
+    mujoco, = (choice for choice in tables['CHOICES'] if choice.native == native.UNIT[:-8])
+    shown = tables['from_c'](mujoco, 'single', tables['SWAY'])
+    assert re.fullmatch(r'\d+', shown) and f'| {tables["SWAY"]} | {shown} |' in text
 
 
 @pytest.mark.skipif(shutil.which('pkg-config') is None, reason='no pkg-config')

@@ -501,7 +501,7 @@ def test_pages_build_without_a_warning(tmp_path):
     assert 'Return the contacts of n pairs' in (
         tmp_path / 'reference' / 'python_api.html').read_text('utf-8')
     first = (tmp_path / 'index.html').read_text('utf-8')
-    assert 'Clone this repository' in first and 'landing.gif' in first  # the README's first screen
+    assert 'instead</strong> if you want' in first and 'centroid.png' in first  # the README's
     browser = pytest.importorskip('browser', reason='needs websockets', exc_type=ImportError)
     if browser.chromium() is None:
         pytest.skip('Chromium is not installed')
