@@ -40,7 +40,7 @@ MEASURED = {**SETS, **LOADS, 'settled': settled.at_rest}
 """Sets of poses: drawn ones, and recorded goods at rest of scenes that train no network."""
 PAIRS, QUICK_PAIRS = 100_000, 5_000
 CLASSES = ('vertex-face', 'edge-edge', 'edge-face', 'face-face')
-SHOWN = (1e-6, 10.0)  # errors that are drawn to scale [%]; others are at the edge
+LEAST = 1e-3  # error that is drawn to scale [%]; smaller ones are at the edge
 MARKS = {'o': 'half of the pairs', '|': '99 %', 'D': 'worst pair'}
 """What is drawn of a set."""
 CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
@@ -181,28 +181,33 @@ def csv_rows(rows: Sequence[AccuracyRow]) -> Iterator[dict[str, object]]:
                        **errors._asdict()}
 
 
-def draw(path: Path, rows: Sequence[AccuracyRow]) -> None:
-    """Draw half, 99 % and the worst of the point errors: a line for each set and model."""
-    models = list(dict.fromkeys(row.model for row in rows))
+def draw(path: Path, table: Path) -> None:
+    """Draw half, 99 % and the worst of the CSV's point errors: a line for each set and model."""
+    rows = [row for row in output.read_csv(table)
+            if (row['quantity'], row['part']) == ('point', 'all')]
+    models = list(dict.fromkeys(row['model'] for row in rows))
     figure, axes = output.subplots(1, 1, (6.4, 1.5 + 0.3 * len(rows)))
     axis = axes[0, 0]
+    colours = [output.COLOURS.get(model, f'C{number}') for number, model in enumerate(models)]
     for place, row in enumerate(rows):
-        errors = row.errors['point']['all']
-        values = np.clip((errors.p50, errors.p99, errors.worst), *SHOWN)
-        colour = f'C{models.index(row.model)}'
+        values = np.maximum([float(row[column]) for column in ('p50', 'p99', 'worst')], LEAST)
+        colour = colours[models.index(row['model'])]
         axis.plot(values, [place] * len(values), color=colour, linewidth=1.2)
         for (mark, label), value in zip(MARKS.items(), values):
             axis.plot(value, place, mark, color=colour, markersize=7, clip_on=False,
                       label='' if place else label)
-    names = [row.set if len(models) == 1 else f'{row.set}, {row.model}' for row in rows]
+    names = [row['set'] if len(models) == 1 else f'{row["set"]}, {row["model"]}' for row in rows]
     axis.set_yticks(range(len(rows)), names)
     axis.invert_yaxis()
-    axis.set(xscale='log', xlim=SHOWN, title=f'Point error of {" and ".join(models)}',
+    p99, worst = (max(float(row[column]) for row in rows) for column in ('p99', 'worst'))
+    axis.set(xscale='log', xlim=(LEAST, 1.2 * worst),
+             title=f'{" and ".join(models)}: p99 at most {p99:.2g} %, the worst {worst:.2g} %',
              xlabel="point error [% of the smaller box's longest edge]")
+    axis.xaxis.set_major_formatter('{x:g}')
     axis.grid(color='0.9', linewidth=0.5)
     axis.set_axisbelow(True)
     figure.legend(fontsize=9, loc='outside lower center', ncols=3, frameon=False)
-    figure.savefig(path)
+    figure.savefig(path, metadata={'Software': None})
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -229,7 +234,7 @@ def main(args: Sequence[str] | None = None) -> int:
     output.write_csv(folder / 'accuracy.csv', csv_rows(rows), about=output.machine())
     output.write_page(folder, 'accuracy', args, machine=output.machine(), seed=options.seed,
                       error_table=error_table(rows), point_classes=class_table(rows))
-    draw(folder / 'accuracy.png', rows)
+    draw(folder / 'accuracy.png', folder / 'accuracy.csv')
     print(error_table(rows), class_table(rows), sep='\n\n')
     return 0
 

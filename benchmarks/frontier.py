@@ -76,7 +76,7 @@ BATCHES = {'exact': ('exact', 'exact', 0), 'mlp-8-8': ('mlp, 8-8', 'mlp', 10),
            'mlp, linear': ('linear map', 'other', 0),
            'mlp, idle': ('last layer zeroed', 'other', 0),
            'paper': ('paper', 'paper', 0)}
-"""Contestant: its name in a picture, whose colour it has, and how much higher the name stands [pt]."""
+"""Contestant: its name in a picture, whose colour it has, and how far it is raised [pt]."""
 PANELS = {'Goods at rest': ('settled', 'settled cubes'),
           'A 12 m container on another, swaying': ('containers',)}
 """Titles, and the sets that are drawn: of each contestant the first that it answers."""

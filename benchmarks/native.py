@@ -32,7 +32,7 @@ from box_contact_ros.models.networks import SHIPPED_PAPERS, PaperWeights, mlp_nu
 from box_contact_ros.models.weights_file import load_weights
 from box_contact_ros.resources import resource_path
 
-from . import output, settled
+from . import native_picture, output, settled
 from .contestant import MLP_SIZES
 from .engines import add_leave_out, may_miss
 from .output import markdown_table, percentiles
@@ -384,7 +384,8 @@ def main(args: Sequence[str] | None = None) -> int:
     from tqdm import tqdm
 
     parser = output.report_parser(
-        'native', __doc__, quick='few pairs and rounds, to try it out', out='native.md, native.csv')
+        'native', __doc__, quick='few pairs and rounds, to try it out',
+        out='native.md, native.csv, native.png')
     add_leave_out(parser)
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
@@ -434,6 +435,8 @@ def main(args: Sequence[str] | None = None) -> int:
     found[best].update(scenes)
     output.write_csv(folder / 'native.csv', [*csv_rows(found), *contact_rows(contacts)],
                      about=output.machine())
+    drawn_sets = [*settled.by_engine(settled.read()), *SETS, *LOADS, *FLUSH]
+    native_picture.draw(folder / 'native.png', folder / 'native.csv', best, drawn_sets)
     print(tables['single'], tables['batch'], sep='\n\n')
     for name in missing:
         print(f'native: {name.capitalize()} is left out: {OPTIONAL[name]}', file=sys.stderr)

@@ -86,7 +86,9 @@ def draw(rows: Sequence[Row], path: Path) -> None:
                                      ('pairs', ':', 'triangles that meet')):
             axes.plot([row['tilt_deg'] for row in mine], [row[column] for row in mine], style,
                       color=f'C{number}', markersize=3.5, label=f'{words}, N = {divisions}')
-    axes.set(xscale='log', yscale='log', xlabel='angle between the faces [°]', ylabel='number')
+    axes.set(xscale='log', yscale='log', xlabel='angle between the faces [°]',
+             ylabel='box tests, and triangles that meet',
+             title='The less two faces are turned, the more a soup has to test')
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter('{x:g}')
     axes.grid(color='0.9', linewidth=0.6)

@@ -222,10 +222,11 @@ def plot(path: Path, results: Sequence[Search]) -> None:
                     and not (number < len(done) and one.number in done[number])]
             panel.scatter([search.cost(one) for one in left],
                           [rung[one.number]['error'] for one in left], s=5, linewidths=0,
-                          color=f'C{number}', label=f'last rung: {number}')
+                          color=f'C{number}', label=f'left in round {number}')
         panel.plot(search.cost(search.candidates[0]), done[-1][0]['error'], 'k*', markersize=11,
                    label='in use')
-        panel.set(title=search.name, xlabel='multiply-adds of the network')
+        panel.set(title=search.name.replace('signs +++', 'roll, pitch, yaw > 0'),
+                  xlabel='multiply-adds of the network')
     panels[0, 0].set_ylabel('RMSE over the angles [rad]')
     panels[0, 0].legend(fontsize=8, loc='upper right')
     figure.savefig(path)

@@ -167,5 +167,6 @@ def draw(path: Path, logs: Sequence[AnswerLog], *, block: int) -> None:
     axes[-1].xaxis.set_major_formatter('{x:g}')
     axes[-1].set_xlabel('time from the stamp of the poses to the answer [ms]')
     times_as_long = ratio(logs[1], logs[0], block=block)[0]
-    figure.suptitle(f'The contact node takes {times_as_long:.2f} times as long as transport alone')
+    figure.suptitle(f'The contact node takes {times_as_long:.2f} times as long as transport alone\n'
+                    '(median of the ratios of blocks in turn)')
     figure.savefig(path)

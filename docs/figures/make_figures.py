@@ -24,7 +24,9 @@ from matplotlib import pyplot as plt
 
 STACK, LOAD, OVERLAP, POINT, CORNER = '#8c8c8c', '#4477aa', '#ccbb44', '#222222', '#ee6677'
 CONTAINER = (12.192, 2.438, 2.591)
-DEPTH = 0.05  # of the lowest corner below the stack's top, in the graph [m]
+DEPTHS = {0.05: '#222222', 0.5e-3: '#777777', 0.03e-3: '#aaaaaa'}
+"""Depths of the lowest corner in the graph [m], from a hard landing to rest, and their colours."""
+LEAST_TILT = 1e-4  # up to which the axis is linear [°]
 
 
 def clip(polygon: np.ndarray, direction: tuple[float, float], bound: float) -> np.ndarray:
@@ -74,25 +76,31 @@ def sketch(axes: plt.Axes, tilt: float) -> None:
 
 
 def slide(axes: plt.Axes) -> None:
-    """Where a container on another has its contact point, over the tilt, at one depth."""
+    """Where a container on another has its contact point, over the tilt, at some depths."""
     length, _, height = CONTAINER
-    degrees = np.linspace(-1.5, 1.5, 601)
+    half = np.concatenate([np.linspace(0.0, LEAST_TILT, 40), np.geomspace(LEAST_TILT, 1.5, 400)])
+    degrees = np.concatenate([-half[::-1], half[1:]])
     tilts = np.radians(degrees)
     # Turned about y by t, the lowest corner is h/2 cos t + l/2 |sin t| below the centre.
     low = 0.5 * (height * np.cos(tilts) + length * np.abs(np.sin(tilts)))
-    b = np.zeros((len(tilts), 7))
-    b[:, 2] = 0.5 * height - DEPTH + low
-    b[:, 4], b[:, 6] = np.sin(0.5 * tilts), np.cos(0.5 * tilts)
     a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(tilts), 1))
-    found = ContactSolver(CONTAINER, CONTAINER, model='exact').batch(a, b)
+    for depth, colour in DEPTHS.items():
+        b = np.zeros((len(tilts), 7))
+        b[:, 2] = 0.5 * height - depth + low
+        b[:, 4], b[:, 6] = np.sin(0.5 * tilts), np.cos(0.5 * tilts)
+        found = ContactSolver(CONTAINER, CONTAINER).batch(a, b)
+        axes.plot(degrees, found.point[:, 0], color=colour, linewidth=2,
+                  label=f'{1e3 * depth:g} mm deep')
     ends = np.sign(tilts) * 0.5 * length * np.cos(tilts) - 0.5 * height * np.sin(tilts)
     ends[tilts == 0.0] = np.nan
     axes.plot(degrees, ends, color=CORNER, linewidth=2)
-    axes.plot(degrees, found.point[:, 0], color=POINT, linewidth=2)
-    axes.text(0.08, -6.05, 'deepest corner', color=CORNER, fontsize=11, va='center')
-    axes.text(0.35, 2.2, 'centroid', color=POINT, fontsize=11)
-    axes.set(title='The deepest corner jumps by 12 m', xlabel='tilt of a container [deg]',
-             ylabel='contact point along its length [m]', xlim=(-1.5, 1.5), ylim=(-6.6, 6.6))
+    axes.text(-1.2e-4, 6.1, 'deepest corner', color=CORNER, fontsize=10, va='center', ha='right')
+    axes.legend(title='centroid', title_fontsize=10, fontsize=9, loc='lower right')
+    axes.set_xscale('symlog', linthresh=LEAST_TILT, linscale=0.7)
+    axes.set(title='The deepest corner jumps by 12 m', xlabel='tilt of a container [°]',
+             ylabel='contact point along its length [m]', xlim=(-1.5, 1.5), ylim=(-6.8, 6.8))
+    axes.set_xticks([-1, -0.01, -LEAST_TILT, 0, LEAST_TILT, 0.01, 1],
+                    ['-1', '-0.01', '', '0', '', '0.01', '1'])
     axes.grid(color='#dddddd')
     axes.spines[['top', 'right']].set_visible(False)
 
