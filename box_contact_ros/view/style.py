@@ -17,15 +17,14 @@ NEAR: Colour = (20, 150, 90)
 BOX_OPACITY = 0.4  # the contact is inside the boxes, so they are translucent
 POINT_RADIUS, NORMAL_LENGTH = 0.015, 0.15
 """Lengths of what has no size of its own, as shares of the box's longest edge."""
-ELLIPSE_SIGMAS = math.sqrt(3.0)
-"""Semi-axes of a patch's ellipse in standard deviations. A uniform rectangle l × w has l/√12 and
-w/√12, so its ellipse has l/2 and w/2 and touches its edges. Two would reach out of the boxes."""
+HALF_SIDES = math.sqrt(3.0)
+"""Half sides of a patch's rectangle in standard deviations: those of l × w are l/√12 and w/√12."""
 DASHES = 12  # of the line between two nearest points
-_CIRCLE = np.linspace(0.0, 2.0 * math.pi, 49)
+_CORNERS = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [1.0, 1.0]])
 
 
 def patch_axes(normals: np.ndarray, covariances: np.ndarray) -> np.ndarray:
-    """Return the semi-axes (k, 2, 3) [m] of the ellipses of patches, the longer one first.
+    """Return the half sides (k, 2, 3) [m] of the rectangles of patches, the longer one first.
 
     They lie in the contact planes, in the common frame. NaN where the model gives the point alone.
     """
@@ -34,17 +33,17 @@ def patch_axes(normals: np.ndarray, covariances: np.ndarray) -> np.ndarray:
     flat = tangents @ np.where(known[:, None, None], covariances, 0.0) @ tangents
     variances, axes = np.linalg.eigh(flat)  # ascending; the first axis is the normal
     deviations = np.sqrt(np.maximum(variances[:, :0:-1], 0.0))  # below zero by rounding
-    semi_axes = ELLIPSE_SIGMAS * deviations[:, :, None] * np.swapaxes(axes[:, :, :0:-1], 1, 2)
-    return np.where(known[:, None, None], semi_axes, math.nan)
+    half_sides = HALF_SIDES * deviations[:, :, None] * np.swapaxes(axes[:, :, :0:-1], 1, 2)
+    return np.where(known[:, None, None], half_sides, math.nan)
 
 
 def patch_sides(points: np.ndarray, normals: np.ndarray, covariances: np.ndarray) -> np.ndarray:
-    """Return the ends (n, 2, 3) [m] of the short lines that draw the ellipses of patches.
+    """Return the ends (n, 2, 3) [m] of the sides of the rectangles of patches.
 
     points, normals: (k, 3) of the contacts; those without a patch are left out.
     """
     axes = patch_axes(normals, covariances)
-    outlines = points[:, None] + np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1) @ axes
+    outlines = points[:, None] + _CORNERS @ axes
     outlines = outlines[~np.isnan(outlines[:, 0, 0])]
     return np.stack([outlines[:, :-1], outlines[:, 1:]], axis=2).reshape(-1, 2, 3)
 

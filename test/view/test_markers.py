@@ -92,7 +92,7 @@ def test_a_contact_is_point_normal_depth_and_patch():
     ends = np.array([xyz(end) for end in patch.points]).reshape(-1, 2, 3) - CONTACT.point
     assert np.roll(ends[:, 1], 1, axis=0) == pytest.approx(ends[:, 0], abs=1e-12)
     assert np.abs(ends @ CONTACT.normal).max() < 1e-12
-    assert np.linalg.norm(ends, axis=2) == pytest.approx(0.5)
+    assert np.linalg.norm(ends, axis=2) == pytest.approx(math.sqrt(0.5))
 
 
 def test_all_contacts_are_drawn_and_the_deepest_labelled():
@@ -107,7 +107,7 @@ def test_all_contacts_are_drawn_and_the_deepest_labelled():
     assert [m.id for m in found['normals']] == list(range(30))
     assert [m.text for m in found['depths']] == [
         f'depth {n:.2f} mm' for n in range(29, 29 - LABELLED, -1)]
-    assert len(found['patches'][0].points) == 30 * 48 * 2
+    assert len(found['patches'][0].points) == 30 * 4 * 2
 
 
 def test_a_pair_that_is_near_has_a_dashed_line_and_its_distance():

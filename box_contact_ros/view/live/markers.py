@@ -7,8 +7,7 @@ A contact has its point, normal, patch and depth. Boxes that are near have a das
 their nearest points, with the distance.
 Subscribes to the poses of all that moves and to the contact node's contacts. Publishes markers
 (visualization_msgs/MarkerArray) 30 times a second while poses come. RViz with config/contact.rviz
-shows them, Foxglove with config/contact.foxglove.json. A patch is an ellipse that touches the edges
-of a rectangle.
+shows them, Foxglove with config/contact.foxglove.json. A patch is the rectangle of its covariance.
 """
 from __future__ import annotations
 
