@@ -32,7 +32,7 @@ REPORTS = {f'benchmarks.{path.stem}' for path in ROOT.glob('benchmarks/*.py')
            if "__name__ == '__main__'" in path.read_text('utf-8')}
 INSTALLED = {f'box_contact_ros.{module}' for module in (*PROGRAMS.values(), 'demo.demo')}
 CHECKOUT = REPORTS | {'benchmarks.paper', 'benchmarks.paper.search', 'training',
-                      *(f'docs/figures/make_{what}.py' for what in ('figures', 'landing_gif'))}
+                      *(f'docs/figures/make_{what}.py' for what in ('figures', 'tilt_gif'))}
 
 
 def alone(*words: str) -> subprocess.CompletedProcess[str]:
