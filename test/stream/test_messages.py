@@ -277,7 +277,7 @@ def test_no_field_of_a_contact_is_left_out():
     overlap = ContactSolver((2, 3, 1), (1, 2, 2), model='exact')(
         (0, 0, 0, 0.2, 0.1, 0.4, 1), (0.3, 0.4, 1.2, 0.1, 0.2, 0.3, 0.9))
     scene, contacts = two_boxes((2, 3, 1), (1, 2, 2)), Contacts.of([overlap])
-    answer = Answer(np.array([[0, 1]]), contacts, 1, np.empty((0, 2), np.int64), scene)
+    answer = Answer(np.array([[0, 1]]), contacts, NONE, NO_NEAR, 1, NONE, scene)
     written = deserialize_message(
         ContactWriter(scene).contacts(header_bytes(STAMP, 'map'), answer), ContactsMessage)
     kept, = KeptMessages(1).fill([('p', 'a', 'b')], contacts)
