@@ -10,6 +10,7 @@ from ..models.make_model import most_near
 from ..scene.scene_check import SceneCheck
 from ..scene.scene_solver import SceneSolver
 from .messages import KeptMessages, check_frame, near_messages, pose_of, size_of
+from .paced_service import Kind
 
 MOST_CONTACTS = 4096
 """Of a response: all pairs of 91 boxes, 0.8 MB."""
@@ -55,3 +56,9 @@ class Checker:
                                           found.contacts)
         listed.near = near_messages([names_of(a, b) for a, b in found.near_pairs.tolist()],
                                     found.near)
+
+
+def kind_and_size(request: Check.Request) -> tuple[Kind, int]:
+    """Return what decides how many pairs a box has, and the number of boxes and pairs."""
+    pairs = len(request.pairs)
+    return (pairs > 0, request.margin), len(request.boxes) + pairs

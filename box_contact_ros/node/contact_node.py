@@ -43,9 +43,10 @@ from ..solver.checks import short_repr
 from ..solver.model import NATIVE
 from ..stream.pairing import PAIRINGS, RESETS
 from ..stream.streams import watched_of
+from . import check, set_boxes
 from .check import Checker
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
-from .paced_service import CheckService
+from .paced_service import PacedService
 from .parameters import (
     Setting,
     declare,
@@ -60,7 +61,6 @@ from .parameters import (
 )
 from .rclpy_workarounds import ends_within, lifecycle_state
 from .runtime import END_SECONDS, LOG_SECONDS, GuardedNode, run_node
-from .set_boxes import changed
 from .tick import TickAnswerer
 from .topics import SceneTopics
 
@@ -151,8 +151,10 @@ class ContactNode(GuardedNode, LifecycleNode):
         self._answerer: TickAnswerer | None = None  # likewise
         self._checker: Checker | None = None  # of the solver's scene and model
         self.add_on_set_parameters_callback(self._set_live)
-        self._checks = CheckService(self, self.counts, self._check)
-        self.create_service(SetBoxes, '~/set_boxes', self.answered(self._set_boxes, '~/set_boxes'))
+        self._checks = PacedService(self, self.counts, 'checks', (Check, '~/check'), self._check,
+                                    check.kind_and_size)
+        PacedService(self, self.counts, 'changes', (SetBoxes, '~/set_boxes'), self._set_boxes,
+                     set_boxes.kind_and_size, in_turn=True)
         self.create_service(Trigger, '~/reset', self.answered(self._reset, '~/reset'))
         # On a clock of its own: simulated time may stand still.
         self.create_timer(DIAGNOSTICS_SECONDS, self._report, clock=Clock(
@@ -292,7 +294,7 @@ class ContactNode(GuardedNode, LifecycleNode):
             return response
         solver = self._answerer.solver
         try:
-            solver = changed(solver, request)
+            solver = set_boxes.changed(solver, request)
         except ValueError as error:
             response.message = str(error)
         else:

@@ -7,11 +7,10 @@ from __future__ import annotations
 import time
 from collections import Counter, deque
 from collections.abc import Callable
+from typing import Any
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
-
-from box_contact_msgs.srv import Check
 
 from .rclpy_workarounds import Send, answer_later
 from .runtime import LONG, GuardedNode
@@ -24,33 +23,39 @@ MOST_WAITING = 16
 """Costly requests that wait for the end of a pause."""
 KEPT_TIMES = 4096  # of requests, for a report
 KEPT_KINDS = 256
-Kind = tuple[bool, float]  # of requests: whether pairs are listed, and the margin
+Kind = tuple[Any, ...]
+"""Of requests: what decides how much each part of one costs."""
 
 
-class CheckService:
-    """Serves ~/check, and keeps clients that ask costly requests without pause from stopping ticks.
+class PacedService:
+    """Serves requests, and keeps clients that ask costly ones without pause from stopping ticks.
 
     After a costly request that took T, costly requests wait for PAUSE · T. A client that waits asks
     nothing: a refusal would bring its request again, and ROS takes a millisecond to read it.
-    Whether a request is costly is judged by its kind, and by its number of boxes and pairs. The
-    margin makes the kind, and whether pairs are listed: both decide how many pairs a box has.
+    Whether a request is costly is judged by its kind, and by its size.
     """
 
-    def __init__(self, node: GuardedNode, counts: Counter[str],
-                 answer: Callable[[Check.Request, Check.Response], Check.Response]) -> None:
-        """Serve ~/check of a node; `answer` fills in a response."""
-        self._counts = counts
+    def __init__(self, node: GuardedNode, counts: Counter[str], what: str, service: tuple[Any, str],
+                 answer: Callable[[Any, Any], Any],
+                 kind_and_size: Callable[[Any], tuple[Kind, int]], *, in_turn: bool = False,
+                 ) -> None:
+        """Serve a service, by its type and name, of a node; `answer` fills in a response.
+
+        what: what `counts` calls the requests. in_turn: whether none overtakes another.
+        """
+        self._counts, self._what = counts, what
+        self._kind_and_size, self._in_turn = kind_and_size, in_turn
         self._until = 0.0  # end of the pause, by the steady clock [s]
         self._cheap: dict[Kind, int] = {}
-        """Number of boxes and pairs that are not costly, of the kinds that came last."""
-        self._waiting: deque[tuple[float, Check.Request, Check.Response, Send]] = deque()
+        """Size up to which requests are not costly, of the kinds that came last."""
+        self._waiting: deque[tuple[float, Any, Any, Send]] = deque()
         """When each came [s], and what `_answer` takes."""
         self._times: deque[float] = deque(maxlen=KEPT_TIMES)  # from taking to answering [s]
-        self._filled = node.answered(answer, '~/check')
+        self._filled = node.answered(answer, service[1])
         self._timer = node.create_timer(LONG, self._answer_next, clock=Clock(
             clock_type=ClockType.STEADY_TIME))
         self._timer.cancel()
-        answer_later(node.create_service(Check, '~/check', answer), self._take)
+        answer_later(node.create_service(*service, answer), self._take)
 
     def take_times(self) -> list[float]:
         """Return the times [s] from taking to answering of the requests since the last call."""
@@ -58,18 +63,18 @@ class CheckService:
         self._times.clear()
         return times
 
-    def _take(self, request: Check.Request, response: Check.Response, send: Send) -> None:
+    def _take(self, request: Any, response: Any, send: Send) -> None:
         """Answer a request now or, if it is costly in a pause, later."""
         now = time.monotonic()
-        kind, count = _kind_and_count(request)
-        is_costly = count > self._cheap.get(kind, 0)
+        kind, size = self._kind_and_size(request)
+        is_costly = size > self._cheap.get(kind, 0) or (self._in_turn and self._waiting)
         if not is_costly or not (self._waiting or now < self._until):
             self._answer(now, request, response, send)
         elif len(self._waiting) < MOST_WAITING:
             self._waiting.append((now, request, response, send))
             self._wait()
         else:
-            self._counts['checks refused'] += 1
+            self._counts[f'{self._what} refused'] += 1
             response.message = (f'busy: {MOST_WAITING} costly requests wait, as ticks come first; '
                                 'ask again later')
             send(response)
@@ -87,26 +92,19 @@ class CheckService:
         self._timer.timer_period_ns = max(1, round(1e9 * (self._until - time.monotonic())))
         self._timer.reset()
 
-    def _answer(self, came: float, request: Check.Request, response: Check.Response,
-                send: Send) -> None:
+    def _answer(self, came: float, request: Any, response: Any, send: Send) -> None:
         """Answer a request that came at a time [s]."""
         began, used = time.monotonic(), time.thread_time()
         response = self._filled(request, response)
         send(response)
         ended = time.monotonic()
-        self._counts['checks answered' if response.success else 'checks refused'] += 1
+        self._counts[f'{self._what} {"answered" if response.success else "refused"}'] += 1
         self._times.append(ended - came)
-        kind, count = _kind_and_count(request)
-        cheap = max(self._cheap.pop(kind, 0), count)
+        kind, size = self._kind_and_size(request)
+        cheap = max(self._cheap.pop(kind, 0), size)
         if ended - began > COSTLY and (cost := time.thread_time() - used) > COSTLY:
             self._until = ended + PAUSE * (ended - began)
-            cheap = int(count * COSTLY / cost)
+            cheap = int(size * COSTLY / cost)
         self._cheap[kind] = cheap  # the newest comes last
         if len(self._cheap) > KEPT_KINDS:
             del self._cheap[next(iter(self._cheap))]
-
-
-def _kind_and_count(request: Check.Request) -> tuple[Kind, int]:
-    """Return the kind of a request, and its number of boxes and pairs."""
-    pairs = len(request.pairs)
-    return (pairs > 0, request.margin), len(request.boxes) + pairs

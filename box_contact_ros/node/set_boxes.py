@@ -15,6 +15,7 @@ from ..scene.scene import Box, Scene, SceneError
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import nearest_name, short_repr
 from .messages import check_frame, pose_of, size_of
+from .paced_service import Kind
 
 NAME = re.compile('[A-Za-z_][A-Za-z0-9_]*')
 """Of a box, as msg_schemas/scene.json has it."""
@@ -57,3 +58,8 @@ def _boxes(scene: Scene, boxes: Sequence[Any], field: str) -> dict[str, Box]:
             raise SceneError((field, number, *error.path),
                              f'{short_repr(name)} {error.reason}') from None
     return found
+
+
+def kind_and_size(request: SetBoxes.Request) -> tuple[Kind, int]:
+    """Return the number of boxes; all requests are of one kind."""
+    return (), 1 + len(request.fixed) + len(request.moving) + len(request.absent)

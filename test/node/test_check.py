@@ -26,10 +26,11 @@ from typed_messages import TOLD, a_box, a_pair, contacts_by_pair
 
 from box_contact_msgs.srv import Check
 from box_contact_ros import ContactSolver, SceneSolver, make_model
+from box_contact_ros.node import check as check_module
 from box_contact_ros.node import paced_service
 from box_contact_ros.node.check import MOST_CONTACTS, Checker
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.paced_service import CheckService
+from box_contact_ros.node.paced_service import PacedService
 from box_contact_ros.scene.scene import Box, Frame, Pair, Scene
 from box_contact_ros.scene.scene_check import MOST_BOXES, MOST_PAIRS
 
@@ -361,9 +362,9 @@ def test_costly_requests_wait_for_ticks(client: Client, executor_type: Any) -> N
 
 
 class Bench:
-    """A `CheckService` whose requests take a time [s] of their own, by a clock that stands."""
+    """A `PacedService` whose requests take a time [s] of their own, by a clock that stands."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, *, in_turn: bool = False) -> None:
         self.now, self.sent = 0.0, []
         monkeypatch.setattr(paced_service, 'time', SimpleNamespace(
             monotonic=lambda: self.now, thread_time=lambda: self.now))
@@ -372,7 +373,8 @@ class Bench:
         node = Mock(create_timer=Mock(return_value=self.timer),
                     answered=lambda callback, name: callback)
         self.counts: Counter[str] = Counter()
-        self.service = CheckService(node, self.counts, self.answer)
+        self.service = PacedService(node, self.counts, 'checks', (Check, '~/check'), self.answer,
+                                    check_module.kind_and_size, in_turn=in_turn)
         self.end_of_pause = node.create_timer.call_args.args[1]
 
     def answer(self, request: Any, response: Check.Response) -> Check.Response:
@@ -435,6 +437,21 @@ def test_what_one_client_asks_makes_no_other_wait(monkeypatch: pytest.MonkeyPatc
     for number in range(300):
         bench.ask('other', 1, 0.001, margin=1.0 + number)
     assert len(bench.service._cheap) == paced_service.KEPT_KINDS
+
+
+def test_where_the_order_matters_none_overtakes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A cheap request waits behind a costly one; alone in a pause it does not."""
+    bench = Bench(monkeypatch, in_turn=True)
+    bench.ask('cheap', 1, 0.001)
+    bench.ask('costly', 80, 0.1)
+    bench.ask('alone', 1, 0.001)
+    bench.ask('next costly', 80, 0.1)
+    bench.ask('behind it', 1, 0.001)
+    assert bench.sent == ['cheap', 'costly', 'alone']
+    for _ in range(2):
+        bench.now += 1.0
+        bench.end_of_pause()
+    assert bench.sent[3:] == ['next costly', 'behind it']
 
 
 @pytest.mark.parametrize('by_topics', [False, True])

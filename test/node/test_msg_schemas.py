@@ -259,6 +259,9 @@ def test_changes_of_boxes_validate(node, client, size, absent, success):
     assert not [error.message for error in response.iter_errors(plain(answer))]
     answer.success = not success
     assert not response.is_valid(plain(answer))
+    counted = f'changes {"answered" if success else "refused"}'
+    assert int(client.diagnostic(counted)) > 0
+    assert validator_at('/diagnostics').is_valid(plain(client.diagnostics[-1]))
 
 
 def set_in(path: str, value: Any):
