@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,9 @@ from patience import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / 'docs' / 'examples'
-CLIENTS = ('check_client.py', 'lockstep_client.py', 'forces_client.py')  # of a contact node
+CLIENTS = ('check_client.py', 'lockstep_client.py', 'forces_client.py', 'lift.py')
+"""Of a contact node."""
+PARAMETERS = {'lift.py': (f'scene:={ROOT}/config/scenes/lift.yaml', 'pair_topics:=false')}
 NEEDS = {'mujoco_loop.py': 'mujoco', 'container_stack.py': 'mujoco', 'from_mjcf.py': 'mujoco',
          'dask_pairs.py': 'distributed',
          'tf_to_pose.py': 'tf2_ros'} | dict.fromkeys(CLIENTS, 'box_contact_msgs.msg')
@@ -43,7 +46,9 @@ def test_example(name: str, program, tmp_path: Path) -> None:
     """Figures agree to the printed digits; shorter runs print as many lines in the same words."""
     pytest.importorskip(NEEDS.get(name, 'numpy'))
     if name in CLIENTS:
-        program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready')
+        given = PARAMETERS.get(name, ('model:=exact',))
+        program('contact_node', '--ros-args', *(word for value in given for word in (
+            '-p', value))).wait_for_output('ready')
     command = [str(EXAMPLES / name)]
     if name in QUICK:
         module = name.removesuffix('.py')
@@ -246,6 +251,30 @@ def test_cpp_node(cpp_with_ros: Path, name: str) -> None:
         finally:
             node.terminate()
     assert asked.stdout == 'box_a_box_b 0.01 {1000000000}\nleft at 0: []\n'
+
+
+@pytest.mark.parametrize('events', ['true', 'false'])
+def test_cpp_node_pairs_streams_that_drift_apart(cpp_with_ros: Path, events: str) -> None:
+    """By its parameters, in both executors: three poses of A before those of B lose no tick."""
+    from ros_client import Client  # only here: an extra
+
+    values = ('size_a:=[2.0, 2.0, 2.0]', 'size_b:=[2.0, 2.0, 2.0]', 'margin:=0.5',
+              f'events_executor:={events}')
+    with closing(Client()) as client, subprocess.Popen(
+            [cpp_with_ros / 'ros_node', '--ros-args',
+             *(word for value in values for word in ('-p', value))]) as node:
+        try:
+            client.offer_until_answered((0, 0, 0, 0, 0, 0, 1), (0, 0, 1.9, 0, 0, 0, 1))
+            stamps = [client.next_stamp() for _ in range(3)]
+            for side in ((0, 0, 0, 0, 0, 0, 1), None), (None, (0, 0, 2.4, 0, 0, 0, 1)):
+                for stamp in stamps:
+                    client.send(*side, stamps=(stamp, stamp))
+            assert client.are_answered(stamps)
+            assert [client.contacts[stamp].near[0].depth for stamp in stamps] == pytest.approx(
+                [-0.4] * 3)
+            assert client.points and client.normals
+        finally:
+            node.terminate()
 
 
 def test_cpp_client(cpp_with_ros: Path, program) -> None:
