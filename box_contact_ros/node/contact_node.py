@@ -29,6 +29,7 @@ from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
+from rclpy.service_introspection import ServiceIntrospectionState
 from std_srvs.srv import Trigger
 
 from box_contact_msgs.srv import Check, SetBoxes
@@ -62,7 +63,7 @@ from .parameters import (
 from .rclpy_workarounds import ends_within, lifecycle_state
 from .runtime import END_SECONDS, LOG_SECONDS, GuardedNode, run_node
 from .tick import TickAnswerer
-from .topics import SceneTopics
+from .topics import CHANGES, SceneTopics
 
 NOT_CONFIGURED = 'the node is not configured'
 LONGEST = 1e6  # s, about twelve days
@@ -153,8 +154,11 @@ class ContactNode(GuardedNode, LifecycleNode):
         self.add_on_set_parameters_callback(self._set_live)
         self._checks = PacedService(self, self.counts, 'checks', (Check, '~/check'), self._check,
                                     check.kind_and_size)
-        PacedService(self, self.counts, 'changes', (SetBoxes, '~/set_boxes'), self._set_boxes,
-                     set_boxes.kind_and_size, in_turn=True)
+        changes = PacedService(self, self.counts, 'changes', (SetBoxes, '~/set_boxes'),
+                               self._set_boxes, set_boxes.kind_and_size, in_turn=True)
+        # Who draws the scene follows its changes.
+        changes.service.configure_introspection(self.get_clock(), CHANGES,
+                                                ServiceIntrospectionState.CONTENTS)
         self.create_service(Trigger, '~/reset', self.answered(self._reset, '~/reset'))
         # On a clock of its own: simulated time may stand still.
         self.create_timer(DIAGNOSTICS_SECONDS, self._report, clock=Clock(

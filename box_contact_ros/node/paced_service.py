@@ -11,6 +11,7 @@ from typing import Any
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
+from rclpy.service import Service
 
 from .rclpy_workarounds import Send, answer_later
 from .runtime import LONG, GuardedNode
@@ -55,7 +56,8 @@ class PacedService:
         self._timer = node.create_timer(LONG, self._answer_next, clock=Clock(
             clock_type=ClockType.STEADY_TIME))
         self._timer.cancel()
-        answer_later(node.create_service(*service, answer), self._take)
+        self.service: Service = node.create_service(*service, answer)
+        answer_later(self.service, self._take)
 
     def take_times(self) -> list[float]:
         """Return the times [s] from taking to answering of the requests since the last call."""

@@ -13,12 +13,14 @@ import numpy as np
 import poses
 import pytest
 import yaml
+from geometry_msgs.msg import PoseArray
 from patience import PATIENCE
 from rclpy.qos import QoSProfile
 from ros_client import CUBES, Client, serving
-from typed_messages import changed, contacts_at, read
+from typed_messages import a_box, changed, contacts_at, pose_array, read
 from visualization_msgs.msg import Marker, MarkerArray
 
+from box_contact_msgs.srv import SetBoxes
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
@@ -248,3 +250,44 @@ def test_program(program):
     assert 'scene' in program('markers', '--help').wait_for_output('size_a')
     bad = program('markers', '--ros-args', '-p', 'scene:=no_such_scene')
     assert bad.wait() == 1 and 'no_such_scene' in bad.output
+
+
+def test_boxes_that_come_and_go_are_drawn(tmp_path):
+    """Also by a listener that is started after the change; what has gone is taken away."""
+    scene = {'poses': 'array', 'pairs': 'all', 'boxes': {
+        'ground': {'size': [20, 20, 1], 'pose': [0, 0, -0.5, 0, 0, 0, 1]},
+        'hook': {'size': CUBE}}}
+    path = tmp_path / 'yard.yaml'
+    path.write_text(yaml.safe_dump(scene))
+    shown: dict[int, float] = {}  # heights of boxes by id
+    rows_sent = [1]
+
+    def hear(message):
+        for marker in message.markers:
+            if marker.ns == 'boxes':
+                shown.pop(marker.id, None)
+                if marker.action == Marker.ADD:
+                    shown[marker.id] = marker.pose.position.z
+
+    def is_shown(*heights):
+        def send():
+            rows = [(0, 0, 9, 0, 0, 0, 1), (0, 0, 7, 0, 0, 0, 1)][:rows_sent[0]]
+            array.publish(pose_array(rows, 'map', client.next_stamp()))
+        return client.spin(lambda: sorted(shown.values()) == sorted(heights) or send())
+
+    def change(**fields):
+        assert client.call(SetBoxes, 'contact_node/set_boxes', SetBoxes.Request(**fields)).success
+
+    with closing(Client()) as client, serving(ContactNode, scene=str(path), pair_topics=False):
+        array = client.node.create_publisher(PoseArray, 'poses', 10)
+        client.node.create_subscription(MarkerArray, 'markers', hear, 10)
+        change(fixed=[a_box('c1', (0, 0, 1, 0, 0, 0, 1), CUBE)])
+        with serving(MarkersNode, scene=str(path)):
+            assert is_shown(-0.5, 9.0, 1.0)
+            change(fixed=[a_box('c1', (0, 0, 3, 0, 0, 0, 1), CUBE)])
+            assert is_shown(-0.5, 9.0, 3.0)
+            change(moving=[a_box('c1', (0, 0, 0, 0, 0, 0, 1))])
+            rows_sent[0] = 2
+            assert is_shown(-0.5, 9.0, 7.0)
+            change(absent=['c1'])
+            assert is_shown(-0.5, 9.0)

@@ -183,7 +183,7 @@ def test_a_body_carries_its_boxes(make_node, tmp_path):
 
 def test_poses_come_while_they_are_looked_up():
     """The page reads in one thread what the node hears in another."""
-    track, pose = Track([0]), np.zeros((1, 7))
+    track, pose = Track(), np.zeros((1, 7))
     ended = threading.Event()
 
     def hear() -> None:

@@ -22,14 +22,16 @@ from rclpy.context import Context
 from rclpy.qos import QoSProfile
 
 from box_contact_msgs.msg import Contacts as ContactsMessage
+from box_contact_msgs.srv import SetBoxes
 
 from ...node.contact_node import PARAMETERS as CONTACT_PARAMETERS
 from ...node.contact_node import scene_of
 from ...node.parameters import Setting, declare, warn_of_unknown
 from ...node.runtime import GuardedNode
-from ...node.topics import pose_qos
-from ...scene.scene import ALONE, Scene
-from ...scene.scene_solver import Answer
+from ...node.set_boxes import changed
+from ...node.topics import CHANGES, pose_qos
+from ...scene.scene import ALONE, NOWHERE, Scene
+from ...scene.scene_solver import Answer, SceneSolver
 from ...solver.checks import are_poses, short_repr
 from ...stream.cdr import MessageError
 from ...stream.pairing import StampedPose
@@ -38,6 +40,7 @@ from ...stream.read_poses import PoseReader
 from ...stream.streams import ALL_BOXES, topics_of
 
 KEPT = 1000  # poses kept per topic: a second at 1 kHz
+NO_ROW = -1  # of a box that moves no more
 UNANSWERED = 0.5
 """Time [s] that poses may come without contacts; then nobody answers, and none are drawn."""
 QUIET = 1.0  # time [s] without a pose, after which nobody moves the boxes any more
@@ -118,7 +121,10 @@ class PoseTopic(NamedTuple):
 
 
 def pose_topics(scene: Scene) -> list[PoseTopic]:
-    """Return how the poses of all that moves come, in the scene's order."""
+    """Return how the poses of all that moves come, in the scene's order.
+
+    Arrays may become longer: who sends them follows the changes of the scene.
+    """
     topics = []
     for source, topic in topics_of(scene).items():
         is_array = source == ALL_BOXES
@@ -135,9 +141,9 @@ def _read_one(reader: PoseReader, _: int, data: bytes) -> StampedPose:
 
 
 def _read_array(reader: PoseReader, count: int, data: bytes) -> StampedPose:
-    """Return so many poses. A bad pose becomes NaN: the contact node reports it."""
+    """Return so many poses, or more. A bad pose becomes NaN: the contact node reports it."""
     poses = reader.read_poses(data)
-    if len(poses.numbers) != count:
+    if len(poses.numbers) < count:
         raise MessageError('wrong number of poses',
                            f'{len(poses.numbers)} poses, but {count} boxes and bodies of the scene '
                            'move')
@@ -148,14 +154,16 @@ def _read_array(reader: PoseReader, count: int, data: bytes) -> StampedPose:
 class Track:
     """The last poses of one topic, by stamp."""
 
-    def __init__(self, rows: list[int]) -> None:
-        self.rows = rows  # those that the topic gives of SceneRows.poses
+    def __init__(self) -> None:
+        self.rows: list[int] = []  # those that the topic gives of SceneRows.poses
         self.kept: deque[tuple[int, np.ndarray]] = deque(maxlen=KEPT)
 
     def append(self, stamp: int, poses: np.ndarray) -> None:
         """Take poses (m, 7); what has none, NaN, stays where it was."""
         last = self.kept[-1][1] if self.kept else poses
-        self.kept.append((stamp, np.where(np.isnan(poses[:, :1]), last, poses)))
+        both = min(len(last), len(poses))  # boxes may have come that move
+        poses[:both] = np.where(np.isnan(poses[:both, :1]), last[:both], poses[:both])
+        self.kept.append((stamp, poses))
 
     def at(self, stamp: int) -> np.ndarray:
         """Return the last poses (m, 7) up to a stamp, the first ones where all are newer."""
@@ -176,18 +184,20 @@ class Listener(GuardedNode):
         self.values = values = declare(self, settings)
         warn_of_unknown(self, settings)
         scene = scene_of(values)
-        self.rows = SceneRows(scene)
-        self._tracks: list[Track] = []
+        self._asked: dict[tuple[bytes, int], SetBoxes.Request] = {}
+        """Requests of ~/set_boxes without a response so far, by client and number."""
         self._frame_id = ''
         self._answer: tuple[int, Answer, float] | None = None  # stamp, what touches, latency
         self._heard = -math.inf  # when a pose last came, by the steady clock [s]
         self._unanswered = math.inf  # since when poses come without contacts [s]
         self.topics = pose_topics(scene)
-        for topic in self.topics:
-            self._tracks.append(Track([scene.row_of[name] for name in topic.names]))
-            self.create_subscription(topic.kind, topic.name,
-                                     partial(self._on_poses, topic, self._tracks[-1]), topic.qos,
-                                     raw=True)
+        self._tracks = [Track() for _ in self.topics]
+        self._take(SceneSolver(scene))
+        self.create_subscription(SetBoxes.Event, 'contact_node/set_boxes/_service_event',
+                                 self._on_change, CHANGES)
+        for topic, track in zip(self.topics, self._tracks):
+            self.create_subscription(topic.kind, topic.name, partial(self._on_poses, topic, track),
+                                     topic.qos, raw=True)
         self.create_subscription(ContactsMessage, 'contacts', self._on_contacts, contacts_qos,
                                  raw=True)
 
@@ -195,6 +205,26 @@ class Listener(GuardedNode):
     def quiet(self) -> bool:
         """Whether no pose has come for QUIET seconds."""
         return time.monotonic() - self._heard > QUIET
+
+    def _take(self, solver: SceneSolver) -> None:
+        """Draw the scene of a solver from now on."""
+        self._solver, self.rows = solver, SceneRows(solver.scene)
+        self._answer = None
+        for topic, track in zip(self.topics, self._tracks):
+            names = solver.moving if solver.scene.pose_array else topic.names
+            is_moving = set(solver.scene.moving)
+            track.rows = [solver.scene.row_of[name] if name in is_moving else NO_ROW
+                          for name in names]
+
+    def _on_change(self, event: SetBoxes.Event) -> None:
+        """Follow a request that the contact node has taken."""
+        key = bytes(event.info.client_gid), event.info.sequence_number
+        for request in event.request:
+            self._asked[key] = request
+        for response in event.response:
+            asked = self._asked.pop(key, None)
+            if response.success and asked is not None:
+                self._take(changed(self._solver, asked))
 
     def _on_poses(self, topic: PoseTopic, track: Track, data: bytes) -> None:
         poses = topic.read(data)
@@ -204,6 +234,8 @@ class Listener(GuardedNode):
 
     def _on_contacts(self, data: bytes) -> None:
         read = read_contacts(data)
+        if read.revision != self._solver.revision:  # a change is on its way
+            return
         latency = 1e-9 * (self.get_clock().now().nanoseconds - read.stamp)
         self._answer = read.stamp, read_sorted(read, self.rows.scene), latency
         self._unanswered = math.inf
@@ -219,9 +251,10 @@ class Listener(GuardedNode):
         stamp, answer, latency = max(track.kept[-1][0] for track in tracks), None, math.nan
         if self._answer is not None and time.monotonic() - self._unanswered <= UNANSWERED:
             stamp, answer, latency = self._answer
-        poses = self.rows.poses.copy()
+        poses = np.concatenate((self.rows.poses, [NOWHERE]))  # the last is NO_ROW
         for track in tracks:
-            poses[track.rows] = track.at(stamp)
-        self.rows.scene.place_boxes(poses)
+            known = track.at(stamp)[:len(track.rows)]
+            poses[track.rows[:len(known)]] = known
+        self.rows.scene.place_boxes(poses[:-1])
         return DrawnTick(self.rows, stamp, self._frame_id, poses[:len(self.rows.sizes)], answer,
                          latency)

@@ -68,6 +68,10 @@ class Page:
         """Show boxes and contacts, and ropes by their ends (n, 2, 3) [m]."""
         with self._server.atomic():
             known = ~np.isnan(tick.poses[:, 0])
+            if tick.rows is not self._rows:  # boxes have come or gone
+                self._faces.remove()
+                self._edges.remove()
+                self._add_boxes(tick.rows)
             if known.sum() > self._seen:
                 self._look_at(tick, known)
             self._draw_boxes(tick, known)
@@ -77,7 +81,7 @@ class Page:
                 self._ropes.points = ropes - self._origin
 
     def _add_drawing(self, rows: SceneRows) -> None:
-        """Add all that is drawn. Boxes are instances of one cube: a tick moves them together."""
+        """Add all that is drawn."""
         scene, place = self._server.scene, np.zeros((1, 2, 3))
         edge = float(np.median(rows.sizes.max(axis=1)))
         radius, self._normal_length = style.POINT_RADIUS * edge, style.NORMAL_LENGTH * edge
@@ -100,6 +104,11 @@ class Page:
         self._distance = scene.add_label('/near/distance', '', visible=False)
         self._ropes = scene.add_line_segments('/ropes', place, ROPE, thickness=2.0,
                                               thickness_units='screen', visible=False)
+        self._add_boxes(rows)
+
+    def _add_boxes(self, rows: SceneRows) -> None:
+        """Add the boxes, instances of one cube: a tick moves them together."""
+        self._rows = rows
         colours = np.where(rows.is_a[:, None], style.BOX_A, style.BOX_B)
         self._faces, self._edges = add_cubes(scene, colours, style.BOX_OPACITY)
 
