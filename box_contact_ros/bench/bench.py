@@ -1,7 +1,10 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The bench: compares the latency of contact node, soup node and echo node on the same poses.
+"""The bench: compares the latency of contact node, soup node and two echo nodes on the same poses.
+
+The echo nodes compute nothing. The second one, floor, sends as many messages as the contact node,
+which cannot be faster.
 
 Each node is a process of its own. Only this host hears them, in the ROS domain ROS_DOMAIN_ID, or in
 one drawn at random. The bench sends pairs of poses of equal stamp: a container that sways on top of
@@ -11,8 +14,8 @@ each block.
 The nodes run alone, or beside loops that do nothing but take time: one of low priority on each of
 the nodes' cores (nice), or one on each core of the machine (busy).
 
-The first line of the report says how many times as long a node takes as the one before it, with
-95 % intervals. A table has latencies, and answers that are lost or differ from the exact contacts.
+The first lines of the report say how many times as long a node takes as another one, with 95 %
+intervals. A table has latencies, and answers that are lost or differ from the exact contacts.
 With --out, a picture of the latencies stands before them, those of the first surroundings.
 
 The exit status is 0 only if contact and echo node lost nothing, no answer was wrong, and the run is
@@ -70,7 +73,8 @@ def main(args: Sequence[str] | None = None) -> int:
     with asked_to_end() as signals, contextlib.ExitStack() as ending:
         os.sched_setaffinity(0, theirs)  # the nodes inherit it
         nodes = {name: ending.enter_context(running([
-            *program(NODES[name][0], **({'model': options.model} if name == 'contact' else {})),
+            *program(NODES[name][0], **NODES[name][2],
+                     **({'model': options.model} if name == 'contact' else {})),
             '-r', f'__ns:=/bench/{name}'])) for name in names}
         os.sched_setaffinity(0, own)  # before rclpy starts its threads
         bench, executor = ending.enter_context(running_node(partial(

@@ -39,10 +39,12 @@ SLICE = 0.05  # time [s] between looks at whether the bench was called off
 START_LIMIT = 60.0  # time [s] until a node answers
 DRAIN_SECONDS = 1.0  # time [s] without an answer, after which what is still out is lost
 
-NODES = {'echo': ('bench.echo_node', 'echo/'), 'contact': ('node.contact_node', ''),
-         'soup': ('node.soup_node', 'soup/')}
-"""Module of each node, and what precedes the topics that it answers on. All topics of a node are
-in the namespace bench/NAME. Each node is compared with the one before it."""
+NODES: dict[str, tuple[str, str, dict[str, object]]] = {
+    'echo': ('bench.echo_node', 'echo/', {}),
+    'floor': ('bench.echo_node', 'echo/', {'contacts': True}),
+    'contact': ('node.contact_node', '', {}), 'soup': ('node.soup_node', 'soup/', {})}
+"""Module of each node, what precedes the topics that it answers on, and its parameters. All topics
+of a node are in the namespace bench/NAME."""
 ANSWERS = {'point': (PointStamped, 'contact/point'), 'normal': (Vector3Stamped, 'contact/normal'),
            'contacts': (ContactsMessage, 'contacts')}
 """Type and topic of each kind of answer."""
@@ -154,7 +156,7 @@ class BenchNode(GuardedNode):
                 log.received[kind][row] = received
             if read is not None and read.names:
                 log.depths[row] = -read.contacts.separation[0]
-            if kind == 'point' and log.node != 'echo':
+            if kind == 'point' and log.computes:
                 point = deserialize_message(data, PointStamped).point
                 log.points[row] = point.x, point.y, point.z
         return bool(known)

@@ -3,9 +3,12 @@
 
 """The echo node: answers every pair of poses with a fixed point and normal, and computes nothing.
 
-Its latency is that of transport and executor alone: the floor of the bench. It subscribes
-box_a/pose and box_b/pose as the contact node does. Once poses of equal stamp are in, it publishes
-echo/contact/point and echo/contact/normal under that stamp. Messages stay the bytes they come as.
+Its latency is that of transport and executor alone. With the parameter `contacts` it sends a third
+message, as the contact node does: the floor, below which no node of these topics can be.
+
+It subscribes box_a/pose and box_b/pose as the contact node does. Once poses of equal stamp are in,
+it publishes echo/contact/point and echo/contact/normal under that stamp. Messages stay the bytes
+they come as.
 
 `python -m box_contact_ros.bench.echo_node`; for the bench, not a program of its own.
 """
@@ -21,12 +24,16 @@ from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
 from rclpy.context import Context
 from rclpy.serialization import serialize_message
 
+from box_contact_msgs.msg import Contact, Contacts
+
 from ..node.messages import make_header
+from ..node.parameters import Setting, declare, flag
 from ..node.runtime import GuardedNode, run_node
 from ..node.topics import contact_qos, pose_qos
 from ..stream.cdr import ENCAPSULATION, NANOSECONDS
 
 FRAME = 'world'  # of all poses of the bench
+PARAMETERS = {'contacts': Setting(False, 'whether `contacts` are answered, too', flag)}
 _STAMP = struct.Struct('=iI')  # behind the encapsulation; sender and receiver are one machine
 
 
@@ -48,11 +55,15 @@ class EchoNode(GuardedNode):
     def __init__(self, context: Context, **options: Any) -> None:
         super().__init__('echo_node', context=context, **options)
         self._waiting: set[int] = set()  # stamps whose second pose may still come
+        header = make_header(0, FRAME)
+        answers = [('contact/point', PointStamped(header=header)),
+                   ('contact/normal', Vector3Stamped(header=header))]
+        if declare(self, PARAMETERS)['contacts']:
+            contact = Contact(pair='box_a_box_b', box_a='box_a', box_b='box_b')
+            answers.append(('contacts', Contacts(header=header, contacts=[contact])))
         self._answers = [
-            (self.create_publisher(kind, f'echo/{topic}', contact_qos()),
-             serialize_message(kind(header=make_header(0, FRAME))))
-            for kind, topic in ((PointStamped, 'contact/point'),
-                                (Vector3Stamped, 'contact/normal'))]
+            (self.create_publisher(type(message), f'echo/{topic}', contact_qos()),
+             serialize_message(message)) for topic, message in answers]
         gc.collect()
         gc.freeze()
         for topic in ('box_a/pose', 'box_b/pose'):

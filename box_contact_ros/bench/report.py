@@ -24,7 +24,9 @@ DEPTH_TOLERANCE = 1e-9
 separating-axis test. The depths of two ticks differ by a thousand times more."""
 RESAMPLES = 2000  # of the bootstrap
 LATE = 'bench late p99 [ms]'  # a column
-COLOURS = {'echo': '0.6', 'contact': '#e6146e', 'soup': '#4678aa'}  # of the picture
+COMPARED = (('contact', 'echo'), ('contact', 'floor'), ('soup', 'contact'))
+"""Which nodes are compared, as far as they run."""
+COLOURS = {'echo': '0.6', 'floor': '0.4', 'contact': '#e6146e', 'soup': '#4678aa'}  # of the picture
 
 
 class AnswerLog:
@@ -36,6 +38,7 @@ class AnswerLog:
         rows = len(truth.colliding)
         self.stamps = np.zeros(rows, np.int64)  # [ns], 0: not sent
         self.lateness = np.full(rows, np.nan)  # of the bench itself [s]
+        self.computes = node not in ('echo', 'floor')
         kinds = ('point', 'normal') if node == 'echo' else ('point', 'normal', 'contacts')
         self.received = {kind: np.zeros(rows, np.int64) for kind in kinds}  # [ns], 0: not yet
         self.points = np.full((rows, 3), np.nan)
@@ -61,6 +64,8 @@ class AnswerLog:
     def wrong(self) -> np.ndarray:
         """Return for each row whether its answer is not that of `exact`."""
         right = np.abs(self.depths + self.truth.separation) <= DEPTH_TOLERANCE
+        if not self.computes:
+            return np.zeros(len(right), bool)
         return (self.received.get('contacts', np.zeros(1)) > 0) & ~right
 
 
@@ -84,12 +89,15 @@ def ratio(log: AnswerLog, baseline: AnswerLog, *, block: int) -> tuple[float, fl
 
 
 def comparison(logs: Sequence[AnswerLog], *, block: int) -> str:
-    """Return the ratios of each node to the one before it: those of `ratio`, and that of the p99.
+    """Return the ratios of nodes that are COMPARED: those of `ratio`, and that of the p99.
 
     Such as `contact / echo 1.18 [1.15, 1.22], p99 1.30`.
     """
-    texts = []
-    for before, log in zip(logs, logs[1:]):
+    texts, log_of = [], {log.node: log for log in logs}
+    for node, other in COMPARED:
+        if node not in log_of or other not in log_of:
+            continue
+        log, before = log_of[node], log_of[other]
         middle, low, high = ratio(log, before, block=block)
         tails = _percentile(log.latencies, 99) / _percentile(before.latencies, 99)
         texts.append(f'{log.node} / {before.node} {middle:.2f} [{low:.2f}, {high:.2f}], '
@@ -166,7 +174,8 @@ def draw(path: Path, logs: Sequence[AnswerLog], *, block: int) -> None:
     axes[-1].xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes[-1].xaxis.set_major_formatter('{x:g}')
     axes[-1].set_xlabel('time from the stamp of the poses to the answer [ms]')
-    times_as_long = ratio(logs[1], logs[0], block=block)[0]
+    log_of = {log.node: log for log in logs}
+    times_as_long = ratio(log_of['contact'], log_of['echo'], block=block)[0]
     figure.suptitle(f'The contact node takes {times_as_long:.2f} times as long as transport alone\n'
                     '(median of the ratios of blocks in turn)')
     figure.savefig(path)

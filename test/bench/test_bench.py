@@ -52,15 +52,15 @@ def test_a_short_run(program, tmp_path):
     assert page.startswith('# Bench of `exact`\n\n![Latencies of each node](bench_exact.png)\n')
     assert (tmp_path / 'bench_exact.png').read_bytes().startswith(b'\x89PNG')
     rows = rows_of(page)
-    assert [row['node'] for row in rows] == ['echo', 'contact', 'soup']
+    assert [row['node'] for row in rows] == ['echo', 'floor', 'contact', 'soup']
     for row in rows:
-        assert (row['sent'], row['lost'], row['wrong']) == ('100', '0', '0')
+        assert (row['sent'], row['lost'], row['wrong']) == ('75', '0', '0')
         p50, p99, most = (float(row[f'{name} [ms]']) for name in ('p50', 'p99', 'max'))
         assert 0.0 < p50 <= p99 <= most
-    assert rows[1]['point error [mm]'] == '0'  # the exact model, bit by bit
+    assert rows[2]['point error [mm]'] == '0'  # the exact model, bit by bit
     number = r'(\d+\.\d\d)'
     compared = re.search(f'quiet: contact / echo {number} \\[{number}, {number}\\], p99 {number}; '
-                         'soup / contact ', page)
+                         'contact / floor .*; soup / contact ', page)
     middle, low, high, _ = map(float, compared.groups())
     assert low <= middle <= high
     assert all(line in running.output for line in page.splitlines() if line.startswith('|'))
@@ -85,7 +85,8 @@ def test_a_row_for_each_surroundings(program):
     running.wait()
     rows = [row for row in rows_of(running.output) if row['node'] != 'soup']
     assert [(row['beside'], row['node']) for row in rows] == [
-        (beside, node) for beside in ('quiet', 'nice') for node in ('echo', 'contact')]
+        (beside, node) for beside in ('quiet', 'nice') for node in (
+            'echo', 'floor', 'contact')]
     assert all(int(row['sent']) > 0 and row['wrong'] == '0' for row in rows)
     for beside in ('quiet', 'nice'):
         assert re.search(rf'^{beside}: contact / echo \d', running.output, re.M)
@@ -125,7 +126,7 @@ def test_planted_faults_show_up(program):
     with running_node(FaultyRelay) as (relay, executor):
         remaps = ' '.join(f'-r bench/contact/{topic}:=relayed/{topic}'
                           for topic in ('contact/point', 'contact/normal', 'contacts'))
-        running = bench(program, '--rate 100 --duration 4 --model exact',
+        running = bench(program, '--rate 100 --duration 6 --model exact',
                         f'--ros-args {remaps}')
         while running.process.poll() is None:
             spin_for(relay, executor, 0.2)
@@ -163,7 +164,7 @@ def test_called_off(program):
 
 def test_a_node_that_does_not_start_is_reported(monkeypatch, capfd):
     """In the node's own words, too."""
-    monkeypatch.setitem(drive.NODES, 'echo', ('bench.no_node', ''))
+    monkeypatch.setitem(drive.NODES, 'echo', ('bench.no_node', '', {}))
     cores = os.sched_getaffinity(0)
     try:
         assert bench_main(['--duration', '1']) == 1

@@ -46,7 +46,7 @@ def played(node: str = 'contact', *, delay: int = MS) -> AnswerLog:
     for kind, later in (('point', delay // 2), ('normal', delay), ('contacts', delay + MS)):
         if kind in log.received:
             log.received[kind][:] = log.stamps + later
-    if node != 'echo':
+    if log.computes:
         log.points[:], log.depths[:] = log.truth.point, DEPTH
     return log
 
@@ -56,7 +56,7 @@ def counts(log: AnswerLog) -> tuple[int, int]:
     return int(log.lost.sum()), int(log.wrong.sum())
 
 
-@pytest.mark.parametrize('node', ['contact', 'echo'])
+@pytest.mark.parametrize('node', ['contact', 'echo', 'floor'])
 def test_a_faultless_run(node):
     """The latency is that of the normal, not that of the contacts."""
     log = played(node)
@@ -106,6 +106,10 @@ def test_ratios_are_paired_by_pose():
     soup.received['normal'][:] = soup.stamps + 6 * MS * (1 + np.arange(PAIRS))
     assert comparison([echo, contact, soup], block=BLOCK) == (
         'contact / echo 1.50 [1.50, 1.50], p99 1.50; soup / contact 2.00 [2.00, 2.00], p99 2.00')
+    floor = played('floor')
+    floor.received['normal'][:] = floor.stamps + MS * (1 + np.arange(PAIRS))
+    assert comparison([floor, contact], block=BLOCK) == (
+        'contact / floor 3.00 [3.00, 3.00], p99 3.00')
 
 
 def test_the_interval_of_a_ratio_spans_its_blocks():
