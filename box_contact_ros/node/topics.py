@@ -34,8 +34,9 @@ MOST_PAIRS_WITH_TOPICS = 1000
 """Two publishers a pair take milliseconds and memory, here and in every process that listens."""
 DEEP_RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 """Of a client: what the DDS layer delivers while Python is busy must not push out the rest."""
-CHANGES = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""Of the events of ~/set_boxes: who draws the scene later hears of the last 500 changes, too."""
+CHANGES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""Of the events of ~/set_boxes, two a request: who draws the scene later hears of the last 50, too.
+Of requests of 100,000 boxes, which are refused, more would take gigabytes."""
 CONTACT_DEPTH = 10
 POSE_DEPTH = 100
 """Poses that wait: 100 ms at 1 kHz, longer than any collection of garbage."""

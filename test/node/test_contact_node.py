@@ -124,7 +124,7 @@ def test_an_error_inside_does_not_end_the_node(node, client, monkeypatch):
 
     broken.scene = node._tick.solver.scene
     with monkeypatch.context() as patch:
-        patch.setattr(node._tick, 'solver', broken)
+        patch.setattr(node._tick._revision, 'solver', broken)
         stamp = client.send(ORIGIN, TOUCHING)
         assert client.spin(lambda: node.counts['refused: internal error'] > 0)
     client.ask(ORIGIN, TOUCHING)

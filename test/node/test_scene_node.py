@@ -223,9 +223,9 @@ def test_a_slow_node_says_so_and_is_late_by_few_ticks(array_node, array_client, 
         time.sleep(0.03)
         return solver(poses)
 
-    slow.scene, slow.model = tick.solver.scene, tick.solver.model
+    slow.scene, slow.moving = tick.solver.scene, tick.solver.moving
     reset = client._client_of(Trigger, 'contact_node/reset')
-    monkeypatch.setattr(tick, 'solver', slow)
+    monkeypatch.setattr(tick._revision, 'solver', slow)
     sent, behind = [], []
 
     def stream(done):

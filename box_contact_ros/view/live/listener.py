@@ -223,8 +223,13 @@ class Listener(GuardedNode):
             self._asked[key] = request
         for response in event.response:
             asked = self._asked.pop(key, None)
-            if response.success and asked is not None:
-                self._take(changed(self._solver, asked))
+            if not response.success or asked is None:
+                continue
+            if response.revision != self._solver.revision + 1:
+                raise ValueError(f'scene {response.revision} comes after scene '
+                                 f'{self._solver.revision}: changes were missed; start this '
+                                 'node before boxes change')
+            self._take(changed(self._solver, asked))
 
     def _on_poses(self, topic: PoseTopic, track: Track, data: bytes) -> None:
         poses = topic.read(data)
