@@ -270,8 +270,8 @@ def test_cpp_node_pairs_streams_that_drift_apart(cpp_with_ros: Path, events: str
                 for stamp in stamps:
                     client.send(*side, stamps=(stamp, stamp))
             assert client.are_answered(stamps)
-            assert [client.contacts[stamp].near[0].depth for stamp in stamps] == pytest.approx(
-                [-0.4] * 3)
+            assert [client.contacts[stamp].near[0].distance for stamp in stamps] == pytest.approx(
+                [0.4] * 3)
             assert client.points and client.normals
         finally:
             node.terminate()

@@ -85,8 +85,8 @@ class BoxContactNode : public rclcpp::Node {
     const auto contact = box_contact::collide(boxes_[0], boxes_[1], query_);
     Contacts contacts;
     contacts.header = header;
-    const auto told = box_contact::to_message(contact, "box_a_box_b", "box_a", "box_b");
     if (contact.colliding) {
+      const auto told = box_contact::to_message(contact, "box_a_box_b", "box_a", "box_b");
       PointStamped point;
       point.header = header, point.point = told.point;
       point_->publish(point);
@@ -95,9 +95,22 @@ class BoxContactNode : public rclcpp::Node {
       normal_->publish(normal);
       contacts.contacts.push_back(told);
     } else if (contact.separation <= query_.margin) {
-      contacts.near.push_back(told);
+      add_near(contacts);
     }
     contacts_->publish(contacts);
+  }
+
+  // List boxes whose distance is within the margin; their separation is less than the distance.
+  void add_near(Contacts& contacts) const {
+    const auto nearest = box_contact::distance(boxes_[0], boxes_[1]);
+    if (nearest.distance > query_.margin) return;
+    auto& near = contacts.near.emplace_back();
+    near.pair = "box_a_box_b", near.box_a = "box_a", near.box_b = "box_b";
+    near.distance = nearest.distance;
+    const double *n = nearest.normal, *a = nearest.point_a, *b = nearest.point_b;
+    near.normal.x = n[0], near.normal.y = n[1], near.normal.z = n[2];
+    near.point_a.x = a[0], near.point_a.y = a[1], near.point_a.z = a[2];
+    near.point_b.x = b[0], near.point_b.y = b[1], near.point_b.z = b[2];
   }
 
   box_contact::Box boxes_[2] = {{{{0, 0, 0}, {0, 0, 0, 1}}, {}}, {{{0, 0, 0}, {0, 0, 0, 1}}, {}}};
