@@ -110,7 +110,7 @@ class Page:
         """Add the boxes, instances of one cube: a tick moves them together."""
         self._rows = rows
         colours = np.where(rows.is_a[:, None], style.BOX_A, style.BOX_B)
-        self._faces, self._edges = add_cubes(scene, colours, style.BOX_OPACITY)
+        self._faces, self._edges = add_cubes(self._server.scene, colours, style.BOX_OPACITY)
 
     def _draw_boxes(self, tick: DrawnTick, known: np.ndarray) -> None:
         """Move the boxes; those without a pose shrink to nothing."""
