@@ -95,6 +95,7 @@ reports:
 	run benchmarks.force_lines $(ARGS)
 	run benchmarks.frontier $(ARGS) $(LEFT_OUT)
 	run benchmarks.native $(ARGS) $(LEFT_OUT)
+	run benchmarks.distance $(ARGS) $(LEFT_OUT)
 	run benchmarks.scenes $(ARGS)
 	run benchmarks.speed $(ARGS)
 	run benchmarks.paper $(ARGS)

@@ -224,7 +224,7 @@ def legend(rows: SceneRows) -> str:
     """Return which colour stands for what, as HTML: boxes by their first names."""
     names = np.array(list(rows.scene.boxes), dtype=object)
     parts = [(style.BOX_A, names[rows.is_a]), (style.BOX_B, names[~rows.is_a]),
-             (style.CONTACT, ['contact: point, normal, patch'])]
+             (style.CONTACT, ['contact: point, normal, patch']), (style.NEAR, ['near: distance'])]
     return ''.join(f'<span style="white-space:nowrap;color:rgb{colour}">■</span> '
                    f'{html.escape(_first(words))} &ensp;' for colour, words in parts if len(words))
 
