@@ -8,6 +8,7 @@ import argparse
 import contextlib
 import math
 import re
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -114,6 +115,15 @@ def first_contact(folder: Path) -> None:
         exec(compile(code, 'first_contact.md', 'exec'), {})
 
 
+def plan_descent(folder: Path) -> None:
+    """Draw plan_descent.png by the example."""
+    example = runpy.run_path(str(Path(__file__).parents[1] / 'examples' / 'plan_descent.py'))
+    beside = example['stacks']()
+    ways = {'straight down': example['descend'](beside, 0.0),
+            'pushed off': example['descend'](beside, example['CLEARANCE'])}
+    example['draw'](ways, beside, str(folder / 'plan_descent.png'))
+
+
 def main() -> None:
     """Draw all figures."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -126,6 +136,7 @@ def main() -> None:
     sketch(axes['other way'], math.radians(-7.0))
     slide(axes['graph'])
     first_contact(folder)
+    plan_descent(folder)
     # No version and no date in the file: the same figure is the same bytes.
     figure.savefig(folder / 'centroid.png', metadata={'Software': None})
 
