@@ -7,7 +7,8 @@
 // usage: answers PAIRS
 //
 // PAIRS has a line for each pair: two poses and two sizes, 20 numbers. The program prints a line for
-// each pair and model: verdict, separation and normal. Then it prints a line for each body of the tower:
+// each pair and model: verdict, separation and normal; and a line for each pair: verdict, distance and
+// normal. Then it prints a line for each body of the tower:
 // pose and velocity. The exit status is 1 if a row of a batch has other bits than its single call.
 #include <algorithm>
 #include <cmath>
@@ -85,6 +86,28 @@ long print_answers(const Pairs& pairs, box_contact::Model model) {
   return different;
 }
 
+// Print the distances of single calls. Returns how many differ from their row of a batch.
+long print_distances(const Pairs& pairs) {
+  const long count = long(pairs.poses_a.size());
+  std::vector<double> distance(count), normal(3 * count), point_a(3 * count), point_b(3 * count);
+  box_contact::NearestResults results{nullptr, distance.data(), normal.data(), point_a.data(),
+                                      point_b.data()};
+  long different = box_contact::distance(
+                       {pairs.poses_a, pairs.poses_b, pairs.sizes_a, pairs.sizes_b}, results,
+                       2) != -1;
+  for (long row = 0; row < count; ++row) {
+    const box_contact::Nearest one = box_contact::distance({pairs.poses_a[row], pairs.sizes_a[row]},
+                                                           {pairs.poses_b[row], pairs.sizes_b[row]});
+    different += !same_bits(&one.distance, &distance[row], 1) ||
+                 !same_bits(one.normal, &normal[3 * row], 3) ||
+                 !same_bits(one.point_a, &point_a[3 * row], 3) ||
+                 !same_bits(one.point_b, &point_b[3 * row], 3);
+    std::printf("%d %a %a %a %a\n", one.colliding, one.distance, one.normal[0], one.normal[1],
+                one.normal[2]);
+  }
+  return different;
+}
+
 // Print where cubes on the ground end that stand askew: after 400 steps of 5 ms, each with an answer.
 // test_builds.py has the same loop in Python.
 void print_tower() {
@@ -127,7 +150,7 @@ int main(int argc, char** argv) {
   if (argc != 2) return 2;
   const Pairs pairs = read_pairs(argv[1]);
   const long different = print_answers(pairs, box_contact::Model::exact) +
-                         print_answers(pairs, box_contact::Model::mlp);
+                         print_answers(pairs, box_contact::Model::mlp) + print_distances(pairs);
   print_tower();
   if (different) std::fprintf(stderr, "%ld rows differ from their single calls\n", different);
   return different != 0;

@@ -68,7 +68,7 @@ def tower() -> np.ndarray:
 @pytest.mark.slow
 @pytest.mark.parametrize('name', ['clang++', pytest.param('arm', marks=pytest.mark.arm)])
 def test_another_build_has_the_same_bits(name: str, tmp_path: Path) -> None:
-    """Verdict, separation and normal of both models; a row of a batch is its single call."""
+    """Verdict, separation and normal of both models, distances; a row is its single call."""
     compiler, emulator = BUILDS[name]
     for program in (compiler, *emulator[:1]):
         if not shutil.which(program):
@@ -83,7 +83,11 @@ def test_another_build_has_the_same_bits(name: str, tmp_path: Path) -> None:
     bodies = tower()
     assert 10.9 < bodies[-1, 2] + 0.5 < 11.0
     assert np.array_equal(lines[-len(bodies):], bodies)
-    for model, rows in zip(('exact', 'mlp'), np.split(np.array(lines[:-len(bodies)]), 2)):
+    *of_models, of_distances = np.split(np.array(lines[:-len(bodies)]), 3)
+    nearest = ContactSolver().distance_batch(*pairs[:2], size_a=pairs.size_a, size_b=pairs.size_b)
+    assert np.array_equal(of_distances, np.column_stack(
+        (nearest.colliding, nearest.distance, nearest.normal)))
+    for model, rows in zip(('exact', 'mlp'), of_models):
         wanted = ContactSolver(model=model).batch(
             *pairs[:2], size_a=pairs.size_a, size_b=pairs.size_b)
         assert 0.3 < wanted.colliding.mean() < 0.95

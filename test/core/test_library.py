@@ -316,6 +316,44 @@ def test_rows_by_place(tmp_path: Path) -> None:
         '-1 -0.5 7\n-0.5 7\n-2 -4\nsizes must be one, or one for each pose, not 0\n')
 
 
+DISTANCES = """
+#include <cstdio>
+#include <vector>
+#include "box_contact/box_contact.hpp"
+using namespace box_contact;
+
+int main() {
+  const Box a{{{0, 0, 0}, {0, 0, 0, 1}}, {2, 2, 2}}, b{{{4, 5, 1}, {0, 0, 0, 1}}, {2, 2, 2}};
+  const Nearest nearest = distance(a, b);
+  std::printf("%g %g %g %d\\n", nearest.distance, nearest.point_a[2], nearest.normal[1],
+              nearest.colliding);
+  const std::vector<Pose> poses{a.pose, b.pose};
+  const std::vector<Size> sizes{a.size};
+  std::vector<std::int64_t> pairs{1, 0, 0, 0};
+  std::vector<double> distances(2), points(6);
+  NearestResults results;
+  results.distance = distances.data(), results.point_b = points.data();
+  const auto refused = distance({poses, poses, sizes, sizes, pairs}, results, 2);
+  std::printf("%d %g %g %g\\n", int(refused), distances[0], points[0], distances[1]);
+  try {
+    distance(a, {{{0, 0, 0}, {0, 0, 0, 0}}, {2, 2, 2}});
+  } catch (const std::invalid_argument& error) {
+    std::puts(error.what());
+  }
+}
+"""
+
+
+def test_distances_in_cpp(tmp_path: Path) -> None:
+    """Edge to edge, by rows and places too, and a refusal."""
+    (tmp_path / 'distances.cpp').write_text(DISTANCES)
+    run(tool('g++'), '-std=c++17', *STRICT, INCLUDES, tmp_path / 'distances.cpp', *LINKED, '-o',
+        tmp_path / 'distances')
+    assert run(tmp_path / 'distances') == (
+        '3.60555 0.5 0.83205 0\n-1 3.60555 1 0\n'
+        'pose_b quaternion (0, 0, 0, 0) has no length within 1e-100 to 1e100\n')
+
+
 def test_a_debug_build_is_as_fast(tmp_path: Path) -> None:
     """The library is optimised whatever the simulator's configuration."""
     run(tool('cmake'), '-S', ROOT, '-B', tmp_path, '-DCMAKE_BUILD_TYPE=Debug',
