@@ -20,11 +20,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from ..core import native
+from ..forces.support import hull_margins
 
 FALLS = 1e-5
 """Missing part of its weight from which a body falls [1]: above what the solver leaves."""
@@ -130,13 +132,15 @@ def settle(bodies: Bodies, beds: Beds, friction: float,
     report(int((~rests[group[group >= 0]]).sum()))
     is_level = np.bincount(of_patch[np.abs(beds.normal[left, 2]) <= 1.0 - LEVEL],
                            minlength=count) == 0
+    inside = hull_margins(beds.hull[left, :, :2], beds.pairs[left, 1], bodies.centre[:, :2]) > 0.0
+    is_sure = np.bincount(group[(group >= 0) & ~inside], minlength=count) == 0
     size = np.bincount(group[group >= 0], minlength=count)
-    for flat in (True, False):
-        for some in _batches(np.flatnonzero(rests & (is_level == flat)), size):
+    for flat, sure in product((True, False), repeat=2):
+        for some in _batches(np.flatnonzero(rests & (is_level == flat) & (is_sure == sure)), size):
             rows = left[np.isin(of_patch, some)]
             members = np.flatnonzero(np.isin(group, some))
             part = _Programme(bodies, beds, members, rows, flat)
-            load[rows], centre[rows], missing[members] = part.settle(friction)
+            load[rows], centre[rows], missing[members] = part.settle(friction, sure)
             report(len(members))
     return Rest(load, centre, missing)
 
@@ -262,12 +266,15 @@ class _Programme:
                                                     np.concatenate(columns))),
                           (len(self.keep) * len(self.members), len(force)))
 
-    def settle(self, friction: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return loads (k,), centres of pressure (k, 3), and what is missing (n, 6)."""
+    def settle(self, friction: float, sure: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return loads (k,), centres of pressure (k, 3), and what is missing (n, 6).
+
+        sure: all bodies may be expected to hold, so that their loads are looked for at once.
+        """
         bound = np.zeros(len(self.rows))
         at = self.beds.centre[self.rows]
         for _ in range(1 if self.flat else PASSES_MAX):
-            force, missing = self._solve(bound, at)
+            force, missing = self._solve(bound, at, sure)
             load = np.bincount(self.patch, force, minlength=len(self.rows))
             moment = np.stack([np.bincount(self.patch, force * self.point[:, axis],
                                            minlength=len(self.rows)) for axis in range(3)], axis=1)
@@ -281,7 +288,8 @@ class _Programme:
         whole[:, self.keep] = missing
         return np.where(presses, load, 0.0) * self.unit, at, whole
 
-    def _solve(self, bound: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _solve(self, bound: np.ndarray, at: np.ndarray, sure: bool,
+               ) -> tuple[np.ndarray, np.ndarray]:
         """Return forces (q,) at points and what is missing, with friction up to bounds (k,)."""
         from scipy.sparse import hstack
 
@@ -290,14 +298,18 @@ class _Programme:
         cost = 1.0 / self.stiffness
         rub_cost = np.tile(self.beds.area[self.rows].mean() / self.beds.area[self.rows[rubs]], 3)
         metric = np.repeat(self.weight, len(self.keep))
-        # Whether loads exist depends on where patches end alone.
-        _, missing = _least(
-            hstack((self.pressing[:, self.spans], rubbing), format='csc'), self.wanted,
-            SOFTNESS * np.append(cost[self.spans], rub_cost), metric, limits)
-        missing[np.abs(missing) < DOUBTFUL] = 0.0
-        force, more = _least(
-            hstack((self.pressing, rubbing), format='csc'), self.wanted - missing,
-            np.append(cost, rub_cost), STIFFNESS * metric, limits)
+        given = hstack((self.pressing, rubbing), format='csc')
+        missing = np.zeros(len(self.wanted))
+        if not sure:
+            # Whether loads exist depends on where patches end alone.
+            _, missing = _least(
+                hstack((self.pressing[:, self.spans], rubbing), format='csc'), self.wanted,
+                SOFTNESS * np.append(cost[self.spans], rub_cost), metric, limits)
+            missing[np.abs(missing) < DOUBTFUL] = 0.0
+        force, more = _least(given, self.wanted - missing, np.append(cost, rub_cost),
+                             STIFFNESS * metric, limits)
+        if sure and np.abs(more).max() > FALLS:
+            return self._solve(bound, at, sure=False)
         return force[:len(cost)], (missing + more).reshape(-1, len(self.keep))
 
     def _rubbing(self, rubs: np.ndarray, at: np.ndarray) -> Any:
