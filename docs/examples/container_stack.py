@@ -13,7 +13,7 @@ It prints:
     4 s: slower than 1 mm/s: True, less than 1 mm deep: True
     6 s: slower than 1 mm/s: True, less than 1 mm deep: True
     8 s: slower than 1 mm/s: True, less than 1 mm deep: True
-    corners on the ground: 24.7 24.7 25.3 25.3 % of the weight
+    corners on the ground: 25 25 25 25 % of the weight
 """
 from itertools import combinations
 
@@ -76,7 +76,7 @@ def main() -> None:
             print(f'{data.time:.0f} s: slower than 1 mm/s: {fastest < 1e-3}, '
                   f'less than 1 mm deep: {deepest < 1e-3}')
     shares = forces.loads().corner_loads[0] / (9.81 * MASS * COUNT)
-    print('corners on the ground:', *(f'{100.0 * share:.1f}' for share in shares),
+    print('corners on the ground:', *(f'{100.0 * share:.0f}' for share in shares),
           '% of the weight')
 
 

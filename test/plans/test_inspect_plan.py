@@ -272,3 +272,9 @@ def test_the_picture_has_a_colour_for_each_cause():
     assert words == ['sound', 'unsupported']
     labels = [text.get_text() for text in figure.axes[0].texts]
     assert labels == [f'{found.load[1] / 1e3:.3g}']
+
+
+def test_many_boxes_show_progress(monkeypatch, capsys):
+    monkeypatch.setattr(sys.modules['box_contact_ros.plans.inspect_plan'], 'MANY', 1)
+    assert inspect_plan(plan_of([box(0, 0.5), box(0, 1.5)], [10, 10])).sound
+    assert 'loads' in capsys.readouterr().err

@@ -42,7 +42,7 @@ def statics(plan):
 
 
 def assert_agrees(plan):
-    """Assert that groups stand where loads exist; return how many there are, and boxes that fall."""
+    """Assert that groups stand where loads exist; return how many there are, and what falls."""
     found, independent = inspect_plan(plan), statics(plan)
     groups = independent.groups()
     for boxes in groups:
@@ -83,14 +83,13 @@ def test_what_falls_in_random_plans(seed):
     assert groups > 0
 
 
-@pytest.mark.parametrize('order', ['00100408', '00100003'])
+@pytest.mark.parametrize('order', PALLETS)
 def test_unique_loads_are_those_of_a_simulation(order):
     """Of what stands, after a second of PatchForces; and loads are within their ranges."""
     plan = pallet(order)
-    kept = np.flatnonzero(inspect_plan(plan).stands)
-    plan = Plan(plan.sizes[kept], plan.poses[kept], plan.masses[kept], ground=0)
-    found = inspect_plan(plan)
-    assert found.sound
+    while not (found := inspect_plan(plan)).sound:  # what falls may have held others down
+        kept = np.flatnonzero(found.stands)
+        plan = Plan(plan.sizes[kept], plan.poses[kept], plan.masses[kept], ground=0)
     loads = dict(zip(map(tuple, found.carried_by.tolist()), found.loads / G))
     independent = statics(plan)
     ranges = {pair: ends for boxes in independent.groups()
@@ -100,7 +99,7 @@ def test_unique_loads_are_those_of_a_simulation(order):
     forces = PatchForces([Body(mass=0, inertia=np.zeros(3)), *(
         Body.of_box(size, mass) for size, mass in zip(plan.sizes[1:], plan.masses[1:]))])
     forces.set_boxes(plan.sizes)
-    forces.hold(contacts_of(plan.sizes, plan.poses)[0])
+    forces.hold(found.carried_by)
     poses, velocities, weights = plan.poses, np.zeros((len(plan), 6)), np.zeros((len(plan), 6))
     weights[:, 2] = -G * plan.masses
     for _ in range(1000):
@@ -113,7 +112,7 @@ def test_unique_loads_are_those_of_a_simulation(order):
         if high - low < 0.01:
             unique += 1
             assert force / G == pytest.approx(loads[pair], abs=0.1)
-    assert unique >= 10
+    assert unique >= 5
 
 
 @pytest.fixture(scope='module')
