@@ -15,9 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import LENGTH_MAX
 from ..solver.checks import pose_fault, size_fault
-from ..solver.contact_solver import ContactSolver
 from ..solver.contacts_of import contacts_of
 from ..solver.faces import TOLERANCE
 from ..solver.pose import rotation_matrix
@@ -142,11 +140,10 @@ def _near(solids: Sequence[Solid], fixed: set[Hashable]) -> tuple[np.ndarray, np
         return np.zeros((0, 2), int), np.zeros(0, bool)
     sizes = np.array([solids[n].size for n in known], float)
     poses = np.array([solids[n].pose for n in known])
-    rows, _ = contacts_of(np.minimum(sizes + NEAR, LENGTH_MAX), poses,
-                          fixed=[solids[n].body in fixed for n in known])
-    rows = rows[[solids[a].body != solids[b].body for a, b in known[rows].tolist()]]
-    contacts = ContactSolver().batch(poses, sizes=sizes, pairs=rows)
-    return known[rows], contacts.separation <= TOLERANCE
+    rows, contacts = contacts_of(sizes, poses, margin=NEAR,
+                                 fixed=[solids[n].body in fixed for n in known])
+    own = np.array([solids[a].body == solids[b].body for a, b in known[rows].tolist()], bool)
+    return known[rows[~own]], contacts.separation[~own] <= TOLERANCE
 
 
 def _unjudged(solids: Sequence[Solid], touching: np.ndarray, fixed: set[Hashable],

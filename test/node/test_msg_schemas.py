@@ -139,7 +139,7 @@ def test_every_reference_resolves():
     messages = DOCUMENT['components']['messages'].values()
     assert {message['payload']['schema']['$ref']: message['name'] for message in messages} == {
         name: schema['title'] for name, schema in SCHEMAS.items()
-        if name not in ('common.json', 'scene.json')}
+        if name not in ('common.json', 'inspection.json', 'plan.json', 'scene.json')}
 
 
 def test_operations_cover_the_channels():

@@ -15,7 +15,6 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 import pytest
 from patience import PATIENCE
@@ -25,10 +24,10 @@ EXAMPLES = ROOT / 'docs' / 'examples'
 CLIENTS = ('check_client.py', 'lockstep_client.py', 'forces_client.py', 'lift.py')
 """Of a contact node."""
 PARAMETERS = {'lift.py': (f'scene:={ROOT}/config/scenes/lift.yaml', 'pair_topics:=false')}
-NEEDS = {'mujoco_loop.py': 'mujoco', 'container_stack.py': 'mujoco', 'from_mjcf.py': 'mujoco',
-         'dask_pairs.py': 'distributed',
+NEEDS = {'mujoco_loop.py': 'mujoco', 'container_stack.py': 'mujoco',
+         'dask_plans.py': 'distributed',
          'tf_to_pose.py': 'tf2_ros'} | dict.fromkeys(CLIENTS, 'box_contact_msgs.msg')
-QUICK = {'vectorised_env.py': 'main(100)', 'dask_pairs.py': 'main(40_000, 10_000)'}
+QUICK = {'vectorised_env.py': 'main(100)'}
 """Shorter runs, whose figures are not those of the docstring."""
 
 
@@ -65,68 +64,6 @@ def test_example(name: str, program, tmp_path: Path) -> None:
         printed, expected = ([re.sub(r'[-\d.,]+', '#', line) for line in lines]
                              for lines in (printed, expected))
     assert printed == expected
-
-
-def run_with_other_file(name: str, file: Path, old: str, new: str) -> Any:
-    """Run an example with its file, in which some words are others."""
-    text = next(EXAMPLES.glob(f'*/{file.name}')).read_text()
-    assert old in text
-    file.write_text(text.replace(old, new))
-    return subprocess.run([sys.executable, EXAMPLES / name, file], capture_output=True, text=True,
-                          timeout=PATIENCE)
-
-
-@pytest.mark.parametrize(('name', 'file', 'old', 'new', 'words'), [
-    ('palletising.py', 'packing_plans.json', '"00100408"', '"mine"', ''),
-    ('palletising.py', 'packing_plans.json', '"00100408"', '', 'JSONDecodeError'),
-    ('palletising.py', 'packing_plans.json', 'length/mm', 'length', "KeyError('length/mm')"),
-    ('from_sdf.py', 'yard.sdf', '<pose>0 6 0', '<pose degrees="true">0 6 0', 'pose of truck has'),
-    ('from_sdf.py', 'yard.sdf', '<pose>0 6 0 0 0', '<pose>0 6 0', 'pose of truck has 4 numbers'),
-    ('from_sdf.py', 'yard.sdf', 'model name="load"', 'model', 'a model has no name'),
-    ('from_sdf.py', 'yard.sdf', 'name="load"', 'name="load" placement_frame="box"', 'load has the'),
-    ('from_sdf.py', 'yard.sdf', 'name="spreader"', 'name="load"', 'the name load'),
-    ('from_sdf.py', 'yard.sdf', 'name="axles"', 'name="bed"', 'the name truck/chassis/bed'),
-    ('from_sdf.py', 'yard.sdf', 'world', 'model', 'no <world>'),
-    ('from_sdf.py', 'yard.sdf', '</sdf>', '', 'no element found'),
-    ('from_baplie.py', 'ship.edi', 'LOC', '', 'no container'),
-    ('from_baplie.py', 'ship.edi', '0110302', '0110102', 'two containers are in 0110102'),
-    ('from_baplie.py', 'ship.edi', '0100304', '0100308', '0100306 is above an empty slot'),
-    ('from_baplie.py', 'ship.edi', '45G1', '4CG1', ''),
-    ('from_baplie.py', 'ship.edi', '45G1', '4ZG1', 'size type 4ZG1')])
-def test_a_file_that_is_misread_is_refused(name: str, file: str, old: str, new: str, words: str,
-                                           tmp_path: Path) -> None:
-    """By one line, that names the file and what is wrong."""
-    done = run_with_other_file(name, tmp_path / file, old, new)
-    assert done.returncode == bool(words) and done.stderr.count('\n') == bool(words), done.stderr
-    assert done.stderr.startswith(f'{tmp_path / file}: ' if words else '') and words in done.stderr
-
-
-@pytest.mark.parametrize('kinds', ['contype="0" conaffinity="0"', 'contype="2" conaffinity="4"'])
-def test_geoms_that_never_collide_are_no_pair(kinds: str, tmp_path: Path) -> None:
-    """As by MuJoCo: neither has a `contype` that is among the bits of the other's `conaffinity`."""
-    pytest.importorskip('mujoco')
-    done = run_with_other_file('from_mjcf.py', tmp_path / 'gripper.xml', 'name="table"',
-                               f'name="table" {kinds}')
-    assert done.stdout.splitlines() == shown('from_mjcf.py')[1:]
-
-
-def test_exact_touch_is_zero_deep(tmp_path: Path) -> None:
-    """Without a sign."""
-    done = run_with_other_file('from_sdf.py', tmp_path / 'yard.sdf', '3.939', '3.94')
-    assert 'load/container/box and spreader/frame/beam: 0.0 mm deep' in done.stdout
-
-
-@pytest.mark.parametrize(('name', 'file', 'old', 'new', 'words'), [
-    ('from_sdf.py', 'yard.sdf', '<size>12.4 2.5 0.2</size></box>', '</box><sphere/>',
-     'truck/chassis/bed is no box'),
-    ('from_sdf.py', 'yard.sdf', '</world>', '<include><uri>crane</uri></include></world>',
-     'include crane'),
-    ('from_baplie.py', 'ship.edi', "EQD+CN+TEST0000001+22G1+++5'", '', '0090102 has no EQD')])
-def test_what_is_not_read_is_named(name: str, file: str, old: str, new: str, words: str,
-                                   tmp_path: Path) -> None:
-    done = run_with_other_file(name, tmp_path / file, old, new)
-    assert done.returncode == 0 and done.stderr == f'not read: {done.stderr[10:]}'
-    assert words in done.stderr and done.stderr.count('\n') == 1
 
 
 def refused(client: Sequence[str | Path], program) -> bool:

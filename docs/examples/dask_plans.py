@@ -1,0 +1,53 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""A folder of plans on many machines: `python docs/examples/dask_plans.py [FOLDER [SCHEDULER]]`.
+
+All machines must see FOLDER. SCHEDULER is the address of a Dask scheduler, such as
+tcp://10.0.0.5:8786 (`dask scheduler` starts one, `dask worker ADDRESS` a worker). Without it, two
+workers start on this machine. Needs the extras `cluster`, `plans` and, for MJCF, `sim`, on every
+machine.
+
+It prints:
+
+    gripper.xml: overlap
+    pallet.csv: unsupported, overloaded
+    ship.edi: unsupported, goes with what falls
+    yard.sdf: overlap
+    4 plans, 0 sound
+"""
+import sys
+from pathlib import Path
+
+from distributed import Client, LocalCluster
+
+FILES = Path(__file__).with_name('files')
+
+
+def judge(path: Path) -> tuple[bool, str]:
+    """Return whether the plan of a file is sound, and what is wrong with it."""
+    from box_contact_ros import inspect_plan
+    from box_contact_ros.plans.read_plan import read_any
+    from box_contact_ros.plans.report import rows_of
+
+    try:
+        plan, bears = read_any(path)
+        found = inspect_plan(plan, bears=bears)
+    except (OSError, ValueError) as error:
+        return False, str(error)
+    return found.sound, ', '.join(dict.fromkeys(row.kind for row in rows_of(found))) or 'sound'
+
+
+def main(folder: Path = FILES, scheduler: str | None = None) -> None:
+    """Share the files among all workers, and print what each says."""
+    cluster = scheduler or LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)
+    paths = sorted(path.absolute() for path in folder.iterdir())
+    with Client(cluster) as client:
+        answers = client.gather(client.map(judge, paths))
+    for path, (_, text) in zip(paths, answers):
+        print(f'{path.name}: {text}')
+    print(f'{len(paths):,} plans, {sum(sound for sound, _ in answers):,} sound')
+
+
+if __name__ == '__main__':
+    main(*map(Path, sys.argv[1:2]), *sys.argv[2:3])
