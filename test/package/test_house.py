@@ -19,7 +19,7 @@ from patience import PATIENCE
 ROOT = Path(__file__).resolve().parents[2]
 NAME = 'box_contact_ros'
 ORDER = ('extras', 'resources', 'core', 'solver', 'models', 'forces', 'scene', 'stream',
-         'plans', 'arguments', 'processes', 'node', 'bench', 'demo', 'view')
+         'arguments', 'processes', 'plans', 'node', 'bench', 'demo', 'view')
 """A folder, or module of the root, imports only itself and those before it."""
 OUTSIDE = ('benchmarks', 'training')
 HEADER = ('Copyright 2026 The box_contact_ros maintainers', 'SPDX-License-Identifier: Apache-2.0')

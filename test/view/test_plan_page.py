@@ -94,7 +94,7 @@ def test_the_page_in_a_browser(found, is_busy, tmp_path):
     image = pytest.importorskip('PIL.Image')
     with closing(PlanPage('127.0.0.1', 8470, 'ship.edi', found)) as page, (
             busy_loops() if is_busy else closing(open(os.devnull))), open_page(page.url) as tab:
-        tab.wait_for('document.getElementById("verdict")')
+        tab.wait_for('document.getElementById("verdict") !== null')
         assert tab.text('verdict').endswith(': not sound') and tab.text('file') == 'ship.edi'
         assert 'unsupported           0100304' in tab.text('rows')
         assert 'unsupported (1)' in tab.text('legend')
