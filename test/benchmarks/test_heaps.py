@@ -21,6 +21,15 @@ def test_a_sample_has_no_fault(capsys: pytest.CaptureFixture[str]) -> None:
     assert words.startswith('150 heaps, ') and int(words.split()[2]) < 5, words
 
 
+@pytest.mark.parametrize('number', [1311, 2135, 3344, 4287, 6064, 6604, 7281, 7986, 9284])
+def test_heaps_that_exploded(number: int) -> None:
+    """To 3e189 times their first energy: a free needle at 167 rad/s left a step at 12,632 rad/s.
+
+    Its energy went to the axis of least inertia, and its angular momentum was lost.
+    """
+    assert heaps.examine(1, number).fault == ''
+
+
 def test_heaps_are_as_wide_as_is_said() -> None:
     """Sizes, aspects, ratios of mass and steps come near their limits, and boxes stand flush."""
     drawn = [heaps.Heap.draw(SEED, number) for number in range(500)]
