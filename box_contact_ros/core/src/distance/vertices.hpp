@@ -162,10 +162,10 @@ BC_INLINE NearestPoints<T> try_vertices(const Pair<T>& pair) {
   Vertex<T> of_b = nearest_vertex(a), of_a = nearest_vertex(b);
   Triple<T> from_b = a.bring(of_b.place), from_a = b.bring(of_a.place);
   Triple<T> on_a = clamp(from_b, pair.half_a), on_b = clamp(from_a, pair.half_b);
-  NearestPoints<T> found{sqrt(of_b.distance2), on_a, of_b.place, from_b - on_a};
-  found.take(of_a.distance2 < of_b.distance2,
-             {sqrt(of_a.distance2), of_a.place, on_b, pair.b_in_a * (on_b - from_a)});
-  return found;
+  Mask<T> of_a_is_nearer = of_a.distance2 < of_b.distance2;
+  return {sqrt(min(of_a.distance2, of_b.distance2)), select(of_a_is_nearer, of_a.place, on_a),
+          select(of_a_is_nearer, on_b, of_b.place),
+          select(of_a_is_nearer, pair.b_in_a * (on_b - from_a), Triple<T>(from_b - on_a))};
 }
 
 }  // namespace apart
