@@ -189,9 +189,9 @@ class PatchForces:
         iterations: of sequential impulses in a sub-step, at most.
         relaxations: further iterations, which remove the speed of pushing out.
         threads: at most. They change no bit.
-        most_depth: how deep what rests may be [m], where a load is large for the lighter body. With
-        contacts of one's own, its island makes up to 64 times as many sub-steps. `loads` tells where
-        that is not enough.
+        most_depth: how deep what rests may be [m], where a load is large for the lighter body.
+        With contacts of one's own, its island makes up to 64 times as many sub-steps. `loads`
+        tells where that is not enough.
         substeps, iterations and relaxations may be 1,000 each.
         ValueError: names the field and its value.
         """

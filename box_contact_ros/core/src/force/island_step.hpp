@@ -70,6 +70,10 @@ class IslandStep {
 
   void advance(const Island& island) const {
     for (size_t k = island.body; k < island.body_end; ++k) begin(moving_[k]);
+    if (island.block == island.block_end) {
+      for (size_t k = island.body; k < island.body_end; ++k) fly(moving_[k]);
+      return;
+    }
     for (size_t k = island.block; k < island.block_end; ++k)
       blocks_[k].normal_sum = blocks_[k].friction_sum = {};
     int factor = step_.own ? fineness_of_(island, step_.steps, fineness_) : 1;
@@ -147,6 +151,28 @@ class IslandStep {
     moving.angular_impulse = moving.placed.axes * (transposed_times(moving.placed.axes, calmer) /
                                                    bodies_[k].inverse_inertia);
   }
+  // Move a body that nothing touches.
+  void fly(Moving& moving) const {
+    const Body& body = bodies_[size_t(moving.body)];
+    double h = step_.steps.length;
+    Vec<double> ones{1.0, 1.0, 1.0}, inertia = ones / body.inverse_inertia;
+    Vec<double> momentum =
+        inertia * transposed_times(moving.placed.axes, moving.angular);  // in its own frame
+    for (int number = 1; number <= step_.steps.count; ++number) {
+      if (step_.outside) {
+        const bc_wrench& outside = step_.outside[moving.body];
+        moving.linear += (h * body.inverse_mass) * vector(outside.force);
+        momentum += h * transposed_times(moving.placed.axes, vector(outside.torque));
+      }
+      moving.placed.position += h * moving.linear;
+      if (dot(momentum, momentum) == 0.0) continue;
+      tumble(body, h, moving.quaternion, momentum);
+      moving.placed.axes = rotation_matrix(moving.quaternion);
+    }
+    moving.angular = moving.placed.axes * (momentum * body.inverse_inertia);
+    moving.pushed = {moving.linear, moving.angular};
+  }
+
   // Solve the contacts of an island anew, where its bodies are within the advance.
   void ask_again(const Island& island) const {
     for (size_t k = island.block; k < island.block_end; ++k) {

@@ -159,4 +159,59 @@ inline Vec<double> gyroscopic_change(const Body& body, const Vec<double>& angula
   return found > 0.0 ? std::sqrt(energy / found) * after - angular : change;
 }
 
+// A body that nothing touches turns by no more than this at a time [rad], and so often at most: its energy
+// then swings by 4e-5, before it is put right.
+constexpr double turn_limit = 0.05;
+constexpr int turns_max = 1000;
+
+// Turn a body with the quaternion q by t = tan(θ / 2) about its own axis x.
+inline void turn_about(int x, double t, double (&q)[4]) {
+  int y = (x + 1) % 3, z = (x + 2) % 3;
+  double w = q[3], at_x = q[x], at_y = q[y], at_z = q[z], norm = 1.0 / std::sqrt(1.0 + t * t);
+  q[x] = norm * (at_x + t * w);
+  q[3] = norm * (w - t * at_x);
+  q[y] = norm * (at_y + t * at_z);
+  q[z] = norm * (at_z - t * at_y);
+}
+
+// Put twice the kinetic energy right. The body turns a little under its angular momentum, which stays.
+inline void keep_energy(const Body& body, double energy, double (&q)[4], Vec<double>& momentum) {
+  Vec<double> speed = momentum * body.inverse_inertia;
+  double squared = dot(momentum, momentum), found = dot(momentum, speed);
+  Vec<double> across = speed - (found / squared) * momentum;
+  double slope = 2.0 * dot(across, speed);
+  if (!(slope > 0.0) || !(std::fabs(found - energy) < turn_limit * energy)) return;
+  Vec<double> turned = momentum - ((found - energy) / slope) * across;
+  turned = std::sqrt(squared / dot(turned, turned)) * turned;
+  Vec<double> half = (0.5 / squared) * cross(turned, momentum);
+  double w = q[3], norm = 1.0 / std::sqrt(1.0 + dot(half, half));
+  Vec<double> v = vector_at(q), after = norm * ((v + w * half) + cross(v, half));
+  q[3] = norm * (w - dot(v, half));
+  std::copy_n(after.v, 3, q);
+  momentum = turned;
+}
+
+// Turn a body that nothing touches for a time h: about each of its own axes in turn, there and back
+// (Dullweber, Leimkuhler and McLachlan, "Symplectic splitting methods for rigid body molecular dynamics",
+// 1997). Its angular momentum in the common frame stays the same to rounding, and so does its energy.
+// `momentum`: in its own frame.
+inline void tumble(const Body& body, double h, double (&q)[4], Vec<double>& momentum) {
+  Vec<double> speed = momentum * body.inverse_inertia;
+  double energy = dot(momentum, speed);
+  double turns = std::ceil(std::min(length(speed) * h / turn_limit, double(turns_max)));
+  constexpr int axes[] = {0, 1, 2, 1, 0};
+  for (int k = int(turns); k-- > 0;)
+    for (int step = 0; step < 5; ++step) {
+      int x = axes[step], y = (x + 1) % 3, z = (x + 2) % 3;
+      double angle = (step == 2 ? 1.0 : 0.5) * (h / turns) * momentum[x] * body.inverse_inertia[x];
+      double half = 0.5 * angle, t = half + half * half * half / 3.0;  // tan(angle / 2)
+      double scale = 1.0 / (1.0 + t * t), cosine = scale * (1.0 - t * t), sine = 2.0 * scale * t;
+      double along_y = momentum[y], along_z = momentum[z];
+      momentum[y] = cosine * along_y + sine * along_z;
+      momentum[z] = cosine * along_z - sine * along_y;
+      turn_about(x, t, q);
+    }
+  for (int newton = 0; newton < 2; ++newton) keep_energy(body, energy, q, momentum);
+}
+
 }  // namespace box_contact::BOX_CONTACT_SET::force
