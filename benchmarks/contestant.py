@@ -39,9 +39,9 @@ MODELS = ('exact', 'mlp', 'paper', *(f'soup-{n}' for n in (1, 8, 10, 12, 14, 16,
 CORE_MODELS = ('exact', 'mlp')
 """Models in C++ with volume and covariance: each instruction set of the machine is measured."""
 WEIGHTS = resource_path('weights', 'mlp.safetensors').parent
-MLP_SIZES = sorted((path.stem for path in WEIGHTS.glob('mlp-*.safetensors')),
-                   key=lambda name: [int(units) for units in name.split('-')[1:]])
-"""Other sizes of the network of `mlp` that are shipped, by their weights files."""
+OTHER_WEIGHTS = Path(__file__).with_name('weights')
+MLP_SIZES = {path.stem: path for path in sorted(OTHER_WEIGHTS.glob('mlp-*.safetensors'))}
+"""Weights files of other sizes of the network of `mlp`, by name: `python -m training --hidden`."""
 AT_REST = Path(__file__).with_name('paper') / 'weights' / 'paper-at-rest.safetensors'
 """Weights of `paper` for cubes that lie on each other: `python -m training paper --scene`."""
 ENDING = 5.0  # time that a subprocess has to end after its answer [s]
@@ -196,8 +196,7 @@ def linear_mlp() -> native.Mlp:
 def other_networks() -> list[Contestant]:
     """Return `mlp` by other sizes, linear and idle, and `paper` by weights for other scenes."""
     place = WEIGHTS / 'paper-12.192x2.438x2.591-place.safetensors'
-    return [*(ours('mlp', weights=str(WEIGHTS / f'{name}.safetensors'), name=name)
-              for name in MLP_SIZES),
+    return [*(ours('mlp', weights=str(path), name=name) for name, path in MLP_SIZES.items()),
             ours(linear_mlp(), name='mlp, linear'),
             ours(idle_mlp(), name='mlp, idle'),
             ours('paper', weights=str(place), name='paper-place'),

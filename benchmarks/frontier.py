@@ -71,8 +71,8 @@ CALLS = {'exact': ('exact', 'exact', 0), 'mlp': ('mlp', 'mlp', 12),
          'PyBullet getContactPoints': ('Bullet', 'Bullet', 0),
          'Coal ComputeCollision, contact patch': ('Coal', 'Coal', 9),
          'Drake hydroelastic': ('Drake', 'Drake', 0)}
-BATCHES = {'exact': ('exact', 'exact', 0), 'mlp-8-8': ('mlp, 8-8', 'mlp', 10),
-           'mlp-16-16': ('16-16', 'mlp', 2), 'mlp': ('32-32', 'mlp', -8),
+BATCHES = {'exact': ('exact', 'exact', 0), 'mlp-16-16': ('mlp, 16-16', 'mlp', 2),
+           'mlp': ('32-32', 'mlp', -8),
            'mlp, linear': ('linear map', 'other', 0),
            'mlp, idle': ('last layer zeroed', 'other', 0),
            'paper': ('paper', 'paper', 0)}

@@ -164,8 +164,7 @@ def networks_for(pairs: Pairs) -> bytes:
 
     They are the other sizes of `mlp`, and the paper's where both boxes have a size that it knows.
     """
-    networks = {name: mlp_numbers(resource_path('weights', f'{name}.safetensors'))
-                for name in MLP_SIZES}
+    networks = {name: mlp_numbers(path) for name, path in MLP_SIZES.items()}
     for name in SHIPPED_PAPERS:
         paper = PaperWeights(load_weights(resource_path('weights', f'{name}.safetensors')))
         if paper.fits(pairs.size_a, pairs.size_b).all():

@@ -4,7 +4,7 @@
 """Make the data, fit the networks, write the weights files with their model cards.
 
 mlp                      any two boxes; the default
-mlp --sizes              the other sizes of its network that are shipped
+mlp --hidden 16 16       another size of its network, for reports
 paper                    two boxes of edge 2 that just touch, as the paper draws them
 paper --scene NAME       two equal boxes in the poses of a scene
 paper-…, table-1-…       what only the tables of benchmarks.paper need
@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from benchmarks.contestant import OTHER_WEIGHTS
 from benchmarks.output import QUICK_RESULTS, make_folder, report_parser
 from benchmarks.paper import jobs
 from box_contact_ros.arguments import within
@@ -64,8 +65,6 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--hidden', type=within(1, UNITS_MAX), nargs=2, metavar='UNITS',
                         help=f'units of the hidden layers of mlp (default: {recipe.HIDDEN[0]} '
                         f'{recipe.HIDDEN[1]}), named in the file')
-    parser.add_argument('--sizes', action='store_const', const=recipe.SIZES,
-                        help='mlp with each of the other sizes of its hidden layers')
     parser.add_argument('--scene', choices=paper.SCENES,
                         help='pose set that paper is trained for; one of cubes needs --out')
     parser.add_argument('--output', choices=tuple(paper.SETTINGS), default=paper.ANGLES,
@@ -110,7 +109,8 @@ def _print(path: Path, card: dict[str, Any]) -> None:
 def _train_mlp(options: argparse.Namespace, hidden: tuple[int, int] | None = None) -> None:
     """Train the shipped network, or one of other hidden layers."""
     name = '-'.join((MLP, *map(str, hidden or ())))
-    path = (options.out or jobs.SHIPPED) / f'{name}.safetensors'
+    folder = options.out or (OTHER_WEIGHTS if hidden else jobs.SHIPPED)
+    path = folder / f'{name}.safetensors'
     card = recipe.train(path, seed=options.seed, commit=_commit(), quick=options.quick,
                         hidden=hidden or recipe.HIDDEN)
     _print(path, card)
@@ -144,8 +144,7 @@ def main(args: Sequence[str] | None = None) -> int:
     torch.set_num_threads(1)  # matrices this small gain nothing from more
     for name in dict.fromkeys(options.what):
         if name == MLP:
-            for hidden in options.sizes or [options.hidden and tuple(options.hidden)]:
-                _train_mlp(options, hidden)
+            _train_mlp(options, options.hidden and tuple(options.hidden))
         elif options.scene:
             _train_scene(options)
         else:

@@ -41,8 +41,6 @@ FEATURE_NAMES = ('cuts along x, y, z', 'depths of cuts', 'their squares',
 """Features of a contact (core/src/mlp/patch_box.hpp)."""
 HIDDEN = (32, 32)
 """Units of both hidden layers."""
-SIZES = ((8, 8), (16, 16))
-"""The other sizes that are shipped: less time, larger errors."""
 HARD_START, HARD_COUNT = 200_000, 3_000
 """Pairs drawn for each search, which climbs from the HARD_COUNT worst."""
 HARD_SHARE = 30  # contacts that are drawn for each one that a search has found

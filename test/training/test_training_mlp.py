@@ -129,8 +129,8 @@ def test_quick_training(quick: Path, data: MlpSamples) -> None:
     assert loss_of(one) < loss_of(other)
 
 
-def test_other_sizes_go_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each under its own name, and the compiled-in weights stay as they are."""
+def test_another_size_goes_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Under its own name, and the compiled-in weights stay as they are."""
     trained: dict[str, tuple[int, int]] = {}
 
     def train_one(path: Path, *, hidden: tuple[int, int], **_: object) -> dict[str, Any]:
@@ -139,10 +139,8 @@ def test_other_sizes_go_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         return {**SHIPPED.card, 'training': {'minutes': 0.0}}
 
     monkeypatch.setattr(recipe, 'train', train_one)
-    monkeypatch.setattr(train.jobs, 'SHIPPED', tmp_path)
+    monkeypatch.setattr(train, 'OTHER_WEIGHTS', tmp_path)
     monkeypatch.setattr(train, 'SHIPPED_HEADER', tmp_path / 'unwritten.hpp')
-    assert train.main(['mlp', '--sizes']) == 0
     assert train.main(['mlp', '--hidden', '3', '5']) == 0
-    assert trained == {**{f'mlp-{a}-{b}.safetensors': (a, b) for a, b in recipe.SIZES},
-                       'mlp-3-5.safetensors': (3, 5)}
+    assert trained == {'mlp-3-5.safetensors': (3, 5)}
     assert not list(tmp_path.iterdir())
