@@ -255,9 +255,11 @@ def test_by_find_package(tmp_path: Path) -> None:
                       re.M)
     assert found[1] == str(PREFIX / 'lib/cmake/box_contact_ros')
     assert example(tmp_path / 'first_contact') == EXAMPLE_SAYS
-    says = example(tmp_path / 'stack')
-    assert len(says) == 3
-    assert '\n'.join(f'//   {line}' for line in says) in (EXAMPLE / 'stack.cpp').read_text()
+    for name, lines in (('stack', 3), ('landing', 7)):
+        says = example(tmp_path / name)
+        assert len(says) == lines
+        text = (EXAMPLE / f'{name}.cpp').read_text()
+        assert '\n'.join(f'//   {line}' for line in says) in text
     version = metadata.version('box_contact_ros')
     (tmp_path / 'CMakeLists.txt').write_text(
         'cmake_minimum_required(VERSION 3.18)\nproject(one LANGUAGES CXX)\n'
