@@ -70,7 +70,15 @@ struct Block {
   Vec<double> normal_sum, friction_sum;  // of the sub-steps
 };
 
-inline double clamp(double x, double limit) { return std::max(-limit, std::min(limit, x)); }
+// Rocking whose centre of pressure is within the spans: N·n at x·e1 + y·e2 has the moment
+// N·(y·e1 − x·e2).
+inline double clamp(double x, double low, double high) { return std::max(low, std::min(high, x)); }
+inline double bounded_1(const Rectangle& shape, double normal, double rocking) {
+  return clamp(rocking, normal * shape.span_2.low, normal * shape.span_2.high);
+}
+inline double bounded_2(const Rectangle& shape, double normal, double rocking) {
+  return clamp(rocking, -normal * shape.span_1.high, -normal * shape.span_1.low);
+}
 inline void bound(Vec<double>& impulses, double limit) {
   double squared = dot(impulses, impulses);
   if (squared > limit * limit) impulses = (limit / std::sqrt(squared)) * impulses;
@@ -220,8 +228,8 @@ inline void remember(const Patch& patch, const Block& block, Vec<double>& normal
   Vec<double> rocking = patch.rocking_impulse + cross(moved, patch.normal_impulse * patch.normal);
   double torsion = patch.torsion_impulse + dot(patch.normal, cross(moved, patch.friction_impulse));
   normal = {patch.normal_impulse,
-            clamp(dot(rocking, shape.axis_1), patch.normal_impulse * shape.half_2),
-            clamp(dot(rocking, shape.axis_2), patch.normal_impulse * shape.half_1)};
+            bounded_1(shape, patch.normal_impulse, dot(rocking, shape.axis_1)),
+            bounded_2(shape, patch.normal_impulse, dot(rocking, shape.axis_2))};
   friction = {dot(patch.friction_impulse, shape.axis_1), dot(patch.friction_impulse, shape.axis_2),
               shape.radius > 0.0 ? torsion / shape.radius : 0.0};
   bound(friction, block.friction * normal[0]);
@@ -294,8 +302,8 @@ inline double solve_normal(Block& block, const NormalRows& rows, Moving& a, Movi
            rows.bias + rows.softness * block.normal_impulses;
   };
   Vec<double> v = error(), next = block.normal_impulses - mass * v;
-  double limit_1 = next[0] * block.shape.half_2, limit_2 = next[0] * block.shape.half_1;
-  if (!(std::fabs(next[1]) <= limit_1 && std::fabs(next[2]) <= limit_2)) {
+  if (!(bounded_1(block.shape, next[0], next[1]) == next[1] &&
+        bounded_2(block.shape, next[0], next[2]) == next[2])) {
     // The pressure would be negative at the rim: row by row, within the limits.
     double alone = 1.0 / (block.normal_compliance + rows.softness[0]);
     next = {std::max(0.0, block.normal_impulses[0] - alone * v[0]), block.normal_impulses[1],
@@ -303,8 +311,8 @@ inline double solve_normal(Block& block, const NormalRows& rows, Moving& a, Movi
     apply_normal(block, next - block.normal_impulses, a, b);
     block.normal_impulses = next;
     v = error();
-    next[1] = clamp(next[1] - mass[1][1] * v[1], next[0] * block.shape.half_2);
-    next[2] = clamp(next[2] - mass[2][2] * v[2], next[0] * block.shape.half_1);
+    next[1] = bounded_1(block.shape, next[0], next[1] - mass[1][1] * v[1]);
+    next[2] = bounded_2(block.shape, next[0], next[2] - mass[2][2] * v[2]);
   }
   apply_normal(block, next - block.normal_impulses, a, b);
   block.normal_impulses = next;

@@ -15,7 +15,7 @@
 #include <limits>
 #include <utility>
 
-#include "rigid_body.hpp"
+#include "rectangle.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
@@ -86,6 +86,11 @@ struct Face {
   Vec<double> centre, outward, half_1, half_2;
 
   double area() const { return 4.0 * length(half_1) * length(half_2); }
+  Span span_along(const Vec<double>& axis) const {
+    double middle = dot(centre, axis);
+    double half = std::fabs(dot(half_1, axis)) + std::fabs(dot(half_2, axis));
+    return {middle - half, middle + half};
+  }
 };
 
 // The face of a box most along a direction.

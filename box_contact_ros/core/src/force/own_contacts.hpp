@@ -84,6 +84,7 @@ class OwnContacts {
     placed.place(at_a, at_b, vector(found.normal), found.point, found.covariance[0], found.volume,
                  found.separation,
                  [&] { return rotation_matrix((is_lighter_b ? pose_b : pose_a).quaternion); });
+    placed.end_at_rim(pose_a, a.box.size, pose_b, b.box.size);
     if (placed.has_area()) patch = placed;
   }
 

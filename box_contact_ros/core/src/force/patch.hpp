@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "../../include/box_contact/force.h"
-#include "rectangle.hpp"
+#include "faces.hpp"
 #include "rigid_body.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
@@ -53,6 +53,17 @@ struct Patch {
     shape = rectangle_of(normal, covariance, box_axes);
     // Of the mere touch on a large floor, whose volume is that of a box pressed in to 1e-9 of the size.
     depth = std::min(volume / (4.0 * shape.half_1 * shape.half_2), -separation);
+  }
+
+  // Nothing presses beyond the rim of a face. The rectangle of a wedge reaches there: a box would
+  // tip late, and one whose middle is beyond an edge would stay.
+  void end_at_rim(const bc_pose& pose_a, const bc_size& size_a, const bc_pose& pose_b,
+                  const bc_size& size_b) {
+    for (const Face& face : {face_along(pose_a, size_a, point, normal),
+                             face_along(pose_b, size_b, point, -normal)}) {
+      shape.span_1 = shape.span_1.within(face.span_along(shape.axis_1));
+      shape.span_2 = shape.span_2.within(face.span_along(shape.axis_2));
+    }
   }
 
   // Whether area and depth are numbers: what no limit of an answer alone makes sure of.

@@ -9,7 +9,7 @@
 // constrain the velocity of B relative to A:
 //
 //     pressing  N  along n at c            N ≥ 0
-//     rocking   τ  about the axes 1 and 2  |τ1| ≤ N·l2, |τ2| ≤ N·l1: no pressure is negative
+//     rocking   τ  about the axes 1 and 2  the centre of N in the rectangle and on both faces
 //     friction  f  in the plane at c       |f|² + (m/r)² ≤ (μ·N)²
 //     torsion   m  about n                 r: the radius at which friction resists a spin
 //
@@ -285,6 +285,11 @@ class PatchForces {
                   bool is_b = is_lighter_b(bodies_, patch);
                   return axes_of(is_b ? patch.box_b : patch.box_a, poses[is_b ? patch.b : patch.a]);
                 });
+    if (!boxes().empty()) {
+      const bc_body_box &of_a = boxes()[size_t(patch.box_a)], &of_b = boxes()[size_t(patch.box_b)];
+      patch.end_at_rim(in_common_frame(poses[patch.a], of_a.box.pose), of_a.box.size,
+                       in_common_frame(poses[patch.b], of_b.box.pose), of_b.box.size);
+    }
     patch.friction = answer.friction ? answer.friction[k] : options_.friction;
     patch.stiffness = answer.stiffness ? answer.stiffness[k] : 0.0;
     if (answer.surface) patch.surface = sign * vector_at(answer.surface + 3 * k);

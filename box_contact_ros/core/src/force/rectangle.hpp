@@ -49,10 +49,20 @@ inline bool is_covariance(const double* c) {
   return xx > 0.0 && yy > 0.0 && zz > 0.0;
 }
 
+// From where to where along an axis, with 0 within [m].
+struct Span {
+  double low, high;
+
+  Span within(const Span& other) const {
+    return {std::min(0.0, std::max(low, other.low)), std::max(0.0, std::min(high, other.high))};
+  }
+};
+
 struct Rectangle {
   Vec<double> axis_1, axis_2;  // along its sides; with the normal a right-handed frame
   double half_1, half_2;       // half lengths along them [m]
   double radius;               // at which friction resists a spin [m]
+  Span span_1, span_2;         // where the centre of pressure may be along the axes [m]
 
   bool has_area() const {
     return half_1 > 0.0 && half_2 > 0.0 && half_1 <= place_max && half_2 <= place_max;
@@ -97,8 +107,14 @@ Rectangle rectangle_of(const Vec<double>& normal, const double* covariance,
   double e2 = std::max(mean - spread, thinnest * thinnest * e1);
   double squareness = e1 > 0.0 ? 2.0 * std::sqrt(e1 * e2) / (e1 + e2) : 1.0;
   double radius = radius_of_line + (radius_of_square - radius_of_line) * squareness;
-  return {axis_1, cross(normal, axis_1), std::sqrt(3.0 * e1), std::sqrt(3.0 * e2),
-          torsion_share * radius * std::sqrt(e1 + e2)};
+  double half_1 = std::sqrt(3.0 * e1), half_2 = std::sqrt(3.0 * e2);
+  return {axis_1,
+          cross(normal, axis_1),
+          half_1,
+          half_2,
+          torsion_share * radius * std::sqrt(e1 + e2),
+          {-half_1, half_1},
+          {-half_2, half_2}};
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET::force
