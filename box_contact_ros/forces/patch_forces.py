@@ -143,6 +143,8 @@ class Loads(NamedTuple):
     """What each contact carried, the mean over the last step: a row for each pair of boxes.
 
     Forces are those on box B; A gets the opposite. All is zero where nothing presses.
+    With `set_boxes`, the patches of two bodies share as rubber pads do. All bodies of mass 0 are
+    one support.
     """
 
     pairs: np.ndarray

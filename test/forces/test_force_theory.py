@@ -251,6 +251,35 @@ def test_the_loads_of_three_feet(dt: float) -> None:
     assert forces.loads().pressing / (56.0 * GRAVITY) == pytest.approx(statics, rel=0.03)
 
 
+@pytest.mark.parametrize('dt', [STEP, 1 / 120, FRAME])
+def test_two_pads_share_as_rubber_ones(dt: float) -> None:
+    """N = W/2 ∓ W·x·c / 2(c² + L²/12): pads of length L at ±c, the centre of mass at x; 1 ‰.
+
+    On a floor, and by the beam's one box on two fixed boxes. Corner loads add up to each load.
+    """
+    weight, aside, at, long = 70.0 * GRAVITY, 0.3, 0.8, 0.4
+    shift = aside * at / (2.0 * (at**2 + long**2 / 12.0))
+    pads = [((long, 0.5, 0.2), (side * at, 0, 0.1)) for side in (-1.0, 1.0)]
+    beam, inertia = ((2.4, 0.5, 0.1), (0, 0, 0.25)), (5.0, 7.0, 11.0)
+    upright = (0.0, 0.0, 0.0, 1.0)
+    for body in ((0, 1, 1, 1), (0, 0, 0, 1)):  # whose the floor, the pads and the beam are
+        boxes = [(FLOOR[0], FLOOR[2]), *pads, beam]
+        forces = PatchForces([FIXED, Body(mass=70.0, inertia=inertia, centre=(aside, 0, 0.25))])
+        forces.set_boxes([size for size, _ in boxes], body=body,
+                         poses=[(*place, *upright) for _, place in boxes])
+        forces.hold([(0, 1), (0, 2)] if body[1] else [(1, 3), (2, 3)])
+        poses, velocities, outside = np.zeros((2, 7)), *np.zeros((2, 2, 6))
+        poses[:, 6], outside[1, 2] = 1.0, -weight
+        for _ in range(round(2.0 / dt)):
+            poses, velocities, _ = forces.advance(dt, poses, velocities, outside)
+        loads = forces.loads()
+        assert loads.pressing / weight == pytest.approx([0.5 - shift, 0.5 + shift], rel=1e-3)
+        assert loads.pressing.sum() == pytest.approx(weight, rel=1e-9)
+        assert loads.corner_loads.sum(axis=1) == pytest.approx(loads.pressing, rel=1e-12)
+        middle = loads.pressing @ loads.centre / weight
+        assert middle[:2] == pytest.approx([aside, 0.0], abs=2e-5)  # it leans by 3e-5 rad
+
+
 def test_the_force_of_a_belt_on_a_dam() -> None:
     """Ten parcels of 8 kg on a belt: the dam takes μ·m·g of each, 392.4 N.
 

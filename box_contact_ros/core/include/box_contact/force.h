@@ -102,7 +102,9 @@ typedef struct bc_motion {
 } bc_motion;
 
 /* What the contact of two boxes carried: the mean over the last advance, after relaxation. All forces
- * are those on box B; A gets the opposite. All is zero where nothing presses. */
+ * are those on box B; A gets the opposite. All is zero where nothing presses. With
+ * bc_patch_forces_set_boxes, the patches of two bodies share as rubber pads do. All bodies of mass 0 are
+ * one support. */
 typedef struct bc_load {
   int64_t box_a, box_b;
   double pressing;        /* along the normal, from A to B [N] */

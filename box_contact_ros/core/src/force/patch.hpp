@@ -59,8 +59,8 @@ struct Patch {
   // tip late, and one whose middle is beyond an edge would stay.
   void end_at_rim(const bc_pose& pose_a, const bc_size& size_a, const bc_pose& pose_b,
                   const bc_size& size_b) {
-    for (const Face& face : {face_along(pose_a, size_a, point, normal),
-                             face_along(pose_b, size_b, point, -normal)}) {
+    for (const Face& face :
+         {face_along(pose_a, size_a, point, normal), face_along(pose_b, size_b, point, -normal)}) {
       shape.span_1 = shape.span_1.within(face.span_along(shape.axis_1));
       shape.span_2 = shape.span_2.within(face.span_along(shape.axis_2));
     }

@@ -29,6 +29,7 @@
 #include "faces.hpp"
 #include "island_step.hpp"
 #include "own_contacts.hpp"
+#include "pads.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
@@ -57,23 +58,31 @@ class PatchForces {
   const std::vector<Body>& bodies() const { return bodies_; }
   const std::vector<bc_body_box>& boxes() const { return own_.boxes(); }
   size_t load_count() const { return loads_.size(); }
-  // What a pair carried in the last advance. With boxes, its corners are those of the faces.
-  bc_load load(size_t k) const {
-    bc_load load = loads_[k].over(clock_.advance());
-    if (boxes().empty() || !(load.pressing > 0.0)) return load;
-    const bc_body_box &a = boxes()[size_t(load.box_a)], &b = boxes()[size_t(load.box_b)];
-    FacePatch patch =
-        patch_of_faces(in_common_frame(poses_[size_t(a.body)], a.box.pose), a.box.size,
-                       in_common_frame(poses_[size_t(b.body)], b.box.pose), b.box.size,
-                       loads_[k].normal, face_tolerance);
-    if (patch.polygon.count == 0) return load;
-    auto corners = patch.rectangle();
-    auto shares = corner_shares(corners, patch.flat(vector(load.centre) - patch.origin));
-    for (size_t c = 0; c < 4; ++c) {
-      load.corner_loads[c] = shares[c] * load.pressing;
-      std::copy_n(patch.level(corners[c]).v, 3, load.corners[c]);
+  // Write what each pair carried in the last advance. With boxes, corners are those of the faces, and
+  // the pads of two bodies share as rubber ones do.
+  void write_loads(bc_load* loads) const {
+    for (size_t k = 0; k < loads_.size(); ++k) loads[k] = loads_[k].over(clock_.advance());
+    if (boxes().empty()) return;
+    std::vector<Pad> pads(loads_.size());
+    std::vector<std::pair<BoxPair, size_t>> pressed;  // by the bodies
+    for (size_t k = 0; k < loads_.size(); ++k) {
+      if (!(loads[k].pressing > 0.0)) continue;
+      const bc_body_box &a = boxes()[size_t(loads[k].box_a)], &b = boxes()[size_t(loads[k].box_b)];
+      pads[k] = {patch_of_faces(in_common_frame(poses_[size_t(a.body)], a.box.pose), a.box.size,
+                                in_common_frame(poses_[size_t(b.body)], b.box.pose), b.box.size,
+                                loads_[k].normal, face_tolerance),
+                 loads[k].pressing, vector(loads[k].centre)};
+      if (pads[k].faces.polygon.count == 0) continue;
+      pressed.push_back({std::minmax(support(a.body), support(b.body)), k});
     }
-    return load;
+    std::sort(pressed.begin(), pressed.end());
+    for (auto first = pressed.begin(), last = first; first != pressed.end(); first = last) {
+      std::vector<Pad*> together;
+      for (; last != pressed.end() && last->first == first->first; ++last)
+        if (pads[last->second].faces.area > 0.0) together.push_back(&pads[last->second]);
+      if (together.size() > 1) share_by_normal(std::move(together));
+    }
+    for (const auto& [bodies, k] : pressed) write(pads[k], loads[k]);
   }
   int threads() const { return options_.threads; }
   int64_t box_count() const { return int64_t(boxes().empty() ? bodies_.size() : boxes().size()); }
@@ -193,6 +202,21 @@ class PatchForces {
   }
 
  private:
+  // All that no force moves is one support.
+  int32_t support(int64_t body) const {
+    return bodies_[size_t(body)].is_free() ? int32_t(body) : -1;
+  }
+  static void write(const Pad& pad, bc_load& load) {
+    auto corners = pad.faces.rectangle();
+    auto shares = corner_shares(corners, pad.faces.flat(pad.centre - pad.faces.origin));
+    load.pressing = pad.pressing;
+    std::copy_n(pad.centre.v, 3, load.centre);
+    for (size_t c = 0; c < 4; ++c) {
+      load.corner_loads[c] = shares[c] * load.pressing;
+      std::copy_n(pad.faces.level(corners[c]).v, 3, load.corners[c]);
+    }
+  }
+
   // How far apart the boxes of a pair may be at the start of a step and be a constraint in it [m]: what
   // the outside wrenches would fall. A gap would else cost each box of a stack a step of free fall.
   double reach(int32_t box_a, int32_t box_b, const Vec<double>& normal, double dt,

@@ -363,8 +363,11 @@ int64_t bc_patch_forces_loads(const bc_patch_forces* forces, bc_load* loads, int
   const PatchForces& self = forces_of(forces);
   auto count = int64_t(self.load_count());
   if (!loads || capacity < count) return count;
-  for (int64_t k = 0; k < count; ++k) loads[k] = self.load(size_t(k));
-  return count;
+  bc_status status = guarded([&] {
+    self.write_loads(loads);
+    return BC_OK;
+  });
+  return status == BC_OK ? count : 0;
 }
 
 }  // extern "C"
