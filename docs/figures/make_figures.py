@@ -7,7 +7,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import math
-import re
 import runpy
 from pathlib import Path
 
@@ -107,12 +106,10 @@ def slide(axes: plt.Axes) -> None:
 
 
 def first_contact(folder: Path) -> None:
-    """Draw first_contact.png by the code that the tutorial shows."""
-    page = Path(__file__).parents[1].joinpath('tutorials', 'first_contact.md').read_text('utf-8')
-    code, = (block for block in re.findall(r'```python\n(.*?)```', page, re.DOTALL)
-             if 'savefig' in block)
+    """Draw first_contact.png by the example."""
+    example = runpy.run_path(str(Path(__file__).parents[1] / 'examples' / 'draw_contact.py'))
     with contextlib.chdir(folder):
-        exec(compile(code, 'first_contact.md', 'exec'), {})
+        example['main']()
 
 
 def plan_descent(folder: Path) -> None:

@@ -331,9 +331,7 @@ def test_python_example(text, lines, program, tmp_path, monkeypatch):
     """It runs, next to a node if a client, and prints what the page says."""
     monkeypatch.chdir(tmp_path)  # some write files
     if 'rclpy' in text:
-        scene = ['-p', f'scene:={ROOT}/config/scenes/yard_bay.yaml'] if 'crane/' in text else []
-        program('contact_node', '--ros-args', '-p', 'model:=exact', *scene).wait_for_output(
-            'ready')
+        program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready')
     with contextlib.redirect_stdout(io.StringIO()) as printed:
         exec(compile(text, 'example', 'exec'), {'__name__': 'example'})
     assert printed.getvalue().splitlines() == lines
