@@ -15,7 +15,7 @@ It prints:
     500 ms: 0.03 mm deep, 0.0 mm/s
     2000 ms: 0.03 mm deep, 0.0 mm/s
     force / weight 1.0000, slid 20 mm
-    corner loads 49.05 49.05 49.05 49.05 kN
+    corner loads 49.1 49.1 49.0 49.0 kN
 """
 import numpy as np
 import rclpy
@@ -54,7 +54,7 @@ def main() -> None:
                   f'{1e3 * np.linalg.norm(velocities):.1f} mm/s')
     print(f'force / weight {wrenches[0, 2] / (GRAVITY * MASS):.4f}, '
           f'slid {1e3 * poses[0, 0]:.0f} mm')
-    print('corner loads', *(f'{1e-3 * load:.2f}' for load in forces.loads().corner_loads[0]), 'kN')
+    print('corner loads', *(f'{1e-3 * load:.1f}' for load in forces.loads().corner_loads[0]), 'kN')
     rclpy.shutdown()
 
 
