@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import permutations
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -95,11 +96,12 @@ class Body:
         return cls(mass=mass, inertia=mass / 12.0 * (squares.sum() - squares))
 
     @classmethod
-    def of_boxes(cls, sizes: ArrayLike, poses: ArrayLike, masses: ArrayLike) -> Self:
+    def of_boxes(cls, sizes: ArrayLike, poses: ArrayLike, masses: ArrayLike) -> Assembly:
         """Return the body of boxes of one density each, fixed to each other.
 
-        sizes: full extents (m, 3) [m]. poses: (m, 7) in the body's frame. masses: (m,) [kg].
-        ValueError: names field and value; and where the body's axes are not principal.
+        sizes: full extents (m, 3) [m]. poses: (m, 7) in a frame of the boxes. masses: (m,) [kg].
+        The body's axes are principal: turned against that frame where need be, as for an L.
+        ValueError: names field and value.
         """
         size, pose = _as_rows(sizes, 'sizes', 3), _as_rows(poses, 'poses', 7)
         mass = _as_rows(masses, 'masses')
@@ -120,11 +122,26 @@ class Body:
         inertia = np.einsum('nij,nj,nkj->ik', axes, own, axes) + np.einsum(
             'n,nij->ij', mass, (arm**2).sum(axis=1)[:, None, None] * np.eye(3)
             - arm[:, :, None] * arm[:, None])
-        aside = np.abs(inertia - np.diag(np.diag(inertia))).max()
-        if aside > INERTIA_SLACK * inertia.max():
-            raise ValueError(f'the axes of the body are not principal: a product of inertia is '
-                             f'{aside:g} kg m²; turn its frame')
-        return cls(mass=float(mass.sum()), inertia=np.diag(inertia), centre=centre)
+        turn, own_poses = np.array([0.0, 0.0, 0.0, 1.0]), pose
+        if np.abs(inertia - np.diag(np.diag(inertia))).max() > INERTIA_SLACK * inertia.max():
+            principal = _principal_axes(inertia)
+            turn = _quaternion(principal)
+            inertia, centre = principal.T @ inertia @ principal, centre @ principal
+            own_poses = np.array([[*(row[:3] @ principal), *_quaternion(principal.T @ each)]
+                                  for row, each in zip(pose, axes)])
+        return Assembly(cls(mass=float(mass.sum()), inertia=np.diag(inertia), centre=centre),
+                        own_poses, turn)
+
+
+class Assembly(NamedTuple):
+    """A body of several boxes, and where they are in its frame."""
+
+    body: Body
+    """Its axes are principal."""
+    poses: np.ndarray
+    """(m, 7) of the boxes in the body's frame, as `PatchForces.set_boxes` takes them."""
+    turn: np.ndarray
+    """(4,) quaternion x y z w of the body's frame in that of the boxes; both have one origin."""
 
 
 class Motion(NamedTuple):
@@ -317,6 +334,29 @@ def _step(step: Callable[..., Any], dt: float, poses: ArrayLike, velocities: Arr
         return found
     return step(dt, _as_rows(poses, 'poses', 7), _as_rows(velocities, 'velocities', 6),
                 None if wrenches is None else _as_rows(wrenches, 'wrenches', 6))
+
+
+def _principal_axes(inertia: np.ndarray) -> np.ndarray:
+    """Return principal axes, near those of the frame, as the columns of a rotation (3, 3)."""
+    axes = np.linalg.eigh(inertia)[1]
+    orders = permutations(range(3))
+    axes = axes[:, max(orders, key=lambda order: np.abs(axes[range(3), order]).sum())]
+    axes = axes * np.where(np.diag(axes) < 0.0, -1.0, 1.0)
+    if np.linalg.det(axes) < 0.0:
+        axes[:, np.abs(np.diag(axes)).argmin()] *= -1.0
+    return axes
+
+
+def _quaternion(rotation: np.ndarray) -> np.ndarray:
+    """Return the quaternion x y z w of a rotation (3, 3)."""
+    # Four times the squares of the components; from the largest, the others by products of two.
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
+    products = np.array([[1.0 + xx - yy - zz, xy + yx, xz + zx, zy - yz],
+                         [xy + yx, 1.0 - xx + yy - zz, yz + zy, xz - zx],
+                         [xz + zx, yz + zy, 1.0 - xx - yy + zz, yx - xy],
+                         [zy - yz, xz - zx, yx - xy, 1.0 + xx + yy + zz]])
+    row = products[np.diag(products).argmax()]
+    return row / np.linalg.norm(row)
 
 
 def _columns(bodies: Sequence[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

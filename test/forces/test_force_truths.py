@@ -181,9 +181,53 @@ def test_a_body_of_boxes_has_their_moments() -> None:
     sizes, quarter = np.tile(size, (8, 1)), math.sqrt(0.5)
     sizes[0], poses[0, 3:] = size[[1, 0, 2]], (0, 0, quarter, quarter)
     poses[:, 0] += 0.7
-    body = Body.of_boxes(sizes, poses, [2500.0] * 8)
+    body, own_poses, turn = Body.of_boxes(sizes, poses, [2500.0] * 8)
+    assert np.array_equal(own_poses, poses) and turn.tolist() == [0, 0, 0, 1]
     assert body.mass == whole.mass and body.inertia == pytest.approx(whole.inertia, rel=1e-12)
     assert body.centre == pytest.approx([0.7, 0, 0], abs=1e-12)
+
+
+def gallows() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return sizes, poses and masses of a base, a post beside its middle, and an arm."""
+    return (np.array([(2, 1, 0.2), (0.2, 0.3, 2), (1.2, 0.2, 0.2)]),
+            np.array([[0.1, 0, 0.1, 0, 0, 0, 1], [-0.5, 0.2, 1.2, 0, 0, 0, 1],
+                      [0.2, 0.2, 2.3, *turned((0, 0, 1), 0.3)]]), np.array([80.0, 30.0, 15.0]))
+
+
+def test_a_body_that_is_lopsided_gets_principal_axes() -> None:
+    """Turned back, its moments are those of small cubes, and its boxes are where they were."""
+    sizes, poses, masses = gallows()
+    body, own, turn = Body.of_boxes(sizes, poses, masses)
+    axes = rotation_matrix(turn)
+    steps = (np.arange(24) + 0.5) / 24 - 0.5
+    grid, moments = np.array(list(product(steps, repeat=3))), np.zeros((3, 3))
+    for size, pose, mass in zip(sizes, poses, masses):
+        arms = (grid * size) @ rotation_matrix(pose[3:]).T + pose[:3] - axes @ body.centre
+        moments += mass / len(grid) * ((arms**2).sum() * np.eye(3) - arms.T @ arms)
+    assert axes @ np.diag(body.inertia) @ axes.T == pytest.approx(moments, abs=2e-3 * moments.max())
+    assert own[:, :3] @ axes.T == pytest.approx(poses[:, :3], abs=1e-12)
+    for row, pose in zip(own, poses):
+        back = axes @ rotation_matrix(row[3:])
+        assert back == pytest.approx(rotation_matrix(pose[3:]), abs=1e-12)
+    assert 0.9 < turn[3] < 1.0
+
+
+def test_a_gallows_stands() -> None:
+    """For 2 s at 1/60 s; its base carries all, with the centre of pressure below that of mass."""
+    sizes, poses, masses = gallows()
+    body, own, turn = Body.of_boxes(sizes, poses, masses)
+    forces = PatchForces([FIXED, body])
+    forces.set_boxes([FLOOR[0], *sizes], body=[0, 1, 1, 1], poses=[(0, 0, 0, 0, 0, 0, 1), *own])
+    forces.hold([(0, 1), (0, 2), (0, 3)])
+    at = np.array([[*FLOOR[2], 0, 0, 0, 1], [0, 0, 0, *turn]])
+    velocities, outside = np.zeros((2, 2, 6))
+    outside[1, 2] = -GRAVITY * body.mass
+    for _ in range(120):
+        at, velocities, _ = forces.advance(1 / 60, at, velocities, outside)
+    loads, middle = forces.loads(), masses @ poses[:, :3] / masses.sum()
+    assert np.abs(at[1, :3]).max() < 1e-3 and np.abs(velocities).max() < 1e-4
+    assert loads.pressing == pytest.approx([GRAVITY * body.mass], rel=1e-4)
+    assert loads.centre[0, :2] == pytest.approx(middle[:2], abs=1e-3)
 
 
 def test_two_boxes_land_as_one() -> None:

@@ -102,8 +102,6 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: Body.of_boxes([(1, 2, -1)], [POSE], [1.0]), 'sizes[0]', '(1, 2, -1)'),
     (lambda: Body.of_boxes([UNIT], [POSE * 0], [1.0]), 'poses[0]', 'w=0'),
     (lambda: Body.of_boxes([UNIT], [POSE], [0.0]), 'masses', '0.'),
-    (lambda: Body.of_boxes([UNIT] * 2, [POSE, POSE + [1, 1, 0, 0, 0, 0, 0]], [1.0] * 2),
-     'axes', '0.5 kg'),
     (lambda: PatchForces(None), 'bodies', 'None'),
     (lambda: PatchForces([BODY, 1]), 'bodies[1]', '1'),
     (lambda: PatchForces([], friction=-0.5), 'friction', '-0.5'),
