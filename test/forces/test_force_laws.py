@@ -404,6 +404,15 @@ def test_bodies_enter_leave_and_change_mass() -> None:
     assert found.shape == (2, 6) and found[1, 2] > 0.0
 
 
+def test_what_is_let_go_gets_no_push() -> None:
+    """A crane speeds a load up by its velocity, then gives it mass: no contact, no wrench."""
+    forces, at, outside = PatchForces([FIXED]), pose()[None], np.zeros((1, 6))
+    for speed in (0.0, 0.1, 0.2):
+        forces.wrenches(STEP, at, [[speed, 0, 0, 0, 0, 0]], outside)
+    forces.set_bodies([Body.of_box(CUBE, MASS)])
+    assert not forces.wrenches(STEP, at, [[0.2, 0, 0, 0, 0, 0]], outside).any()
+
+
 def test_a_kinematic_body_carries_along() -> None:
     """A lift that rises at 0.5 m/s pushes, and is not pushed."""
     world = World(pose(z=0.5)).run(50)

@@ -90,6 +90,9 @@ class PatchForces {
 
   // Change masses, add bodies at the end, or drop bodies there with their patches.
   void set_bodies(std::vector<Body> bodies) {
+    // What is let go, or gripped, has not ended an advance as what it is now.
+    for (size_t k = 0; k < std::min(bodies.size(), bodies_.size()); ++k)
+      if (bodies[k].is_free() != bodies_[k].is_free()) ended_[k] = {};
     bodies_ = std::move(bodies);
     ended_.resize(bodies_.size());
     fineness_.resize(bodies_.size());
