@@ -32,8 +32,7 @@ void add(const Poses& poses, size_t calls, const std::string& name, const Model&
   };
   bc_contact& contact = *new bc_contact;
   auto call = [=, &contact](size_t i) {
-    Counts counts{};
-    solve_pair(model, pair(i), 0.0, contact, counts);
+    solve_pair(model, pair(i), 0.0, contact);
     return contact.separation;
   };
   all.push_back(single(name, calls, call, [&contact] { return contact.separation; }));
@@ -50,8 +49,7 @@ void add(const Poses& poses, size_t calls, const std::string& name, const Model&
               3,
               3};
     Results results{colliding, separation, normal, point, volume, nullptr, nullptr, 0.0};
-    Counts counts{};
-    solve_rows<Lanes<double, lanes>>(model, rows, 0, long(n), results, counts);
+    solve_rows<Lanes<double, lanes>>(model, rows, 0, long(n), results);
   };
   all.push_back({name + ", batch", n, batch, [=](size_t i) {
                    if (i == 0) batch(0);
