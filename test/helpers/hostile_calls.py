@@ -53,7 +53,7 @@ def exact() -> Any:
 
 def forces(n: int = 2) -> Any:
     """Return the forces on n bodies of 1 kg."""
-    return native.PatchForces(np.ones(n), np.ones((n, 3)), np.zeros((n, 3)), 2, 5, 2, 1, 0.5)
+    return native.PatchForces(np.ones(n), np.ones((n, 3)), np.zeros((n, 3)), 2, 5, 2, 1, 0.5, 1e-3)
 
 
 def held(pairs: int = 1) -> list[Any]:
