@@ -56,18 +56,18 @@ class OwnContacts {
   }
 
   // Solve all pairs with the bodies at `poses`. `solve(rows, count, results)` answers rows, and returns
-  // the first that is refused, or −1; so does this. A pair apart by no more than `reach(a, b, normal)`
-  // [m], and by no more than `farthest`, gets the patch that it has once it touches, and keeps its
-  // separation above zero.
-  template <class Solve, class Reach>
-  long solve(const bc_pose* poses, double farthest, const Solve& solve, const Reach& reach) {
+  // the first that is refused, or −1; so does this. A pair apart by no more than `farthest` [m] for which
+  // `is_near(a, b, normal, apart)` gets the patch that it has once it touches, and keeps its separation
+  // above zero.
+  template <class Solve, class IsNear>
+  long solve(const bc_pose* poses, double farthest, const Solve& solve, const IsNear& is_near) {
     for (size_t k = 0; k < boxes_.size(); ++k)
       poses_[k] = in_common_frame(poses[boxes_[k].body], boxes_[k].box.pose);
     auto* numbers = reinterpret_cast<const double*>(poses_.data());
     auto* sizes = reinterpret_cast<const double*>(sizes_.data());
     detail::Rows rows{numbers, numbers, sizes, sizes, 3, 3, pairs_.data(), long(boxes_.size())};
     long refused = solve(rows, long(count()), found_.results(farthest));
-    return refused >= 0 ? refused : solve_near(solve, reach);
+    return refused >= 0 ? refused : solve_near(solve, is_near);
   }
   // Solve the pair of a patch anew, with its bodies at other places. A pair that is apart now keeps its
   // patch, which goes with the bodies.
@@ -164,15 +164,15 @@ class OwnContacts {
     found_.resize(n);
     near_.reserve(n);
   }
-  template <class Solve, class Reach>
-  long solve_near(const Solve& solve, const Reach& reach) {
+  template <class Solve, class IsNear>
+  long solve_near(const Solve& solve, const IsNear& is_near) {
     near_.clear();
     for (size_t k = 0; k < count(); ++k) {
       double apart = found_.separation[k];
       Vec<double> normal = vector_at(&found_.normal[3 * k]);
       if (!(apart > 0.0) || normal[0] != normal[0]) continue;  // in contact, or beyond the farthest
       auto a = size_t(pairs_[2 * k]), b = size_t(pairs_[2 * k + 1]);
-      if (apart <= reach(int32_t(a), int32_t(b), normal))
+      if (is_near(int32_t(a), int32_t(b), normal, apart))
         near_.add(k, poses_[a], poses_[b], sizes_[a], sizes_[b], -apart * normal);
     }
     if (near_.row.empty()) return -1;

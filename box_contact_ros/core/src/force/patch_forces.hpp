@@ -153,8 +153,8 @@ class PatchForces {
     held = Held::all;
     if (own_.count() == 0) return -1;
     long refused = own_.solve(poses, farthest(dt, outside), solve,
-                              [&](int32_t a, int32_t b, const Vec<double>& normal) {
-                                return reach(a, b, normal, dt, outside);
+                              [&](int32_t a, int32_t b, const Vec<double>& normal, double apart) {
+                                return is_near(a, b, normal, apart, dt, outside);
                               });
     if (refused < 0) held = take(own_.answer(), poses);
     return refused;
@@ -220,9 +220,9 @@ class PatchForces {
     }
   }
 
-  // How far apart the boxes of a pair may be at the start of a step and be a constraint in it [m]: what
-  // the outside wrenches would fall. A gap would else cost each box of a stack a step of free fall.
-  double reach(int32_t box_a, int32_t box_b, const Vec<double>& normal, double dt,
+  // Whether the boxes of a pair are a constraint in a step, though apart at its start: by no more than
+  // what the outside wrenches would fall. A gap would else cost each box of a stack a step of free fall.
+  bool is_near(int32_t box_a, int32_t box_b, const Vec<double>& normal, double apart, double dt,
                const bc_wrench* outside) const {
     auto pull = [&](int64_t box) {
       auto body = size_t(body_of(box));
@@ -230,8 +230,8 @@ class PatchForces {
                  ? std::fabs(dot(vector(outside[body].force), normal)) * bodies_[body].inverse_mass
                  : 0.0;
     };
-    return std::max(gap_share * dt * dt * std::max(pull(box_a), pull(box_b)),
-                    has_pressed(box_a, box_b) ? pressed_gap : 0.0);
+    return apart <= gap_share * dt * dt * std::max(pull(box_a), pull(box_b)) ||
+           (apart <= pressed_gap && has_pressed(box_a, box_b));
   }
   double farthest(double dt, const bc_wrench* outside) const {
     double pull = 0.0;
