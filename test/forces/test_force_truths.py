@@ -96,6 +96,25 @@ def test_a_step_beyond_float64_names_the_body_and_changes_nothing(own: bool) -> 
     assert world.poses.tobytes() == twin.poses.tobytes()
 
 
+def test_a_step_that_is_refused_makes_no_island_finer() -> None:
+    """Its weights are 30 times those that come later, and what is fine stays so for a second."""
+    light = Body(mass=1.0, inertia=[1e-50] * 3)
+    cube = (1.0, 1.0, 1.0)
+    rows = [FLOOR, *((cube, mass, (x, 0, z))
+                     for mass, x, z in ((10.0, 0, 0.5), (3e4, 0, 1.5), (1.0, 9, 50)))]
+    world, twin = World(*rows), World(*rows)
+    for each in (world, twin):
+        each.forces.set_bodies([*each.bodies[:3], light])
+    wild = world.outside.copy()
+    wild[2], wild[3, 3:] = 30.0 * wild[2], 1e100
+    with pytest.raises(ValueError, match=r'^bodies\[3\]'):
+        world.forces.advance(1 / 60, world.poses, world.velocities, wild)
+    for each in (world, twin):
+        for _ in range(3):
+            each.step(1 / 60)
+    assert world.poses.tobytes() == twin.poses.tobytes()
+
+
 def test_threads_change_no_bit() -> None:
     places = [(k % 20 - 10, k // 20 % 10 - 5, 0.26 + 0.52 * (k // 200)) for k in range(400)]
     rows = [FLOOR, *(((0.5, 0.5, 0.5), 50.0, place, turned((1, 1, 0), 0.01 * (k % 7)))

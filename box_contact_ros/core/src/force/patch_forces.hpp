@@ -186,6 +186,7 @@ class PatchForces {
     if (lost >= 0) {
       patches_.swap(kept_patches_);
       clock_ = kept_clock_;
+      fineness_ = kept_fineness_;
       is_grouped_ = false;
       return lost;
     }
@@ -202,6 +203,7 @@ class PatchForces {
   void keep() {
     kept_patches_ = patches_;
     kept_clock_ = clock_;
+    kept_fineness_ = fineness_;
   }
 
  private:
@@ -257,6 +259,7 @@ class PatchForces {
     patches_.reserve(room_);
     next_.reserve(room_);
     kept_patches_.reserve(room_);
+    kept_fineness_.reserve(bodies_.size());
     loads_.reserve(room_);
     islands_.make_room(bodies_.size(), room_);
   }
@@ -385,6 +388,7 @@ class PatchForces {
   Islands islands_;
   std::vector<Patch> kept_patches_;  // for an advance that fails
   Clock kept_clock_;
+  std::vector<Fineness> kept_fineness_;
   size_t room_ = 0;          // for patches
   bool is_grouped_ = false;  // whether islands are those of the patches
 };
