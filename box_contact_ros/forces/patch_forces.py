@@ -55,7 +55,6 @@ FRICTION = 0.5
 """Coulomb's μ [1], steel on steel, dry."""
 
 
-
 @dataclass(frozen=True, kw_only=True)
 class Body:
     """What the forces know of a body.
@@ -291,7 +290,7 @@ class PatchForces:
 
     def wrenches(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
                  wrenches: ArrayLike | None = None) -> np.ndarray:
-        """Return the mean wrenches (n, 6) of contacts over a step, which then move the bodies.
+        """Return what moves the bodies in a step: the mean wrenches of contacts (n, 6).
 
         Call it instead of `advance`, with the same arguments. The next call takes the velocities to
         which these wrenches led, and removes the speed of pushing out from them.

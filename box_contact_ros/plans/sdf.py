@@ -368,4 +368,3 @@ def _weight(link: Element, frame: np.ndarray, volume: float) -> Weight:
     if not 0.0 <= mass <= MASS_MAX:
         raise Unreadable('mass', f'its mass is {inertial.findtext("mass")}')
     return Weight(mass, place[:3])
-

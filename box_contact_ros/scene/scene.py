@@ -352,7 +352,7 @@ class Scene:
 
     @cached_property
     def sides(self) -> np.ndarray:
-        """Return which sides (n, 2 p) of p patterns each box matches."""
+        """Return for each box which sides of p patterns it matches, (n, 2 p)."""
         sides = [self.matching(side) for pattern in self.patterns for side in pattern]
         return np.array(sides, bool).reshape(len(sides), len(self.boxes)).T
 
@@ -438,7 +438,6 @@ class Scene:
         bodies = {self.mover(name) for name in movers} if self.bodies else set()
         return (*(name for name in movers if not self.boxes[name].body),
                 *(name for name in self.bodies if name in bodies))
-
 
 
 def _poses_of(parts: Mapping[str, Box] | Mapping[str, Frame]) -> np.ndarray:

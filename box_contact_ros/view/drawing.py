@@ -29,7 +29,7 @@ def add_light(scene: Any) -> None:
     scene.configure_environment_map(hdri=None)
     scene.configure_default_lights(enabled=False)
     scene.add_light_hemisphere('/sky', ground_color=FROM_BELOW, intensity=SKYLIGHT,
-               position=(0.0, 0.0, 1.0))
+                               position=(0.0, 0.0, 1.0))
 
 
 def add_cubes(scene: Any, colours: np.ndarray, opacity: float) -> tuple[Any, Any]:
