@@ -202,8 +202,7 @@ class PatchForces:
         """Begin without patches.
 
         friction: Coulomb's μ of pairs without one of their own.
-        substeps: equal parts of a step, more if 5 ms are exceeded. Heavy bodies on light ones need
-            them.
+        substeps: equal parts of the longest step lately, more if 5 ms are exceeded.
         iterations: of sequential impulses in a sub-step, at most.
         relaxations: further iterations, which remove the speed of pushing out.
         threads: at most. They change no bit.

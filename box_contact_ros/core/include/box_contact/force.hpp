@@ -59,7 +59,7 @@ struct Body {
 class PatchForces {
  public:
   struct Options {
-    int substeps = 4;       // equal parts of an advance, more if 5 ms are exceeded: for heavy on light
+    int substeps = 4;       // equal parts of the longest step lately, more if 5 ms are exceeded
     int iterations = 4;     // of sequential impulses in a sub-step, at most
     int relaxations = 2;    // iterations more, at most, which remove the speed of pushing out
     int threads = 1;        // at most
