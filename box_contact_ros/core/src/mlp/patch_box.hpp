@@ -85,7 +85,7 @@ struct Meeting {
   Triple<T> normal[2];     // from A to B
   Triple<T> corner[2];     // deepest in the other box, from the box's centre [m]
   Triple<T> gap;           // from A's corner to B's, in A's frame [m]
-  T depth, least;          // of the boxes, pressed to the least where they hardly overlap [m]
+  T depth, least;          // of the boxes, pressed in where they are at exact touch [m]
   T unit, by_unit;         // about the size [m], and its inverse
   Triple<T> to_origin[2];  // near the patch, from the corners [m]
   T top;                   // of A along the normal, from the origin [m]
@@ -94,12 +94,11 @@ struct Meeting {
   BC_INLINE explicit Meeting(const Query<T>& query) {
     const Pair<T>& pair = query.pair;
     least = depth_floor * pair.size;
-    T pressed = max(least + query.axis.separation, T{});
     normal[0] = query.axis.normal;
     normal[1] = pair.a_in_b * normal[0];
     corner[0] = towards(normal[0], pair.offset_a, pair.half_a);
     corner[1] = -towards(normal[1], pair.offset_b, pair.half_b);
-    gap = pair.offset_a + pair.b_in_a * corner[1] - corner[0] - pressed * normal[0];
+    gap = pressed_offset(query) + pair.b_in_a * corner[1] - corner[0];
     depth = max(-query.axis.separation, least);
     unit = power_of_two(pair.size, false);
     by_unit = power_of_two(pair.size, true);
@@ -112,6 +111,14 @@ struct Meeting {
   }
 
  private:
+  // From A to B, pressed in where they are at exact touch.
+  BC_INLINE static Triple<T> pressed_offset(const Query<T>& query) {
+    Mask<T> shallow = are_shallow(query.pair, query.axis) & query.touching;
+    if (!any(shallow)) return query.pair.offset_a;
+    Pair<T> pair = query.pair;
+    enforce_minimum_depth(pair, query.axis, shallow);
+    return pair.offset_a;
+  }
   // Along axes that are level, towards the other box.
   BC_INLINE static Triple<T> towards(const Triple<T>& normal, const Triple<T>& other,
                                      const Triple<T>& half) {

@@ -30,12 +30,12 @@ struct Pressed {
         from_b(-q.pair.offset_b),
         origin_b(q.pair.origin_b),
         depth(-q.axis.face_gap) {
-    Mask<T> shallow = (depth_floor * q.pair.size + q.axis.separation > 0.0) & q.touching;
+    Mask<T> shallow = are_shallow(q.pair, q.axis) & q.touching;
     if (any(shallow)) press(q, shallow);
   }
 
  private:
-  [[gnu::noinline]] void press(const Query<T>& q, Mask<T> shallow) {
+  BC_INLINE void press(const Query<T>& q, Mask<T> shallow) {
     Pair<T> pair = q.pair;
     enforce_minimum_depth(pair, q.axis, shallow);
     from_a = pair.offset_a;
