@@ -24,7 +24,7 @@ PathFinder.find_spec = classmethod(lambda cls, name, *rest: (
     None if name.partition('.')[0] in {ABSENT} else find(name, *rest)))
 program, *arguments = sys.argv[1:]
 sys.orig_argv, sys.argv = ['python', '-m', *sys.argv[1:]], [program, *arguments]
-sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / 'docs' / 'figures')!r}]
+sys.path += [{str(ROOT)!r}, {str(ROOT / 'docs' / 'figures')!r}]
 run = runpy.run_path if program.endswith('.py') else runpy.run_module
 run(program, run_name='__main__')
 """
@@ -36,8 +36,8 @@ CHECKOUT = REPORTS | {'benchmarks.paper', 'benchmarks.paper.search', 'training',
 
 
 def alone(*words: str) -> subprocess.CompletedProcess[str]:
-    """Run a program as in an environment without extras."""
-    return subprocess.run([sys.executable, '-c', ALONE, *words], cwd=ROOT, capture_output=True,
+    """Run a program as in an environment without extras, and the package as it is installed."""
+    return subprocess.run([sys.executable, '-P', '-c', ALONE, *words], cwd=ROOT, capture_output=True,
                           text=True, timeout=PATIENCE)
 
 
