@@ -40,7 +40,7 @@ help:
 	echo 'make test     ruff, mypy, and all tests that need no PyTorch'
 	echo 'make test-training  the tests of training, for which it fetches PyTorch'
 	echo 'make check    linters, and the quick tests of core, solver and scene: a minute'
-	echo 'make test-colcon  the quick tests, as `colcon test` runs them in a workspace'
+	echo 'make test-colcon  tests of what an installation changes, by `colcon test` in a workspace'
 	echo 'make test-schemas  the AsyncAPI document, by its own parser, which npm fetches'
 	echo 'make test-arm the library on an emulated 64-bit ARM: the same bits as here'
 	echo 'make test-debian13  make demo, then make test, on a fresh Debian 13 (root)'
@@ -111,7 +111,7 @@ test-training:
 	@.ci/setup training
 	exec $(PYTEST) -m training $(ARGS)
 
-# All tests there, which takes four times as long: make test-colcon ARGS=test
+# All tests there, which takes six times as long: make test-colcon ARGS=test
 test-colcon:
 	@.ci/setup test
 	exec bash test/package/colcon.sh $(PY) $(ARGS)
