@@ -136,6 +136,8 @@ def test_quick_run(tmp_path: Path, program: tuple[Path, list[str]],
                    monkeypatch: pytest.MonkeyPatch) -> None:
     """Every set, scene and instruction set; the page shows the code of each call."""
     monkeypatch.setattr(native, 'compiled', lambda folder, sets: program)
+    for name, count in (('PAIRS', 200), ('CALLS', 20), ('CONTACTS', 500)):
+        monkeypatch.setattr(native, f'QUICK_{name}', count)
     assert native.main(['--quick', '--out', str(tmp_path)]) == 0
     with (tmp_path / 'native.csv').open(encoding='utf-8') as file:
         rows = list(csv.DictReader(file))

@@ -57,7 +57,7 @@ def test_a_changed_scene_is_answered_as_a_new_one(margin: float) -> None:
     rng = np.random.default_rng(7)
     scene = yard(rng)
     solver, boxes, found = SceneSolver(scene, margin=margin), dict(scene.boxes), 0
-    for revision in range(1, 200):
+    for revision in range(1, 60):
         free = [name for name, box in boxes.items()
                 if not box.body and name not in ('stack3', 'crane1')]
         chosen = rng.permutation([*free, *(f'stack{revision}{n}' for n in range(3))])[:6].tolist()
@@ -78,7 +78,7 @@ def test_a_changed_scene_is_answered_as_a_new_one(margin: float) -> None:
         assert answer.revision == revision
         assert_same(answer, SceneSolver(whole, margin=margin)([poses[n] for n in whole.moving]))
         found += len(answer.pairs)
-    assert found > 500
+    assert found > 150
     assert_same(pickle.loads(pickle.dumps(solver))([poses[name] for name in solver.moving]), answer)
 
 

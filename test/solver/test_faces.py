@@ -120,7 +120,7 @@ def test_pressures_below_a_load_are_those_of_a_bed_that_does_not_pull(at):
 def test_pressures_on_any_polygon_balance_the_load():
     """By a grid: the pressure that is found has the load's force and its centre."""
     rng = np.random.default_rng(4)
-    grid = np.stack(np.meshgrid(*[np.linspace(-1, 1, 400)] * 2), axis=-1).reshape(-1, 2)
+    grid = np.stack(np.meshgrid(*[np.linspace(-1, 1, 150)] * 2), axis=-1).reshape(-1, 2)
     for share in np.linspace(0, 0.9, 10):
         angle = np.sort(rng.uniform(0, 2 * np.pi, 6))
         polygon = np.stack((np.cos(angle), np.sin(angle)), axis=1)
@@ -132,9 +132,9 @@ def test_pressures_on_any_polygon_balance_the_load():
         padded = np.zeros((1, 9, 2))
         padded[0, :6] = polygon
         found = native.bed_pressures(padded, np.array([6]), at[None])[0]
-        basis = np.column_stack((np.ones(len(places)), places - at)) * np.sqrt(4 / 400**2)
+        basis = np.column_stack((np.ones(len(places)), places - at)) * np.sqrt(4 / 150**2)
         field = np.zeros(3)
-        for _ in range(100):  # Newton on the grid
+        for _ in range(30):  # Newton on the grid
             pressed = basis[basis @ field >= 0]
             field = np.linalg.solve(pressed.T @ pressed, (1, 0, 0))
         assert found == pytest.approx((field[0] + (polygon - at) @ field[1:]).max(), rel=0.02)
