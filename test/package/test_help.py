@@ -37,8 +37,8 @@ CHECKOUT = REPORTS | {'benchmarks.paper', 'benchmarks.paper.search', 'training',
 
 def alone(*words: str) -> subprocess.CompletedProcess[str]:
     """Run a program as in an environment without extras, and the package as it is installed."""
-    return subprocess.run([sys.executable, '-P', '-c', ALONE, *words], cwd=ROOT, capture_output=True,
-                          text=True, timeout=PATIENCE)
+    return subprocess.run([sys.executable, '-P', '-c', ALONE, *words], cwd=ROOT,
+                          capture_output=True, text=True, timeout=PATIENCE)
 
 
 @pytest.mark.parametrize('program', sorted(INSTALLED | CHECKOUT))
