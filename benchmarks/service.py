@@ -31,7 +31,7 @@ from box_contact_msgs.msg import Contacts
 from box_contact_msgs.srv import Check
 from box_contact_ros.arguments import program_parser
 from box_contact_ros.bench.echo_node import raw_stamp, with_stamp
-from box_contact_ros.node.check import Checker
+from box_contact_ros.node.check import CheckAnswerer
 from box_contact_ros.node.messages import make_header, pose_message, set_pose
 from box_contact_ros.node.runtime import GuardedNode, run_node, running_node, spin_once
 from box_contact_ros.node.topics import DEEP_RELIABLE
@@ -94,10 +94,10 @@ class EchoNode(GuardedNode):
 
     def __init__(self, context: Context) -> None:
         super().__init__('echo', context=context)
-        checker = Checker(SceneSolver(yard()))
+        answerer = CheckAnswerer(SceneSolver(yard()))
         for name, question in QUESTIONS.items():
             response = deserialize_message(
-                serialize_message(checker.answer(question, Check.Response())), Check.Response)
+                serialize_message(answerer.answer(question, Check.Response())), Check.Response)
             self.create_service(Check, service_of(name), lambda *_, response=response: response)
 
 

@@ -16,7 +16,7 @@ MOST_CONTACTS = 4096
 """Of a response: all pairs of 91 boxes, 0.8 MB."""
 
 
-class Checker:
+class CheckAnswerer:
     """Answers requests with the scene and the model of a node. It keeps nothing of a request."""
 
     def __init__(self, solver: SceneSolver, model: str = 'exact') -> None:

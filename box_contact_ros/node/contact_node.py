@@ -45,7 +45,7 @@ from ..solver.model import NATIVE
 from ..stream.pairing import PAIRINGS, RESETS
 from ..stream.streams import watched_of
 from . import check, set_boxes
-from .check import Checker
+from .check import CheckAnswerer
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
 from .paced_service import PacedService
 from .parameters import (
@@ -150,7 +150,7 @@ class ContactNode(GuardedNode, LifecycleNode):
         self._values: dict[str, Any] = {}
         self._topics: SceneTopics | None = None  # from configure to cleanup
         self._answerer: TickAnswerer | None = None  # likewise
-        self._checker: Checker | None = None  # of the solver's scene and model
+        self._check_answerer: CheckAnswerer | None = None  # of the solver's scene and model
         self.add_on_set_parameters_callback(self._set_live)
         self._checks = PacedService(self, self.counts, 'checks', (Check, '~/check'), self._check,
                                     check.kind_and_size)
@@ -286,9 +286,9 @@ class ContactNode(GuardedNode, LifecycleNode):
         if self._answerer is None:
             response.message = NOT_CONFIGURED
             return response
-        if self._checker is None or self._checker.solver is not self._answerer.solver:
-            self._checker = Checker(self._answerer.solver, self.model_of(self._values))
-        return self._checker.answer(request, response)
+        if self._check_answerer is None or self._check_answerer.solver is not self._answerer.solver:
+            self._check_answerer = CheckAnswerer(self._answerer.solver, self.model_of(self._values))
+        return self._check_answerer.answer(request, response)
 
     def _set_boxes(self, request: SetBoxes.Request, response: SetBoxes.Response,
                    ) -> SetBoxes.Response:

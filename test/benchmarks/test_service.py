@@ -25,8 +25,8 @@ def test_ticks_come_first_beside_a_planner(capfd: pytest.CaptureFixture[str],
 
 def test_each_question_has_its_contact() -> None:
     """Of 2,001 boxes, one touches: an answer without a contact would be cheap."""
-    checker = service.Checker(service.SceneSolver(service.yard()))
+    answerer = service.CheckAnswerer(service.SceneSolver(service.yard()))
     for question in service.QUESTIONS.values():
-        response = checker.answer(question, service.Check.Response())
+        response = answerer.answer(question, service.Check.Response())
         assert len(response.contacts.contacts) == 1, response.message
-    assert len(checker.answer(service.PLAN, service.Check.Response()).contacts.contacts) == 4095
+    assert len(answerer.answer(service.PLAN, service.Check.Response()).contacts.contacts) == 4095

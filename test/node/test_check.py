@@ -28,7 +28,7 @@ from box_contact_msgs.srv import Check
 from box_contact_ros import ContactSolver, SceneSolver, make_model
 from box_contact_ros.node import check as check_module
 from box_contact_ros.node import paced_service
-from box_contact_ros.node.check import MOST_CONTACTS, Checker
+from box_contact_ros.node.check import MOST_CONTACTS, CheckAnswerer
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.paced_service import PacedService
 from box_contact_ros.scene.scene import Box, Frame, Pair, Scene
@@ -43,13 +43,13 @@ EPISODES = 1  # of each length; 50 were tried
 
 
 @pytest.fixture(scope='module')
-def checker() -> Checker:
-    return Checker(SceneSolver(SCENE, model='exact'))
+def answerer() -> CheckAnswerer:
+    return CheckAnswerer(SceneSolver(SCENE, model='exact'))
 
 
-def asked(checker: Checker, *boxes: Any, **fields: Any) -> Check.Response:
+def asked(answerer: CheckAnswerer, *boxes: Any, **fields: Any) -> Check.Response:
     """Return the response to boxes and further fields of a request."""
-    return checker.answer(Check.Request(boxes=list(boxes), **fields), Check.Response())
+    return answerer.answer(Check.Request(boxes=list(boxes), **fields), Check.Response())
 
 
 def labels(response: Check.Response) -> list[str]:
@@ -58,23 +58,23 @@ def labels(response: Check.Response) -> list[str]:
     return [entry.pair for entry in response.contacts.contacts]
 
 
-def test_boxes_of_the_scene_need_no_size(checker: Checker) -> None:
+def test_boxes_of_the_scene_need_no_size(answerer: CheckAnswerer) -> None:
     """They meet by the scene's pairs, and a guest meets all; a listed pair is any of the boxes."""
-    response = asked(checker, a_box('load', TOUCHING), a_box('stack', ORIGIN),
+    response = asked(answerer, a_box('load', TOUCHING), a_box('stack', ORIGIN),
                      a_box('lorry', TOUCHING), a_box('mine', ORIGIN, CUBE))
     assert labels(response) == ['landing', 'load_lorry', 'mine_load', 'mine_stack', 'mine_lorry']
-    response = asked(checker, a_box('load', TOUCHING), a_box('stack', ORIGIN),
+    response = asked(answerer, a_box('load', TOUCHING), a_box('stack', ORIGIN),
                      a_box('lorry', TOUCHING), pairs=[a_pair('stack', 'load')])
     entry, = response.contacts.contacts
     assert (entry.pair, entry.box_a, entry.normal.z) == ('stack_load', 'stack', 1.0)
 
 
-def test_a_size_of_its_own_lasts_for_one_question(checker: Checker) -> None:
+def test_a_size_of_its_own_lasts_for_one_question(answerer: CheckAnswerer) -> None:
     """A box that moves may have another size than in the scene, whatever the margins are."""
     low, own = (2, 2, 1), (0, 0, 0)
     for size, margin, found in ((low, 0.0, []), (own, 0.0, ['landing']), (low, 0.0, []),
                                 (own, 0.1, ['landing']), (own, 0.0, ['landing']), (low, 0.1, [])):
-        assert labels(asked(checker, a_box('load', TOUCHING, size), a_box('stack', ORIGIN),
+        assert labels(asked(answerer, a_box('load', TOUCHING, size), a_box('stack', ORIGIN),
                             margin=margin)) == found
 
 
@@ -86,15 +86,15 @@ YARD = Scene({'load': Box(CUBE), 'crane': Box(CUBE), 's1': Box(CUBE, FIXED),
 
 
 @pytest.fixture(scope='module')
-def yard() -> Checker:
-    return Checker(SceneSolver(YARD))
+def yard() -> CheckAnswerer:
+    return CheckAnswerer(SceneSolver(YARD))
 
 
-def asked_yard(yard: Checker, *boxes: Any, **fields: Any) -> Check.Response:
+def asked_yard(yard: CheckAnswerer, *boxes: Any, **fields: Any) -> Check.Response:
     return asked(yard, *boxes, **{'header': Header(frame_id='yard'), **fields})
 
 
-def test_one_box_is_a_question(yard: Checker) -> None:
+def test_one_box_is_a_question(yard: CheckAnswerer) -> None:
     """Fixed boxes take part by the scene's pairs; of a guest, all. Nobody else is there."""
     def found(*boxes: Any, **fields: Any) -> list[str]:
         return labels(asked_yard(yard, *boxes, **fields))
@@ -125,10 +125,10 @@ SPREADER = Scene(
 
 def test_a_body_is_a_question() -> None:
     """Named by its name, with one pose: its boxes meet what the scene pairs them with."""
-    checker = Checker(SceneSolver(SPREADER))
+    answerer = CheckAnswerer(SceneSolver(SPREADER))
 
     def found(*boxes: Any, **fields: Any) -> list[str]:
-        return labels(asked(checker, *boxes, **fields))
+        return labels(asked(answerer, *boxes, **fields))
 
     def at(x: float, z: float) -> tuple[float, ...]:
         return (x, 0, z, 0, 0, 0, 1)
@@ -151,13 +151,13 @@ def test_a_body_is_a_question() -> None:
             (a_box('spreader', ORIGIN, CUBE), "'spreader' is a body of the scene, whose boxes"),
             (a_box('gate', at(1, 0)), "'gate' is fixed in the scene with pose (20.0, 0.0, 0.0, "),
             (a_box('spreader', [0] * 7), "boxes[0] 'spreader': quaternion (x=0, y=0, z=0, w=0)")):
-        assert words in asked(checker, box).message
+        assert words in asked(answerer, box).message
     assert found(a_box('load', at(0, 1.9))) == ['load_stack']
     for pair in (('spreader', 'beam'), ('foot', 'beam'), ('gate', 'post')):
-        answer = asked(checker, a_box('spreader', ORIGIN), pairs=[a_pair(*pair)])
+        answer = asked(answerer, a_box('spreader', ORIGIN), pairs=[a_pair(*pair)])
         assert answer.message == (f'pairs[0]: {pair[0]!r} and {pair[1]!r} are of one body, whose '
                                   'boxes are never a pair')
-    lost = asked(checker, a_box('load', ORIGIN), pairs=[a_pair('load', 'beam')])
+    lost = asked(answerer, a_box('load', ORIGIN), pairs=[a_pair('load', 'beam')])
     assert lost.message == ("pairs[0].box_b: 'beam' moves, and its pose is not in the request: add "
                             "'spreader' to boxes")
 
@@ -175,11 +175,11 @@ def test_a_question_is_answered_as_a_tick_of_the_scene_that_it_makes(margin: flo
     boxes |= {f'moving{n}': Box(rng.uniform(0.5, 2, 3)) for n in range(50)}
     patterns = (('moving1*', 'fixed*'), ('fixed2*', 'moving*'), ('moving2*', 'moving3*'))
     scene = Scene(boxes, (Pair('own', 'moving4', 'moving5'),), patterns=patterns)
-    checker, count = Checker(SceneSolver(scene)), 0
+    answerer, count = CheckAnswerer(SceneSolver(scene)), 0
     for _ in range(6):
         guests = {f'guest{n}': (pose(4), tuple(rng.uniform(0.5, 2, 3))) for n in range(40)}
         named = {f'moving{n}': pose(4) for n in rng.permutation(50)[:40]}
-        response = asked(checker, *(a_box(name, *guest) for name, guest in guests.items()),
+        response = asked(answerer, *(a_box(name, *guest) for name, guest in guests.items()),
                          *(a_box(name, place) for name, place in named.items()), margin=margin)
         whole = Scene({**{name: Box(size) for name, (_, size) in guests.items()}, **boxes},
                       scene.pairs, patterns=(('guest*', '*'), *patterns), pose_array=True)
@@ -194,12 +194,12 @@ def test_a_question_is_answered_as_a_tick_of_the_scene_that_it_makes(margin: flo
     assert count > 500
 
 
-def test_boxes_of_own_sizes_are_answered_as_the_solver_does(checker: Checker) -> None:
+def test_boxes_of_own_sizes_are_answered_as_the_solver_does(answerer: CheckAnswerer) -> None:
     """To the bit, under their names. Messages of a long answer serve the next, and get more."""
     placed = [np.array([0, 0, 0.25 * n, 0.1 * n, 0.2, 0, 1]) for n in range(5)]
     sizes = [(2.0 + 0.5 * n, 3.0, 1.0) for n in range(5)]
     for count in (3, 1, 5):
-        response = asked(checker, *(a_box(f'p{n}', placed[n], sizes[n]) for n in range(count)))
+        response = asked(answerer, *(a_box(f'p{n}', placed[n], sizes[n]) for n in range(count)))
         assert response.success and not response.message and not response.contacts.near
         found = contacts_by_pair(response.contacts)
         assert set(found) == {f'p{a}_p{b}' for b in range(count) for a in range(b)}
@@ -211,7 +211,7 @@ def test_boxes_of_own_sizes_are_answered_as_the_solver_does(checker: Checker) ->
 
 @pytest.mark.parametrize('place, depths', [(ABOVE_FIXED, [0.1]), ((0, 5, 1.9, 0, 0, 0, 1), [])])
 @pytest.mark.parametrize('s1', [ORIGIN, FIXED])
-def test_a_fixed_box_is_where_the_scene_says(yard: Checker, place: Any, depths: list[float],
+def test_a_fixed_box_is_where_the_scene_says(yard: CheckAnswerer, place: Any, depths: list[float],
                                              s1: Any) -> None:
     """Without a pose of its own, as a new message is, or with the scene's."""
     response = asked_yard(yard, a_box('load', place), a_box('s1', s1))
@@ -229,7 +229,7 @@ def test_a_fixed_box_is_where_the_scene_says(yard: Checker, place: Any, depths: 
      "header.frame_id: the scene is in frame 'yard', the request in 'map': send"),
     (ORIGIN, CUBE, '/yard', 'the leading slash is the difference'),
     (ORIGIN, CUBE, '', "the request in ''")])
-def test_what_contradicts_the_scene_is_refused(yard: Checker, s1: Any, size: Any, frame: str,
+def test_what_contradicts_the_scene_is_refused(yard: CheckAnswerer, s1: Any, size: Any, frame: str,
                                                words: str) -> None:
     response = asked(yard, a_box('load', ORIGIN), a_box('s1', s1, size),
                      header=Header(frame_id=frame))
@@ -237,11 +237,11 @@ def test_what_contradicts_the_scene_is_refused(yard: Checker, s1: Any, size: Any
     assert labels(asked_yard(yard, a_box('load', ABOVE_FIXED))) == ['landing']
 
 
-def test_near_is_what_is_apart_within_the_margin(checker: Checker) -> None:
+def test_near_is_what_is_apart_within_the_margin(answerer: CheckAnswerer) -> None:
     """`contacts` holds what touches and nothing else."""
     boxes = (a_box('load', APART), a_box('stack', ORIGIN), a_box('lorry', APART))
     for margin, near in ((0.0, []), (0.4, []), (0.5, ['landing'])):
-        answer = asked(checker, *boxes, margin=margin).contacts
+        answer = asked(answerer, *boxes, margin=margin).contacts
         assert [entry.pair for entry in answer.contacts] == ['load_lorry']
         assert [entry.pair for entry in answer.near] == near and not answer.stale
     near, = answer.near
@@ -284,29 +284,29 @@ GOOD = a_box('p', ORIGIN, CUBE)
     ([a_box(f'{i}', (3 * i, 0, 0, 0, 0, 0, 1), CUBE) for i in range(99)], {'margin': 1e6},
      'contacts: 4851 pairs touch or are near'),
 ])
-def test_what_is_wrong_comes_back_as_text(checker: Checker, boxes: list[Any],
+def test_what_is_wrong_comes_back_as_text(answerer: CheckAnswerer, boxes: list[Any],
                                           fields: dict[str, Any], words: str) -> None:
-    response = asked(checker, *boxes, **fields)
+    response = asked(answerer, *boxes, **fields)
     assert not response.success and words in response.message
     assert response.contacts == Check.Response().contacts
 
 
-def test_boxes_that_are_apart_cost_no_pairs(checker: Checker) -> None:
+def test_boxes_that_are_apart_cost_no_pairs(answerer: CheckAnswerer) -> None:
     """As many as a request takes: the broad phase leaves out their pairs."""
     boxes = [a_box(f'{n}', (3 * n, 0, 0, 0, 0, 0, 1), CUBE) for n in range(MOST_BOXES)]
     assert MOST_BOXES * (MOST_BOXES - 1) // 2 > MOST_CONTACTS
-    assert labels(asked(checker, *boxes)) == []
+    assert labels(asked(answerer, *boxes)) == []
 
 
 def test_a_soup_answers_few_pairs() -> None:
     """Its pairs take up to a third of a second; and it knows no axis of those apart."""
     pytest.importorskip('fcl')
-    checker = Checker(SceneSolver(SCENE, model=make_model('soup-2')), 'soup-2')
+    answerer = CheckAnswerer(SceneSolver(SCENE, model=make_model('soup-2')), 'soup-2')
     boxes = [a_box(f'{i}', ORIGIN, CUBE) for i in range(13)]
-    assert 'more than 64 are' in asked(checker, *boxes).message
+    assert 'more than 64 are' in asked(answerer, *boxes).message
     apart = (a_box('load', APART), a_box('stack', ORIGIN))
-    assert asked(checker, *apart).success
-    assert 'margin 1 has no effect' in asked(checker, *apart, margin=1.0).message
+    assert asked(answerer, *apart).success
+    assert 'margin 1 has no effect' in asked(answerer, *apart, margin=1.0).message
 
 
 # --- over ROS -------------------------------------------------------------------------------------

@@ -40,7 +40,7 @@ from box_contact_ros.core import DEPTH_FLOOR
 from box_contact_ros.models.make_model import most_near
 from box_contact_ros.models.weights_file import load_weights
 from box_contact_ros.node import check, diagnostics, topics
-from box_contact_ros.node.check import Checker
+from box_contact_ros.node.check import CheckAnswerer
 from box_contact_ros.node.contact_node import PARAMETERS
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene import scene_check, scene_file
@@ -172,7 +172,7 @@ def called(words: list[str], **_) -> None:
     request = filled(Check.Request(), yaml.safe_load(words[5]))
     files = [ROOT / f'config/scenes/{name}.yaml' for name in ('yard_bay', 'load_on_chassis')]
     scenes = [two_boxes((2.0, 2.0, 2.0), (2.0, 2.0, 2.0)), *map(read_scene, files)]
-    responses = [Checker(SceneSolver(scene)).answer(request, Check.Response())
+    responses = [CheckAnswerer(SceneSolver(scene)).answer(request, Check.Response())
                  for scene in scenes]
     assert sum(bool(response.contacts.contacts) for response in responses) >= 1, responses
 
