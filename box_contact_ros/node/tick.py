@@ -198,12 +198,11 @@ class TickAnswerer:
             del self._revisions[next(iter(self._revisions))]
         self._revision = self._revisions[count]
         moving = self._revision.solver.moving
-        bad = ~are_poses(poses.numbers) & ~absent_poses(poses.numbers)
-        for row in np.flatnonzero(bad):
+        missing = np.flatnonzero(~are_poses(poses.numbers))
+        for row in missing[~absent_poses(poses.numbers[missing])]:
             self._refuse(MessageError('bad pose', f'{pose_fault(poses.numbers[row])}'), moving[row])
-        poses.numbers[bad] = np.nan
-        self._monitor.absent = [
-            name for name, absent in zip(moving, absent_poses(poses.numbers)) if absent]
+        poses.numbers[missing] = np.nan
+        self._monitor.absent = [moving[row] for row in missing]
         return poses
 
     def _answer(self, tick: Tick, arrived: int) -> None:
