@@ -94,6 +94,14 @@ class BroadPhase:
     def resize(self, boxes: np.ndarray, sizes: np.ndarray, /) -> None: ...
     def find(self, poses: np.ndarray, most: int, /) -> tuple[np.ndarray, np.ndarray, int]: ...
 
+class TickWriter:
+    def __init__(self, broad_phase: BroadPhase, solver: PairSolver, margin: float, most_near: int,
+                 sizes: np.ndarray, poses: np.ndarray, moving: np.ndarray, bodies: np.ndarray,
+                 local: np.ndarray, names: tuple[str, ...], listed: np.ndarray,
+                 labels: tuple[str, ...], watched: np.ndarray, topics: tuple[Any, ...],
+                 frame_id: str, revision: int, /) -> None: ...
+    def __call__(self, poses: list[Any]) -> Any: ...  # a tuple, or None
+
 class PatchForces:
     def __init__(self, mass: np.ndarray, inertia: np.ndarray, centre: np.ndarray, substeps: int,
                  iterations: int, relaxations: int, threads: int, friction: float,

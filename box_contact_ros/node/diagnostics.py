@@ -74,7 +74,7 @@ class TickMonitor:
         self.absent: list[str] = []  # the boxes that the last array had no pose of
         self.shared: list[str] = []  # the boxes whose publishers take turns
         self._times: deque[tuple[int, int]] = deque(maxlen=KEPT_TIMES)
-        """Time in the solver and age of the answer [ns] of the last evaluations."""
+        """Time to answer and age of the answer [ns] of the last evaluations."""
         self._evaluations = 0
         self._taken = time.monotonic()  # when `take_load` was called last
         self._refusals: dict[str, str] = {}  # log lines of the next report, by reason
@@ -97,7 +97,7 @@ class TickMonitor:
         self._pairs, self._open = pairs, None
 
     def evaluated(self, took: int, age: int, stale: list[Pair]) -> None:
-        """Note a tick: its time in the solver and the age of its answer [ns], the pairs left out.
+        """Note a tick: the time to answer it and the age of its answer [ns], the pairs left out.
 
         The age runs from the arrival of the pose that completes the tick, by the wall clock.
         """
@@ -159,7 +159,7 @@ class Load(NamedTuple):
     seconds: float
     evaluations: int
     lost: int  # poses that were sent and never came: the queue was full, or the network
-    computing: np.ndarray  # (n,) time in the solver of the last ticks [us]
+    computing: np.ndarray  # (n,) time to answer the last ticks [us]
     ages: np.ndarray  # (n,) time from arrival to answer of the last ticks [ms]
 
 

@@ -3,7 +3,7 @@
 
 """box_contact_msgs as the contacts and answers that Python has, and back.
 
-What the node sends on topics it writes as bytes: `stream.write_contacts`.
+What the node sends on topics the core writes as bytes: `stream.write_contacts`.
 """
 from __future__ import annotations
 
@@ -27,7 +27,6 @@ from ..solver.contact import Contacts
 from ..solver.nearest import Nearests
 from ..stream.cdr import NANOSECONDS
 from ..stream.pairing import frames_differ
-from ..stream.write_contacts import near_numbers
 
 
 def make_header(stamp: int, frame_id: str) -> Header:
@@ -77,7 +76,8 @@ def set_pose(pose: Any, numbers: np.ndarray) -> None:
 def near_messages(names: Sequence[tuple[str, str, str]], near: Nearests) -> list[NearMessage]:
     """Return the messages of pairs that are near, by the names of the pair and its boxes."""
     messages = []
-    for name, row in zip(names, near_numbers(near).tolist()):
+    rows = np.column_stack((near.distance, near.normal, near.point_a, near.point_b))
+    for name, row in zip(names, rows.tolist()):
         message = NearMessage()
         message.pair, message.box_a, message.box_b = name
         n, p, q = message.normal, message.point_a, message.point_b

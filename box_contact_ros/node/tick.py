@@ -3,8 +3,8 @@
 
 """One way for every tick: bytes → pose → tick of all boxes → contacts → messages.
 
-`PoseReader` judges a pose, `Pairing` joins poses to ticks, `SceneSolver` answers a tick,
-`ContactWriter` makes the messages.
+`PoseReader` judges a pose, `Pairing` joins poses to ticks, and `TickWriter` answers a tick with the
+bytes of messages, in one call of the core.
 """
 from __future__ import annotations
 
@@ -15,15 +15,14 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from rclpy.publisher import Publisher
 
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import absent_poses, are_poses, pose_fault
 from ..stream.cdr import NANOSECONDS, MessageError
-from ..stream.pairing import OVERTAKEN, PAIRINGS, Pairing, StampedPose, Tick
+from ..stream.pairing import OVERTAKEN, PAIRINGS, Pairing, StampedPose, TickPoses
 from ..stream.read_poses import PoseReader
 from ..stream.streams import ALL_BOXES
-from ..stream.write_contacts import VECTOR_BYTES, ContactWriter, aligned, header_bytes
+from ..stream.write_contacts import TickWriter
 from .diagnostics import TickMonitor
 from .parameters import reason_of
 from .topics import PoseCallback, SceneTopics
@@ -93,24 +92,6 @@ class PoseQueue:
         return self._turns > 1
 
 
-class Revision:
-    """What answers the ticks of one scene.
-
-    of_pair: by the indices of the boxes of a pair that has topics: its publishers of point and
-    normal, and the places in a tick of what moves its boxes.
-    """
-
-    def __init__(self, solver: SceneSolver, topics: SceneTopics) -> None:
-        """Take what solves the scene, and the topics of the node."""
-        self.solver, self.writer, scene = solver, ContactWriter(solver.scene), solver.scene
-        place = {name: number for number, name in enumerate(solver.moving)}
-        self.of_pair: dict[tuple[int, int], tuple[Publisher, Publisher, list[int]]] = {}
-        for (a, b), publishers in topics.of_pair.items():
-            if a in scene.boxes and b in scene.boxes:
-                sides = [place[mover] for mover in map(scene.mover, (a, b)) if mover in place]
-                self.of_pair[scene.index_of[a], scene.index_of[b]] = (*publishers, sides)
-
-
 class TickAnswerer:
     """Answers ticks of poses; every pose that is refused is counted and noted, never answered.
 
@@ -121,9 +102,8 @@ class TickAnswerer:
                  counts: Counter[str], monitor: TickMonitor) -> None:
         """Begin without poses; `settings` are the checked parameters."""
         self._topics, self._monitor, self._counts = topics, monitor, counts
-        self._revisions: dict[int, Revision] = {}
-        """The last ones by the number of poses in an array. The newest comes last."""
-        self._revision = Revision(solver, topics)  # of the next tick
+        self._writers: dict[int, TickWriter] = {}
+        """Of the last scenes, by the number of poses in an array. The newest comes last."""
         self.pairing: Pairing = PAIRINGS[settings['pairing']](solver.scene, counts=counts)
         self.set_solver(solver)
         self.set_times(settings)
@@ -134,25 +114,23 @@ class TickAnswerer:
     @property
     def solver(self) -> SceneSolver:
         """Return the solver of the newest scene."""
-        return next(reversed(self._revisions.values())).solver
+        return next(reversed(self._writers.values())).solver
 
     def set_solver(self, solver: SceneSolver) -> None:
         """Answer by another solver, whose scene may have other boxes.
 
         Arrays of former lengths, which may be on their way, are answered by former ones.
         """
-        self._revision = Revision(solver, self._topics)
-        self._revisions[len(solver.moving)] = self._revision
-        if len(self._revisions) > FORMER_LENGTHS:
-            del self._revisions[next(iter(self._revisions))]
+        self._writer = TickWriter(solver, self._topics.of_pair)  # of the next tick
+        self._writers[len(solver.moving)] = self._writer
+        if len(self._writers) > FORMER_LENGTHS:
+            del self._writers[next(iter(self._writers))]
         self.pairing.set_partners(solver.scene)
 
     def set_times(self, settings: Mapping[str, Any]) -> None:
         """Take `tolerance` and `max_age` of checked parameters [s]."""
         self.pairing.tolerance, self.pairing.max_age = (
             round(NANOSECONDS * settings[name]) for name in ('tolerance', 'max_age'))
-        self._stamps_differ = not self.solver.scene.pose_array and (
-            settings['pairing'] == 'latest' or self.pairing.tolerance > 0)
 
     def callback_of(self, box: str, topic: str) -> PoseCallback:
         """Return the callback for the bytes of a box, or of all; it raises nothing at all."""
@@ -175,7 +153,7 @@ class TickAnswerer:
                 return
             for tick in ticks:
                 try:
-                    self._answer(Tick.of(self.pairing.scene, tick), arrived)
+                    self._answer(tick, arrived)
                 except Exception as error:  # one tick that is refused keeps back no other
                     self._refuse(error, topic)
         return callback
@@ -190,14 +168,14 @@ class TickAnswerer:
         """Return the poses of all that moves; a bad one is counted, and its name absent."""
         poses = self._reader.read_poses(data)
         count = len(poses.numbers)
-        if count not in self._revisions:
+        if count not in self._writers:
             raise MessageError('wrong number of poses',
                                f'{count} poses, but {len(self.solver.moving)} boxes and bodies '
                                'move')
-        while count != next(iter(self._revisions)):  # whoever sends them knows of the change
-            del self._revisions[next(iter(self._revisions))]
-        self._revision = self._revisions[count]
-        moving = self._revision.solver.moving
+        while count != next(iter(self._writers)):  # whoever sends them knows of the change
+            del self._writers[next(iter(self._writers))]
+        self._writer = self._writers[count]
+        moving = self._writer.solver.moving
         missing = np.flatnonzero(~are_poses(poses.numbers))
         for row in missing[~absent_poses(poses.numbers[missing])]:
             self._refuse(MessageError('bad pose', f'{pose_fault(poses.numbers[row])}'), moving[row])
@@ -205,39 +183,27 @@ class TickAnswerer:
         self._monitor.absent = [moving[row] for row in missing]
         return poses
 
-    def _answer(self, tick: Tick, arrived: int) -> None:
+    def _answer(self, tick: TickPoses, arrived: int) -> None:
         """Publish the contacts of a tick: those of each pair, then all of them.
 
         arrived: when the pose came that completes the tick, by the wall clock [ns]; 0: unknown.
         """
         started = time.perf_counter_ns()
-        revision = self._revision
-        answer = revision.solver(tick.poses)
+        contacts, of_pairs, touching, stale = self._writer(tick)
         took = time.perf_counter_ns() - started
-        header = header_bytes(tick.stamp, tick.frame_id)
-        head, end = aligned(header), 0
-        of_pair = revision.of_pair
-        points, normals = answer.contacts.point.tobytes(), answer.contacts.normal.tobytes()
-        for a, b in answer.pairs.tolist() if of_pair else ():
-            begin, end = end, end + VECTOR_BYTES
-            if (a, b) not in of_pair:  # of a box that came later
-                continue
-            point, normal, sides = of_pair[a, b]
-            if self._stamps_differ:
-                newest = max([tick.stamps[side] for side in sides])
-                head = aligned(header_bytes(newest, tick.frame_id))
-            point.publish(head + points[begin:end])
-            normal.publish(head + normals[begin:end])
-        self._topics.contacts.publish(revision.writer.contacts(header, answer))
+        for (points, normals), point, normal in of_pairs:
+            points.publish(point)
+            normals.publish(normal)
+        self._topics.contacts.publish(contacts)
         # What nobody waits for comes last. A box that an array leaves out is not there: nobody
         # asks for its pairs.
-        age = time.time_ns() - arrived if arrived else 0
-        is_array = answer.scene.pose_array
-        self._monitor.evaluated(took, age, [] if is_array else answer.named_stale())
+        age, scene = time.time_ns() - arrived if arrived else 0, self._writer.solver.scene
+        open_pairs = [] if scene.pose_array else [scene.pair_of(*boxes) for boxes in stale]
+        self._monitor.evaluated(took, age, open_pairs)
         counts = self._counts
-        counts['contacts'] += len(answer.pairs)
+        counts['contacts'] += touching
         counts['evaluations'] += 1
-        counts['stale pairs'] += len(answer.stale)
+        counts['stale pairs'] += len(stale)
 
     def _refuse(self, error: Exception, topic: str, box: str = '') -> None:
         """Count what was refused, and hand it to the next report."""

@@ -304,7 +304,7 @@ class Scene:
         return np.where(self.is_fixed, 0, np.where(self.body_of < 0, alone, 1 + self.body_of))
 
     @cached_property
-    def _placement(self) -> tuple[np.ndarray, np.ndarray]:
+    def placement(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the row of each box's body (n,) or -1, and its pose (n, 7) in the body's frame."""
         of_body = self.body_of >= 0
         local = np.where(of_body[:, None], self.box_poses, AT_FRAME)
@@ -323,7 +323,7 @@ class Scene:
         Raises ValueError for a body whose numbers are no pose. One with seven NaN is not there, nor
         are its boxes.
         """
-        row = native.place_boxes(poses, *self._placement)
+        row = native.place_boxes(poses, *self.placement)
         if row >= 0:
             raise ValueError(f'pose of {list(self._parts)[row]}: {pose_fault(poses[row])}')
 

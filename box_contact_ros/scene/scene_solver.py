@@ -177,6 +177,15 @@ class SceneSolver:
                                   self.margin)
         return Answer(*found, len(pairs), stale, self.scene, self.revision)
 
+    def parts(self) -> tuple[native.BroadPhase, ContactSolver, float, int, np.ndarray, np.ndarray,
+                             np.ndarray, np.ndarray, np.ndarray]:
+        """Return what native.TickWriter answers ticks of the scene by: its first nine arguments."""
+        size, solver = self.scene.sizes[0], self._solver
+        if (self.scene.sizes == size).all():  # model `paper` is in C++ for boxes of one size
+            solver = ContactSolver(size, size, model=self.model, margin=self.margin)
+        return (self._broad_phase, solver, self.margin, self._most_near, self.scene.sizes,
+                self._rows, self._moving, *self.scene.placement)
+
     def _set_poses(self, poses: Sequence[np.ndarray | None] | ArrayLike) -> None:
         """Take the poses of the boxes and bodies that move."""
         if native.write_poses(self._rows, self._moving, poses):  # those of every node

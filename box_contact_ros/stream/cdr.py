@@ -21,10 +21,7 @@ _ORDERS = {b'\0\0': '>', LITTLE: '<'}
 another way: docs/contributing/decisions/contact-node.md."""
 PADDING = 3
 """Most bytes after the body, of any value: RTPS pads a message to a multiple of four."""
-HEAD = struct.Struct('<2s2xiI')  # encapsulation and stamp
-COUNT = struct.Struct('<I')
-REVISION = struct.Struct('<Q')
-FRAME_AT = HEAD.size + 4
+FRAME_AT = 16
 """Where frame_id's characters are: behind stamp and length."""
 CONTACT_BYTES = 8 * 15
 """Of a contact behind its names: point, normal, depth, volume, area and covariance."""

@@ -56,7 +56,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import Counter, deque
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice
@@ -67,6 +67,7 @@ import numpy as np
 
 from ..scene.scene import Scene
 from ..solver.checks import short_repr
+from .cdr import MessageError
 from .streams import partners_of, streams_of
 
 PATIENCE = 5
@@ -130,48 +131,17 @@ class RejectedPose(NamedTuple):
             '~/check'))
 
 
-TickPoses = list['StampedPose | None']
-"""A pose of each stream, None for a box that has none recent enough."""
+TickPoses = list[StampedPose | None]
+"""Poses that belong together: one of each stream, None for a box that has none recent enough."""
 
 
-class Tick(NamedTuple):
-    """Poses that belong together, as a `SceneSolver` takes them."""
-
-    stamp: int  # the newest of its poses [ns]
-    frame_id: str
-    poses: Any
-    """Seven floats of each of `scene.moving`, None for a box that has none recent enough; of a
-    message of all poses an array (n, 7), NaN instead of None."""
-    stamps: list[int]  # of each stream [ns], NEVER for a box that has no pose
-
-    @classmethod
-    def of(cls, scene: Scene, poses: TickPoses) -> Tick:
-        """Return the tick of poses; raises FramesDiffer."""
-        frame_id = scene.frame_id or None
-        numbers: list[Any] = []
-        stamps: list[int] = []
-        for pose in poses:
-            seven, frame, stamp = pose or (None, frame_id, NEVER)
-            if frame != frame_id:
-                if pose is not None and frame_id is not None:
-                    raise FramesDiffer(scene, poses, pose)
-                frame_id = frame
-            numbers.append(seven)
-            stamps.append(stamp)
-        return cls(max(stamps), frame_id or '', numbers[0] if scene.pose_array else numbers, stamps)
-
-
-class FramesDiffer(ValueError):
-    """A tick whose poses are in several frames."""
-
-    reason = 'frame_id differs'
-
-    def __init__(self, scene: Scene, poses: TickPoses, odd: StampedPose) -> None:
-        known = [(box, pose) for box, pose in zip(streams_of(scene), poses) if pose is not None]
-        first, frame = ('the scene', scene.frame_id) if scene.frame_id else (
-            known[0][0], known[0][1].frame_id)
-        box = next(box for box, pose in known if pose is odd)
-        super().__init__(frames_differ(first, frame, box, odd.frame_id))
+def check_frames(scene: Scene, streams: Sequence[str], poses: TickPoses) -> None:
+    """Raise MessageError for a tick whose poses, one of each stream, are in several frames."""
+    known = [(box, pose.frame_id) for box, pose in zip(streams, poses) if pose is not None]
+    first, frame = ('the scene', scene.frame_id) if scene.frame_id else known[0]
+    for box, other in known:
+        if other != frame:
+            raise MessageError('frame_id differs', frames_differ(first, frame, box, other))
 
 
 def frames_differ(first: str, frame: str, other: str, other_frame: str) -> str:

@@ -1,89 +1,49 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Contacts as the bytes of messages: a point, a normal, and `Contacts` of all pairs."""
+"""Ticks of poses → the bytes of messages: points, normals, and `Contacts` of all pairs."""
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from ..core import native
-from ..scene.scene import Pair, Scene
-from ..scene.scene_solver import Answer
-from ..solver.nearest import Nearests
-from .cdr import (
-    CONTACT_BYTES,
-    COUNT,
-    ENCAPSULATION,
-    HEAD,
-    LITTLE,
-    MOST_NAMES,
-    NANOSECONDS,
-    NEAR_BYTES,
-    REVISION,
-)
+from ..scene.scene_solver import SceneSolver
+from .pairing import TickPoses, check_frames
+from .streams import ALL_BOXES
 
-VECTOR_BYTES = 8 * 3
+Written = tuple[bytes, list[tuple[Any, bytes, bytes]], int, list[tuple[int, int]]]
+"""The message of all contacts; the topics of pairs in contact, with their point and normal; how
+many pairs are in contact; the boxes of stale pairs, as `Answer.stale` has them."""
 
 
-class ContactWriter:
-    """Makes the messages of one scene; the bytes of its names are made once."""
+class TickWriter:
+    """Answers the ticks of one scene, each in one call of the core (tick_writer.hpp)."""
 
-    def __init__(self, scene: Scene) -> None:
-        self._names_of = lru_cache(MOST_NAMES)(
-            lambda a, b, at: _names(scene.pair_of(a, b), at))
+    def __init__(self, solver: SceneSolver, topics: Mapping[tuple[str, str], Any]) -> None:
+        """Take what solves the scene, and whatever stands for the topics of pairs of boxes."""
+        self.solver, scene = solver, solver.scene
+        self._streams = (ALL_BOXES,) if scene.pose_array else solver.moving
+        place, index = {name: number for number, name in enumerate(self._streams)}, scene.index_of
+        known = {pair: topic for pair, topic in topics.items() if scene.boxes.keys() >= set(pair)}
+        watched = [(*map(index.__getitem__, pair),
+                    *(place.get(scene.mover(box), -1) for box in pair)) for pair in known]
+        self._write = native.TickWriter(
+            *solver.parts(), scene.names, scene.rows, tuple(pair.label for pair in scene.pairs),
+            np.array(watched, np.int64).reshape(-1, 4), tuple(known.values()), scene.frame_id,
+            solver.revision)
 
-    def contacts(self, header: bytes, answer: Answer) -> bytes:
-        """Return the `Contacts` of an answer."""
-        contacts = answer.contacts
-        numbers = native.message_numbers(contacts.point, contacts.normal, contacts.separation,
-                                         contacts.volume, contacts.covariance).tobytes()
-        parts, at = [aligned(header), REVISION.pack(answer.revision)], 0
-        for pairs, body, size in (
-                (answer.pairs, numbers, CONTACT_BYTES),
-                (answer.near_pairs, near_numbers(answer.near).tobytes(), NEAR_BYTES)):
-            parts.append(COUNT.pack(len(pairs)))
-            at, end = (at + COUNT.size) % 8, 0
-            for a, b in pairs.tolist():
-                begin, end = end, end + size
-                parts += self._names_of(a, b, at), body[begin:end]
-                at = 0  # doubles end each entry, so the next one begins at a multiple of 8
-        stale = answer.named_stale()
-        parts.append(COUNT.pack(len(stale)))
-        parts.append(b''.join([_string(pair.label) for pair in stale]))
-        return b''.join(parts)
+    def __call__(self, poses: TickPoses) -> Written:
+        """Return what is published of a tick; ValueError: it is refused.
 
-
-def near_numbers(near: Nearests) -> np.ndarray:
-    """Return rows (n, 10) as `Near` has them: distance, normal, point_a, point_b."""
-    return np.column_stack((near.distance, near.normal, near.point_a, near.point_b))
-
-
-def header_bytes(stamp: int, frame_id: str) -> bytes:
-    """Return the encapsulation and the header of a stamp [ns]."""
-    return HEAD.pack(LITTLE, *divmod(stamp, NANOSECONDS)) + _string(frame_id)
-
-
-def aligned(data: bytes) -> bytes:
-    """Return the start of a message, padded so that doubles may follow.
-
-    Behind a header, three make a PointStamped or a Vector3Stamped. So does a revision follow.
-    """
-    return data + b'\0' * ((ENCAPSULATION - len(data)) % 8)
-
-
-@lru_cache  # of the frame, in each tick
-def _string(text: str) -> bytes:
-    """Return a string with its length before it, and padded to a multiple of 4 behind it."""
-    data = text.encode() + b'\0'
-    return COUNT.pack(len(data)) + data + b'\0' * (-len(data) % 4)
-
-
-def _names(pair: Pair, at: int) -> bytes:
-    """Return the names that an entry begins with, padded so that doubles may follow.
-
-    at: where they begin, by the distance from a multiple of 8: 0 or 4.
-    """
-    names = b''.join(map(_string, (pair.label, pair.a, pair.b)))
-    return names + b'\0' * (-(at + len(names)) % 8)
+        Points and normals have the newer stamp of their pair, all contacts that of the tick.
+        """
+        written: Written | None = self._write(poses)
+        if written is None:
+            check_frames(self.solver.scene, self._streams, poses)
+            numbers: list[Any] = [pose and pose.numbers for pose in poses]
+            self.solver(numbers[0] if self.solver.scene.pose_array else numbers)
+        assert written is not None
+        return written

@@ -71,6 +71,18 @@ def phase_arguments(n: int = 4) -> list[Any]:
             np.full(n, -1, np.int32)]
 
 
+def writer_arguments(n: int = 4) -> list[Any]:
+    """Return what TickWriter takes: the same boxes; all but the last are parts of a body."""
+    return [native.BroadPhase(*phase_arguments(n)), ContactSolver(), 0.1, 9, np.ones((n, 3)),
+            rows(n + 1), np.array([n - 1, n]), np.array([n] * (n - 1) + [-1]), rows(n),
+            tuple('abcd'), np.array([[1, 0]]), ('named',), np.array([[1, 0, 1, 1]]), (None,),
+            'map', 3]
+
+
+STAMPED = [(POSE, 'map', 5), (POSE, 'map', 7)]
+"""A tick of these boxes."""
+
+
 def refused(kind: type[Exception], call: Callable[..., Any], *args: Any) -> None:
     try:
         call(*args)
@@ -309,6 +321,9 @@ def random_calls(seed: int, rounds: int) -> None:
         (native.BroadPhase, phase_arguments(), {}),
         (native.BroadPhase(*phase_arguments()).find, [rows(), 10], {}),
         (native.BroadPhase(*phase_arguments()).resize, [np.arange(4), np.ones((4, 3))], {}),
+        (native.TickWriter, writer_arguments(), {}),
+        (native.TickWriter(*writer_arguments()), [list(STAMPED)], {}),
+        (native.TickWriter(*writer_arguments()), [[odd(rng, STAMPED[0]), STAMPED[1]]], {}),
         (native.message_numbers, [np.ones((4, 3)), np.ones((4, 3)), np.ones(4), np.ones(4),
                                   np.ones((4, 3, 3))], {}),
         (native.patch_areas, [np.ones((4, 3)), np.ones((4, 3, 3))], {}),

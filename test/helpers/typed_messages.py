@@ -4,6 +4,7 @@
 """The oracle of messages: what the node reads and writes as bytes, by rclpy's message objects."""
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -33,6 +34,8 @@ from box_contact_ros.stream.cdr import NANOSECONDS, MessageError
 from box_contact_ros.stream.pairing import StampedPose
 from box_contact_ros.stream.read_contacts import UPPER, ReadContacts, read_contacts
 
+NUMBERS = {'double': 'd', 'int32': 'i', 'uint32': 'I', 'uint64': 'Q'}
+"""Formats of `struct` by the kinds of fields."""
 TOLD = FIELDS[:-1]
 """What a message says of a contact: all but its axis."""
 
@@ -105,6 +108,35 @@ def _stamped(numbers: np.ndarray, header: Header) -> StampedPose:
         raise MessageError('bad header', 'frame_id is too long')
     return StampedPose(numbers, header.frame_id,
                        header.stamp.sec * NANOSECONDS + header.stamp.nanosec)
+
+
+def as_bytes(message: Any) -> bytes:
+    """Return a message as it is sent, padding zero: rclpy leaves there what was in memory."""
+    body = bytearray()
+    _append(body, message, '')
+    body += b'\0' * (-len(body) % 4)
+    sent = serialize_message(message)
+    assert len(sent) + -len(sent) % 4 == 4 + len(body)
+    return b'\0\1\0\0' + bytes(body)
+
+
+def _append(body: bytearray, value: Any, kind: str) -> None:
+    """Append a value of a kind to the body of a message, as CDR lays it out."""
+    if kind in NUMBERS:
+        data = struct.pack(f'<{NUMBERS[kind]}', value)
+        body += b'\0' * (-len(body) % len(data)) + data
+    elif kind == 'string':
+        data = value.encode() + b'\0'
+        _append(body, len(data), 'uint32')
+        body += data
+    elif kind.endswith(('>', ']')):
+        if kind.endswith('>'):
+            _append(body, len(value), 'uint32')
+        for part in value:
+            _append(body, part, kind.removeprefix('sequence<').rstrip('>]6['))
+    else:
+        for name, of_part in value.get_fields_and_field_types().items():
+            _append(body, getattr(value, name), of_part)
 
 
 def make_point(header: Header, contact: Contact) -> PointStamped:

@@ -122,9 +122,8 @@ def test_an_error_inside_does_not_end_the_node(node, client, monkeypatch):
     def broken(*_):
         raise RuntimeError('planted')
 
-    broken.scene = node._tick.solver.scene
     with monkeypatch.context() as patch:
-        patch.setattr(node._tick._revision, 'solver', broken)
+        patch.setattr(node._tick, '_writer', broken)
         stamp = client.send(ORIGIN, TOUCHING)
         assert client.spin(lambda: node.counts['refused: internal error'] > 0)
     client.ask(ORIGIN, TOUCHING)

@@ -219,13 +219,13 @@ def test_a_slow_node_says_so_and_is_late_by_few_ticks(array_node, array_client, 
     """Of arrays at 100 Hz it answers a third, and those that are new. Services come in between."""
     tick, client = array_node._tick, array_client
 
-    def slow(poses, solver=tick.solver):
+    def slow(poses, writer=tick._writer):
         time.sleep(0.03)
-        return solver(poses)
+        return writer(poses)
 
-    slow.scene, slow.moving = tick.solver.scene, tick.solver.moving
+    slow.solver = tick.solver
     reset = client._client_of(Trigger, 'contact_node/reset')
-    monkeypatch.setattr(tick._revision, 'solver', slow)
+    monkeypatch.setattr(tick, '_writers', {len(tick.solver.moving): slow})
     sent, behind = [], []
 
     def stream(done):

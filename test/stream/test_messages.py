@@ -5,20 +5,21 @@
 from __future__ import annotations
 
 import struct
+from collections import Counter
+from dataclasses import replace
 from itertools import product
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
-from hypothesis import given
+from geometry_msgs.msg import PoseStamped
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from message_fuzz import STRICTER, TYPES, fuzz, outcome_of
 from poses import assert_same_bits
 from rclpy.serialization import deserialize_message, serialize_message
 from typed_messages import (
     TOLD,
+    as_bytes,
     make_contacts,
     make_normal,
     make_point,
@@ -31,15 +32,19 @@ from typed_messages import (
 
 from box_contact_msgs.msg import Contacts as ContactsMessage
 from box_contact_ros import ContactSolver
+from box_contact_ros.core import native
+from box_contact_ros.models.make_model import make_model
 from box_contact_ros.node.messages import KeptMessages, make_header
-from box_contact_ros.scene.scene import Pair, two_boxes
-from box_contact_ros.scene.scene_solver import Answer
-from box_contact_ros.solver.contact import Contact, Contacts
+from box_contact_ros.scene.scene import EVERY_PAIR, NOWHERE, Box, Frame, Pair, Scene, two_boxes
+from box_contact_ros.scene.scene_solver import SceneSolver
+from box_contact_ros.solver.contact import Contacts
+from box_contact_ros.solver.contacts_of import TooManyNear
 from box_contact_ros.solver.nearest import Nearests
 from box_contact_ros.stream.cdr import MessageError
+from box_contact_ros.stream.pairing import StampedPose
 from box_contact_ros.stream.read_contacts import read_contacts
 from box_contact_ros.stream.read_poses import PoseReader
-from box_contact_ros.stream.write_contacts import ContactWriter, aligned, header_bytes
+from box_contact_ros.stream.write_contacts import TickWriter
 from box_contact_ros.view.live.listener import read_answer
 
 STAMPS = st.integers(-2**31 * 10**9, 2**31 * 10**9 - 1)
@@ -56,7 +61,6 @@ GOOD = bytes(serialize_message(pose_stamped(POSE, 'map', STAMP)))
 ARRAY = bytes(serialize_message(pose_array([POSE] * 2, 'map', STAMP)))
 NEAR = Nearests(np.zeros(1, bool), np.array([0.5]), np.array([[0.0, 0.6, 0.8]]),
                 np.array([[1.0, 2.0, 3.0]]), np.array([[1.0, 2.3, 3.4]]))
-NO_NEAR, NONE = NEAR[:0], np.empty((0, 2), np.int64)
 
 
 # --- poses in -------------------------------------------------------------------------------------
@@ -193,80 +197,180 @@ def test_bytes_that_are_no_pose_array_are_refused(data):
 # --- contacts out ---------------------------------------------------------------------------------
 
 
-def some_near(draw, count):
-    numbers = np.array(draw(st.lists(st.tuples(*[FLOATS] * 10), min_size=count, max_size=count)))
-    distance, *vectors = np.split(numbers.reshape(count, 10), [1, 4, 7], axis=1)
-    return Nearests(np.zeros(count, bool), distance[:, 0], *vectors)
+def written(scene, poses, *, model='exact', margin=0.0, topics=None):
+    """Return what a new writer publishes of a tick."""
+    solver = SceneSolver(scene, model=model, margin=margin)
+    return TickWriter(solver, topics or {})(poses)
 
 
-def a_contact(draw):
-    three = st.tuples(*[BOUNDED] * 3)
-    return Contact(True, draw(BOUNDED), np.array(draw(three)), np.array(draw(three)),
-                   draw(FLOATS), np.array(draw(st.tuples(three, three, three))))
+def typed(scene, poses, *, model='exact', margin=0.0, topics=None):
+    """Return the same by `Answer` and rclpy's objects: the oracle."""
+    numbers = [pose and pose.numbers for pose in poses]
+    known = [pose for pose in poses if pose]
+    solver = SceneSolver(scene, model=model, margin=margin)
+    answer = solver(numbers[0] if scene.pose_array else numbers)
+    frame_id = known[0].frame_id
+    message = make_contacts(make_header(max(pose.stamp for pose in known), frame_id),
+                            answer.named(), [pair.label for pair in answer.named_stale()],
+                            answer.named_near())
+    of_pairs = []
+    for pair, contact in answer.named():
+        if (pair.a, pair.b) in (topics or {}):
+            movers = [] if scene.pose_array else [
+                poses[solver.moving.index(mover)] for mover in map(scene.mover, (pair.a, pair.b))
+                if mover in solver.moving]
+            header = make_header(max(pose.stamp for pose in movers or known), frame_id)
+            of_pairs.append((topics[pair.a, pair.b], as_bytes(make_point(header, contact)),
+                             as_bytes(make_normal(header, contact))))
+    return as_bytes(message), of_pairs, answer.touching, list(map(tuple, answer.stale.tolist()))
 
 
-@given(st.data(), STAMPS, FRAMES, st.integers(0, 4), st.integers(0, 2), st.integers(0, 3))
-def test_answers_are_written_alike(data, stamp, frame_id, touching, close, stale):
-    """Decoded, the bytes are the objects.
+class Told:
+    """A model that says of each row of a batch what it was told."""
 
-    Any number of contacts, any frame and names (their lengths move all that follows), pairs that
-    are close, pairs that are stale.
-    """
-    pairs = [Pair(*data.draw(st.tuples(*[NAMES] * 3))) for _ in range(touching + close + stale)]
-    names: Any = SimpleNamespace(pair_of=lambda row, _: pairs[row])
-    contacts, near = [a_contact(data.draw) for _ in range(touching)], some_near(data.draw, close)
-    rows = np.array([(row, 0) for row in range(len(pairs))], np.int64).reshape(-1, 2)
-    listed, near_rows, stale_rows = np.split(rows, [touching, touching + close])
-    answer = Answer(listed, Contacts.of(contacts), near_rows, near, 0, stale_rows, names,
-                    stamp % 2**64)
-    writer, header, typed_header = (
-        ContactWriter(names), header_bytes(stamp, frame_id), make_header(stamp, frame_id))
-    wanted = make_contacts(typed_header, zip(pairs, contacts),
-                           [pair.label for pair in pairs[touching + close:]],
-                           zip(pairs[touching:], near))
-    wanted.revision = answer.revision
-    for _ in range(2):  # the second time the writer knows the names
-        written = deserialize_message(writer.contacts(header, answer), ContactsMessage)
-        assert str(written) == str(wanted)  # as text, where NaN is NaN
-    said = writer.contacts(header, answer)
-    for length in range(0, len(said) - 4, 13):
+    def __init__(self, contacts):
+        self.contacts = contacts
+
+    def solve(self, a, b, size_a, size_b, threads=1):
+        return self.contacts[np.arange(len(a))], -1
+
+
+@given(st.data(), STAMPS, FRAMES, st.integers(1, 4), st.integers(0, 3))
+def test_any_numbers_and_names_are_written_as_rclpy_writes_them(data, stamp, frame_id, touching,
+                                                                stale):
+    """To the byte: names and frames of any length move all that follows. And read again."""
+    count = touching + stale
+    names = data.draw(st.lists(NAMES, min_size=2 * count, max_size=2 * count, unique=True))
+    labels = data.draw(st.lists(NAMES, min_size=count, max_size=count, unique=True))
+    pairs = tuple(map(Pair, labels, names[::2], names[1::2]))
+    assume(len({pair.label for pair in pairs}) == count)
+    numbers = np.array(data.draw(st.lists(
+        st.tuples(*[BOUNDED] * 7, FLOATS, *[BOUNDED] * 9), min_size=count, max_size=count)))
+    contacts = Contacts(np.ones(count, bool), numbers[:, 0].copy(), numbers[:, 1:4].copy(),
+                        numbers[:, 4:7].copy(), numbers[:, 7].copy(),
+                        numbers[:, 8:].reshape(count, 3, 3), np.full(count, -1, np.int32))
+    scene = Scene({name: Box((1.0, 1.0, 1.0)) for name in names}, pairs)
+    poses = [StampedPose(POSE, frame_id, stamp) if number < 2 * touching or number % 2 else None
+             for number in range(2 * count)]
+    topics = {(pair.a, pair.b): pair.label for pair in pairs}
+    given = (scene, poses)
+    message, *rest = written(*given, model=Told(contacts), topics=topics)
+    assert [message, *rest] == list(typed(*given, model=Told(contacts), topics=topics))
+    for length in range(0, len(message) - 4, 13):
         with pytest.raises(MessageError):
-            read_contacts(said[:length])
-    read = read_contacts(said)
+            read_contacts(message[:length])
+    read = read_contacts(message)
     assert read[:2] == (stamp, frame_id)
-    assert read.names + read.near_names == [
-        (pair.label, pair.a, pair.b) for pair in pairs[:touching + close]]
-    assert len(read.names) == touching
-    assert read.stale == [pair.label for pair in pairs[touching + close:]]
-    for field in ('distance', 'normal', 'point_a', 'point_b'):
-        assert np.array_equal(getattr(read.near, field), getattr(near, field), equal_nan=True)
-    assert_same_bits(read.contacts, answer.contacts, 'separation', 'volume', 'point', 'normal',
-                     'colliding')
-    for c in contacts:
-        point, normal = (aligned(header) + vector.tobytes() for vector in (c.point, c.normal))
-        assert deserialize_message(point, PointStamped) == make_point(typed_header, c)
-        assert deserialize_message(normal, Vector3Stamped) == make_normal(typed_header, c)
+    assert read.names == [(pair.label, pair.a, pair.b) for pair in pairs[:touching]]
+    assert read.stale == [pair.label for pair in pairs[touching:]]
+    assert_same_bits(read.contacts, contacts[:touching], 'separation', 'volume', 'point', 'normal')
+
+
+def a_scene(rng):
+    """Return a scene of two to seven boxes: listed pairs, patterns, fixed boxes, bodies, arrays."""
+    is_cubes = rng.random() < 0.5
+    size = (1.0, 1.0, 1.0) if is_cubes else None
+    bodies = {'body': Frame()} if rng.random() < 0.3 else {}
+    boxes = {f'{"bö" * int(rng.integers(1, 5))}{number}': Box(
+        size or rng.uniform(0.5, 2.0, 3),
+        None if number < 2 or rng.random() < 0.6 else a_place(rng)) for number in range(
+            rng.integers(2, 8))}
+    for number in range(2) if bodies else ():
+        boxes[f'part{number}'] = Box(size or rng.uniform(0.5, 2.0, 3), a_place(rng), body='body')
+    first, second, *_ = boxes
+    pairs = [Pair(rng.choice(['', 'named', 'n']), second, first)] if rng.random() < 0.6 else []
+    return Scene(boxes, tuple(pairs), pose_array=bool(rng.random() < 0.3), bodies=bodies,
+                 patterns=EVERY_PAIR if not pairs or rng.random() < 0.5 else (),
+                 frame_id=str(rng.choice(['', 'yard']))), is_cubes
+
+
+def a_place(rng):
+    return np.concatenate((rng.uniform(-1.2, 1.2, 3), rng.normal(size=4)))
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_ticks_are_written_as_rclpy_writes_answers(seed):
+    """To the byte: random scenes, poses, stamps, margins and frames, models in C++ and others."""
+    rng, seen = np.random.default_rng(seed), Counter()
+    for _ in range(100):
+        scene, is_cubes = a_scene(rng)
+        frame_id = scene.frame_id or str(rng.choice(['', 'map', 'ünit']))
+        poses = [StampedPose(a_place(rng).tolist(), frame_id, int(rng.integers(-9, 9 * 10**9)))
+                 if rng.random() < 0.9 else None for _ in scene.moving]
+        if not any(poses):
+            continue
+        if scene.pose_array:
+            rows = np.array([pose.numbers if pose else NOWHERE for pose in poses])
+            poses = [StampedPose(rows, frame_id, 5)]
+        name = rng.choice(['exact', 'mlp', *['paper'] * is_cubes, 'object'])
+        model = Asked() if name == 'object' else make_model(name)
+        margin = float(rng.choice([0.0, 0.5])) if name in ('exact', 'mlp') else 0.0
+        topics = {(pair.a, pair.b): pair for pair in scene.every_pair() if rng.random() < 0.7}
+        options = {'model': model, 'margin': margin, 'topics': topics}
+        wanted = typed(scene, poses, **options)
+        assert written(scene, poses, **options) == wanted
+        seen.update([name, *(f'{part} {bool(wanted[part])}' for part in range(1, 4)),
+                     f'near {bool(read_contacts(wanted[0]).near_names)}'])
+    assert len(seen) == 4 + 2 * 4 and min(seen.values()) > 2, seen
+
+
+class Asked:
+    """A model in Python that answers as `exact` does."""
+
+    def solve(self, *args):
+        return native.Exact().solve(*args)
+
+
+def test_a_tick_in_two_frames_is_refused():
+    scene = Scene({name: Box((1.0, 1.0, 1.0)) for name in 'abc'}, patterns=EVERY_PAIR)
+    poses = [StampedPose(POSE, 'map', 5), None, StampedPose(POSE, '/map', 7)]
+    for frame_id, words in (('', "^a is in frame 'map', c in '/map': the leading slash"),
+                            ('yard', "^the scene is in frame 'yard', a in 'map': send all")):
+        with pytest.raises(MessageError, match=words) as refused:
+            written(replace(scene, frame_id=frame_id), poses)
+        assert refused.value.reason == 'frame_id differs'
+
+
+def test_what_the_core_refuses_the_solver_says():
+    """A pose that is none, of a box and of a body; too many pairs; too few poses."""
+    scene = Scene({name: Box((1.0, 1.0, 1.0)) for name in 'abc'}, patterns=EVERY_PAIR)
+    poses = [StampedPose(POSE, 'map', 5)] * 3
+    with pytest.raises(TooManyNear, match='more than 2 pairs'):
+        TickWriter(SceneSolver(scene, most_near=2), {})(poses)
+    bad = StampedPose((0,) * 7, 'map', 5)
+    with pytest.raises(ValueError, match='pose of b: quaternion .* zero length'):
+        written(scene, [poses[0], bad, poses[2]])
+    of_body = replace(scene, boxes={**scene.boxes, 'd': Box((1.0, 1.0, 1.0), body='all')},
+                      bodies={'all': Frame()})
+    with pytest.raises(ValueError, match='pose of all: quaternion .* zero length'):
+        written(of_body, [*poses, bad])
+    with pytest.raises(ValueError, match='2 poses, but 3 boxes'):
+        written(scene, poses[:2])
 
 
 def test_what_a_client_reads_is_the_contact_again():
     """Every number to the bit, the covariance symmetric again; the answer of the scene, too."""
     scene = two_boxes((2, 3, 1), (1, 2, 2))
-    rows = np.array([[0, 1]])
-    overlap = ContactSolver((2, 3, 1), (1, 2, 2), model='exact')(
-        (0, 0, 0, 0, 0, 0, 1), (0.3, 0.4, 1.2, 0.1, 0.2, 0.3, 0.9))
-    for answer in (Answer(rows, Contacts.of([overlap]), NONE, NO_NEAR, 1, NONE, scene),
-                   Answer(NONE, Contacts.of([]), rows, NEAR, 1, NONE, scene),
-                   Answer(NONE, Contacts.of([]), NONE, NO_NEAR, 0, rows, scene)):
-        read = read_answer(
-            read_contacts(ContactWriter(scene).contacts(header_bytes(0, 'map'), answer)), scene)
+    below = StampedPose(POSE, 'map', STAMP)
+    for z in (2.9, 4.0, None):
+        above = z and StampedPose((1.3, 2.4, 1.3 + z, 0.1, 0.2, 0.3, 0.9), 'map', STAMP)
+        answer = SceneSolver(scene, margin=1.0)([POSE, above and above.numbers])
+        read = read_answer(read_contacts(written(scene, [below, above], margin=1.0)[0]), scene)
+        assert [len(answer.pairs), len(answer.near_pairs), len(answer.stale)] == [
+            z == 2.9, z == 4.0, z is None]
         assert np.array_equal(read.stale, answer.stale)
         assert np.array_equal(read.pairs, answer.pairs)
         assert np.array_equal(read.near_pairs, answer.near_pairs)
         assert np.array_equal(read.near.point_b, answer.near.point_b)
         assert_same_bits(read.contacts, answer.contacts, *TOLD)
-    message = make_contacts(make_header(0, 'map'), [(Pair('p', 'a', 'b'), overlap)])
+    message = make_contacts(make_header(0, 'map'), [(Pair('p', 'a', 'b'), a_contact())])
     with pytest.raises(MessageError, match="'p' is no pair of the scene"):
         read_answer(read_contacts(serialize_message(message)), scene)
+
+
+def a_contact():
+    return ContactSolver((2, 3, 1), (1, 2, 2))((0, 0, 0, 0.2, 0.1, 0.4, 1),
+                                               (0.3, 0.4, 1.2, 0.1, 0.2, 0.3, 0.9))
 
 
 def test_no_field_of_a_contact_is_left_out():
@@ -274,15 +378,13 @@ def test_no_field_of_a_contact_is_left_out():
 
     A new field of Contact.msg fails here until each way sets it.
     """
-    overlap = ContactSolver((2, 3, 1), (1, 2, 2), model='exact')(
-        (0, 0, 0, 0.2, 0.1, 0.4, 1), (0.3, 0.4, 1.2, 0.1, 0.2, 0.3, 0.9))
-    scene, contacts = two_boxes((2, 3, 1), (1, 2, 2)), Contacts.of([overlap])
-    answer = Answer(np.array([[0, 1]]), contacts, NONE, NO_NEAR, 1, NONE, scene)
-    written = deserialize_message(
-        ContactWriter(scene).contacts(header_bytes(STAMP, 'map'), answer), ContactsMessage)
-    kept, = KeptMessages(1).fill([('p', 'a', 'b')], contacts)
-    assert unset(type(kept)()) and unset(written.contacts[0]) == unset(kept) == []
-    read = read_contacts(serialize_message(written)).contacts
+    poses = [StampedPose((0, 0, 0, 0.2, 0.1, 0.4, 1), 'map', STAMP),
+             StampedPose((0.3, 0.4, 1.2, 0.1, 0.2, 0.3, 0.9), 'map', STAMP)]
+    data = written(two_boxes((2, 3, 1), (1, 2, 2)), poses)[0]
+    message = deserialize_message(data, ContactsMessage)
+    kept, = KeptMessages(1).fill([('p', 'a', 'b')], Contacts.of([a_contact()]))
+    assert unset(type(kept)()) and unset(message.contacts[0]) == unset(kept) == []
+    read = read_contacts(data).contacts
     for name in TOLD:
         assert np.all(getattr(read, name)), name
 

@@ -11,7 +11,6 @@ import pytest
 
 from box_contact_ros.scene.scene import Box, Pair, Scene, two_boxes
 from box_contact_ros.stream.pairing import (
-    NEVER,
     NO_PARTNER,
     OLD,
     PAIRINGS,
@@ -22,12 +21,10 @@ from box_contact_ros.stream.pairing import (
     RESETS,
     TOO_LATE,
     WAITING_TICKS,
-    FramesDiffer,
     LatestPairing,
     RejectedPose,
     StampedPose,
     StampPairing,
-    Tick,
 )
 from box_contact_ros.stream.streams import ALL_BOXES
 
@@ -348,21 +345,3 @@ def test_latest_never_answers_with_an_old_pose(late):
     assert None not in stamps(pairing.add(other, pose(100 * MS)))
     tick = stamps(pairing.add(other, pose(101 * MS)))
     assert tick[late == 'box_b'] is None and pairing.stale() == [late]
-
-
-def test_a_tick_has_the_newest_stamp_and_one_frame():
-    """And what SceneSolver takes: a list, or the array of a message of all poses."""
-    boxes = {name: Box((1.0, 1.0, 1.0)) for name in 'abc'}
-    scene = Scene(boxes, patterns=(('*', '*'),))
-    numbers = [np.full(7, float(box)) for box in range(3)]
-    given = [StampedPose(numbers[0], 'map', 5), None, StampedPose(numbers[2], 'map', 7)]
-    tick = Tick.of(scene, given)
-    assert (tick.stamp, tick.frame_id, tick.stamps) == (7, 'map', [5, NEVER, 7])
-    assert tick.poses[0] is numbers[0] and tick.poses[1] is None
-    array = Scene(boxes, patterns=(('*', '*'),), pose_array=True)
-    assert Tick.of(array, [StampedPose(np.zeros((3, 7)), 'map', 5)]).poses.shape == (3, 7)
-    given[2] = given[2]._replace(frame_id='/map')
-    with pytest.raises(FramesDiffer, match="^a is in frame 'map', c in '/map': the leading slash"):
-        Tick.of(scene, given)
-    with pytest.raises(FramesDiffer, match="^the scene is in frame 'yard', a in 'map': send all"):
-        Tick.of(Scene(boxes, patterns=(('*', '*'),), frame_id='yard'), given)

@@ -10,6 +10,7 @@
 #include "pair_solver.hpp"
 #include "patch_area.hpp"
 #include "pose_faults.hpp"
+#include "tick_writer.hpp"
 
 namespace {
 
@@ -101,8 +102,11 @@ PyObject* make_module() {
   add("Exact", Py_NewRef(exact_type));
   add("Mlp", Py_NewRef(mlp_type));
   add("Paper", Py_NewRef(paper_type));
-  add("PairSolver", PyType_FromSpec(&solver_spec));
-  add("BroadPhase", PyType_FromSpec(&broad_phase_spec));
+  solver_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&solver_spec)));
+  broad_phase_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&broad_phase_spec)));
+  add("PairSolver", Py_NewRef(solver_type));
+  add("BroadPhase", Py_NewRef(broad_phase_type));
+  add("TickWriter", PyType_FromSpec(&tick_writer_spec));
   add("PatchForces", PyType_FromSpec(&forces_spec));
   using Whole = std::pair<const char*, long>;
   for (auto [name, value] : {Whole{"NETWORK_FORMAT", detail::network_format},

@@ -107,6 +107,21 @@ inline Pose<double> pose_at(const double* p) {
 // Write the poses of the boxes of bodies to the first n of rows (m, 7). `bodies` (n,): the row of
 // each box's body, or −1. `local` (n, 7): the boxes' poses in the bodies' frames. Returns the row of
 // a body whose pose is bad, or −1. Seven NaN: the body is not there, nor are its boxes.
+inline int64_t place_boxes_of_bodies(double* rows, const int64_t* bodies, npy_intp n,
+                                     const double* local) {
+  for (npy_intp box = 0; box < n; ++box) {
+    int64_t row = bodies[box];
+    if (row < 0) continue;
+    const double* body = rows + 7 * row;
+    bool is_there = !std::all_of(body, body + 7, [](double number) { return std::isnan(number); });
+    if (is_there && !detail::pose_is_valid(body)) return row;
+    Pose<double> pose = pose_in_common_frame(pose_at(body), pose_at(local + 7 * box));
+    std::copy_n(pose.position.v, 3, rows + 7 * box);
+    std::copy_n(pose.quaternion, 4, rows + 7 * box + 3);
+  }
+  return -1;
+}
+
 inline PyObject* place_boxes(PyObject*, PyObject* const* args, Py_ssize_t count) {
   if (count != 3 || !is_plain<double>(args[0]))
     fail(PyExc_TypeError, "place_boxes(rows, bodies, local)");
@@ -115,18 +130,11 @@ inline PyObject* place_boxes(PyObject*, PyObject* const* args, Py_ssize_t count)
   auto local = read<double>(args[2], "local", {bodies.length(0), 7});
   if (!PyArray_ISWRITEABLE(rows.array())) fail(PyExc_ValueError, "rows is read-only");
   if (bodies.length(0) > rows.length(0)) fail(PyExc_ValueError, "bodies has more than rows");
-  for (npy_intp box = 0; box < bodies.length(0); ++box) {
-    int64_t row = bodies.numbers[box];
-    if (row < 0) continue;
-    if (row >= rows.length(0)) fail(PyExc_ValueError, "bodies has a row that `rows` lacks");
-    const double* body = rows.numbers + 7 * row;
-    bool is_there = !std::all_of(body, body + 7, [](double number) { return std::isnan(number); });
-    if (is_there && !detail::pose_is_valid(body)) return PyLong_FromLongLong(row);
-    Pose<double> pose = pose_in_common_frame(pose_at(body), pose_at(local.numbers + 7 * box));
-    std::copy_n(pose.position.v, 3, rows.numbers + 7 * box);
-    std::copy_n(pose.quaternion, 4, rows.numbers + 7 * box + 3);
-  }
-  return PyLong_FromLong(-1);
+  for (npy_intp box = 0; box < bodies.length(0); ++box)
+    if (bodies.numbers[box] >= rows.length(0))
+      fail(PyExc_ValueError, "bodies has a row that `rows` lacks");
+  return PyLong_FromLongLong(
+      place_boxes_of_bodies(rows.numbers, bodies.numbers, bodies.length(0), local.numbers));
 }
 
 // Rows of pairs, as arrays that stay alive.
