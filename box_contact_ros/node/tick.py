@@ -3,8 +3,8 @@
 
 """One way for every tick: bytes → pose → tick of all boxes → contacts → messages.
 
-`PoseReader` judges a pose, `Pairing` joins poses to ticks, and `TickWriter` answers a tick with the
-bytes of messages, in one call of the core.
+`read_pose` reads and judges a pose, and `Pairing` joins poses to ticks. `TickWriter` answers a tick
+with the bytes of messages, in one call of the core.
 """
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ..scene.scene_solver import SceneSolver
 from ..solver.checks import absent_poses, are_poses, pose_fault
 from ..stream.cdr import NANOSECONDS, MessageError
 from ..stream.pairing import OVERTAKEN, PAIRINGS, Pairing, StampedPose, TickPoses
-from ..stream.read_poses import PoseReader
+from ..stream.read_poses import read_pose, read_poses
 from ..stream.streams import ALL_BOXES
 from ..stream.write_contacts import TickWriter
 from .diagnostics import TickMonitor
@@ -108,7 +108,6 @@ class TickAnswerer:
         self.set_solver(solver)
         self.set_times(settings)
         self._queues: dict[str, PoseQueue] = {}  # by box
-        self._reader = PoseReader()
         self.active = False
 
     @property
@@ -135,7 +134,7 @@ class TickAnswerer:
     def callback_of(self, box: str, topic: str) -> PoseCallback:
         """Return the callback for the bytes of a box, or of all; it raises nothing at all."""
         queue = self._queues[box] = PoseQueue(partial(self._topics.publisher_count, box))
-        read = self._read_all if box == ALL_BOXES else self._reader.read_pose
+        read = self._read_all if box == ALL_BOXES else read_pose
 
         def callback(data: bytes, info: Mapping[str, Any]) -> None:
             if not self.active:
@@ -166,7 +165,7 @@ class TickAnswerer:
 
     def _read_all(self, data: bytes) -> StampedPose:
         """Return the poses of all that moves; a bad one is counted, and its name absent."""
-        poses = self._reader.read_poses(data)
+        poses = read_poses(data)
         count = len(poses.numbers)
         if count not in self._writers:
             raise MessageError('wrong number of poses',

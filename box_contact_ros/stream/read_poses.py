@@ -3,7 +3,8 @@
 
 """Poses from the bytes of messages.
 
-What a pose is, the core decides.
+The core reads the usual ones, and decides what a pose is. The rest is read here, or refused in
+words.
 """
 from __future__ import annotations
 
@@ -16,7 +17,6 @@ from ..solver.checks import pose_fault
 from .cdr import (
     ENCAPSULATION,
     FRAME_AT,
-    LITTLE,
     NANOSECONDS,
     PADDING,
     MessageError,
@@ -25,42 +25,46 @@ from .cdr import (
 )
 from .pairing import StampedPose
 
-_POSE = struct.Struct('<7d')
-_LAYOUT = '<2s2xiI{}s{}x7d'
-"""Of a whole little-endian pose, by the sizes of frame_id, its length included, and of what aligns
-the numbers."""
+POSE_BYTES = 8 * 7
 _new_tuple = tuple.__new__  # a named tuple's own constructor is Python code
 
 
-def numbers_at(length: int) -> int:
-    """Return where the seven numbers are, behind a frame_id of so many bytes; aligned to 8."""
-    return ENCAPSULATION + -(-(FRAME_AT - ENCAPSULATION + length) // 8) * 8
+def read_pose(data: bytes) -> StampedPose:
+    """Return the pose of a serialised PoseStamped, or raise MessageError."""
+    found = native.read_pose(data)
+    return _read_in_python(bytes(data)) if found is None else _new_tuple(StampedPose, found)
 
 
-def parse_pose(data: bytes) -> tuple[tuple[float, ...], str, int, int]:
-    """Return numbers, frame_id, seconds and nanoseconds of a PoseStamped, or raise MessageError."""
+def _read_in_python(data: bytes) -> StampedPose:
     order, sec, nanosec, length = parse_head(data, 'PoseStamped')
-    at = numbers_at(length)
-    if not 0 <= len(data) - (at + _POSE.size) <= PADDING:
+    at = ENCAPSULATION + -(-(FRAME_AT - ENCAPSULATION + length) // 8) * 8
+    if not 0 <= len(data) - (at + POSE_BYTES) <= PADDING:
         raise MessageError('not a PoseStamped',
                            f'{len(data)} bytes, where a frame_id of {length} needs '
-                           f'{at + _POSE.size}')
+                           f'{at + POSE_BYTES}')
     frame_id = parse_frame(data, length, 'PoseStamped')
-    return struct.unpack_from(f'{order}7d', data, at), frame_id, sec, nanosec
+    pose = StampedPose(struct.unpack_from(f'{order}7d', data, at), frame_id, _stamp(sec, nanosec))
+    if fault := pose_fault(pose.numbers):
+        raise MessageError('bad pose', fault)
+    return pose
 
 
-def parse_poses(data: bytes) -> tuple[np.ndarray, str, int, int]:
-    """Return the same of a PoseArray, numbers (n, 7), or raise MessageError."""
+def read_poses(data: bytes) -> StampedPose:
+    """Return all poses of a serialised PoseArray, numbers (n, 7), or raise MessageError.
+
+    A row may be no pose: the box of that row has none.
+    """
+    data = bytes(data)
     order, sec, nanosec, length = parse_head(data, 'PoseArray')
     count_at = -(-(FRAME_AT + length) // 4) * 4
     count = struct.unpack_from(f'{order}I', data, count_at)[0] if count_at + 4 <= len(data) else 0
     at = ENCAPSULATION + -(-count_at // 8) * 8 if count else count_at + 4
-    if not 0 <= len(data) - (at + count * _POSE.size) <= PADDING:
+    if not 0 <= len(data) - (at + count * POSE_BYTES) <= PADDING:
         raise MessageError('not a PoseArray', f'{len(data)} bytes, where {count} poses with a '
                                               f'frame_id of {length} need '
-                                              f'{at + count * _POSE.size}')
+                                              f'{at + count * POSE_BYTES}')
     numbers = np.frombuffer(data, f'{order}f8', 7 * count, at).reshape(count, 7).astype(np.float64)
-    return numbers, parse_frame(data, length, 'PoseArray'), sec, nanosec
+    return StampedPose(numbers, parse_frame(data, length, 'PoseArray'), _stamp(sec, nanosec))
 
 
 def _stamp(sec: int, nanosec: int) -> int:
@@ -68,46 +72,3 @@ def _stamp(sec: int, nanosec: int) -> int:
     if nanosec >= NANOSECONDS:
         raise MessageError('bad header', f'stamp has {nanosec} nanoseconds, a second or more')
     return sec * NANOSECONDS + nanosec
-
-
-class PoseReader:
-    """Reads the poses of all boxes. A shortcut knows the frame of the last pose."""
-
-    def __init__(self) -> None:
-        self._frame: bytes | None = None
-        self._frame_id = ''
-        self._unpack = struct.Struct(_LAYOUT.format(0, 0)).unpack
-
-    def read_pose(self, data: bytes) -> StampedPose:
-        """Return the pose of a serialised PoseStamped, or raise MessageError."""
-        try:
-            order, sec, nanosec, frame, *numbers = self._unpack(data)
-        except struct.error:  # another length
-            return self._read_slowly(data)
-        if (frame == self._frame and order == LITTLE and nanosec < NANOSECONDS
-                and not native.pose_fault(numbers)):
-            return _new_tuple(StampedPose, (numbers, self._frame_id, sec * NANOSECONDS + nanosec))
-        return self._read_slowly(data)
-
-    def _read_slowly(self, data: bytes) -> StampedPose:
-        data = bytes(data)
-        numbers, frame_id, sec, nanosec = parse_pose(data)
-        stamp = _stamp(sec, nanosec)
-        fault = pose_fault(numbers)
-        if fault:
-            raise MessageError('bad pose', fault)
-        if data[:2] == LITTLE:
-            length = int.from_bytes(data[FRAME_AT - 4:FRAME_AT], 'little')  # 0 or 1 of an empty one
-            start, end = FRAME_AT - 4, FRAME_AT + length
-            self._frame, self._frame_id = data[start:end], frame_id
-            self._unpack = struct.Struct(
-                _LAYOUT.format(end - start, numbers_at(length) - end)).unpack
-        return StampedPose(numbers, frame_id, stamp)
-
-    def read_poses(self, data: bytes) -> StampedPose:
-        """Return all poses of a serialised PoseArray, numbers (n, 7), or raise MessageError.
-
-        A row may be no pose: the box of that row has none.
-        """
-        numbers, frame_id, sec, nanosec = parse_poses(bytes(data))
-        return StampedPose(numbers, frame_id, _stamp(sec, nanosec))

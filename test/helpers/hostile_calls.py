@@ -321,6 +321,7 @@ def random_calls(seed: int, rounds: int) -> None:
         (native.BroadPhase, phase_arguments(), {}),
         (native.BroadPhase(*phase_arguments()).find, [rows(), 10], {}),
         (native.BroadPhase(*phase_arguments()).resize, [np.arange(4), np.ones((4, 3))], {}),
+        (native.read_pose, [rng.bytes(int(rng.integers(90)))], {}),
         (native.TickWriter, writer_arguments(), {}),
         (native.TickWriter(*writer_arguments()), [list(STAMPED)], {}),
         (native.TickWriter(*writer_arguments()), [[odd(rng, STAMPED[0]), STAMPED[1]]], {}),

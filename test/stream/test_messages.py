@@ -11,6 +11,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+import typed_messages
 from geometry_msgs.msg import PoseStamped
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -25,8 +26,6 @@ from typed_messages import (
     make_point,
     pose_array,
     pose_stamped,
-    read_pose,
-    read_poses,
     unset,
 )
 
@@ -43,7 +42,7 @@ from box_contact_ros.solver.nearest import Nearests
 from box_contact_ros.stream.cdr import MessageError
 from box_contact_ros.stream.pairing import StampedPose
 from box_contact_ros.stream.read_contacts import read_contacts
-from box_contact_ros.stream.read_poses import PoseReader
+from box_contact_ros.stream.read_poses import read_pose, read_poses
 from box_contact_ros.stream.write_contacts import TickWriter
 from box_contact_ros.view.live.listener import read_answer
 
@@ -68,31 +67,25 @@ NEAR = Nearests(np.zeros(1, bool), np.array([0.5]), np.array([[0.0, 0.6, 0.8]]),
 
 @given(st.lists(st.tuples(NUMBERS, FRAMES, STAMPS), min_size=1, max_size=5))
 def test_poses_are_read_alike(poses):
-    """Bytes and objects give the same pose to the bit, or the same reason.
-
-    Any numbers, frames and stamps, one after another: the reader keeps what it knows of the frame
-    before.
-    """
-    reader = PoseReader()
-    for pose in [*poses, *poses]:
+    """Bytes and objects give the same pose to the bit, or the same reason."""
+    for pose in poses:
         message = pose_stamped(*pose)
-        assert outcome_of(reader.read_pose, bytes(serialize_message(message))) == outcome_of(
-            read_pose, message)
+        assert outcome_of(read_pose, bytes(serialize_message(message))) == outcome_of(
+            typed_messages.read_pose, message)
 
 
 @given(st.lists(st.tuples(*[FLOATS] * 7), max_size=4), FRAMES, STAMPS)
 def test_pose_arrays_are_read_alike(rows, frame_id, stamp):
     """Numbers to the bit, of any count and any frame, whose length moves all that follows."""
     message = pose_array(rows, frame_id, stamp)
-    outcome = outcome_of(PoseReader().read_poses, bytes(serialize_message(message)))
-    assert outcome == outcome_of(read_poses, message)
+    outcome = outcome_of(read_poses, bytes(serialize_message(message)))
+    assert outcome == outcome_of(typed_messages.read_poses, message)
     assert outcome == (np.array(rows, dtype=float).tobytes(), (len(rows), 7), frame_id, stamp)
 
 
 @pytest.mark.parametrize('order', ['<', '>'])
 def test_what_cdr_leaves_open_makes_no_difference(order):
     """Byte order, options, padding of any value, and an empty frame_id with its NUL or without."""
-    reader = PoseReader()
     for options, frame, padding, tail in product(
             (b'\0\0', b'\0\3', b'\xff\xff'), (b'ma\0', b'map\0', b'\0', b''), (b'\0', b'\xff'),
             (b'', b'\xff', b'\0' * 3)):
@@ -102,11 +95,11 @@ def test_what_cdr_leaves_open_makes_no_difference(order):
         data = start + head + padding * (-len(head) % 8) + pose
         counted = head + padding * (-len(head) % 4) + struct.pack(f'{order}I', 1)
         array = start + counted + padding * (-len(counted) % 8) + pose
-        for _ in range(2):  # the second time the reader knows the frame
-            for stamped in (reader.read_pose(data), reader.read_poses(array)):
-                numbers = np.array(stamped.numbers)
-                assert numbers.ravel().tolist() == list(POSE) and numbers.dtype == np.float64
-                assert (stamped.frame_id, stamped.stamp) == (frame[:-1].decode(), STAMP)
+        assert (native.read_pose(data) is None) == (order == '>')  # which Python reads
+        for stamped in (read_pose(data), read_poses(array)):
+            numbers = np.array(stamped.numbers)
+            assert numbers.ravel().tolist() == list(POSE) and numbers.dtype == np.float64
+            assert (stamped.frame_id, stamped.stamp) == (frame[:-1].decode(), STAMP)
 
 
 @pytest.mark.parametrize('frame_id, is_read', [
@@ -115,10 +108,10 @@ def test_what_cdr_leaves_open_makes_no_difference(order):
     ids=['255', '256', '254 of two bytes', '256 of two bytes', '4 MB'])
 def test_a_long_frame_is_refused(frame_id, is_read):
     """It would be kept. Bytes count, not characters."""
-    wanted = outcome_of(read_pose, pose_stamped(POSE, frame_id, STAMP))
+    wanted = outcome_of(typed_messages.read_pose, pose_stamped(POSE, frame_id, STAMP))
     assert (len(wanted) > 1) == is_read
-    for read, message in ((PoseReader().read_pose, pose_stamped(POSE, frame_id, STAMP)),
-                          (PoseReader().read_poses, pose_array([POSE], frame_id, STAMP))):
+    for read, message in ((read_pose, pose_stamped(POSE, frame_id, STAMP)),
+                          (read_poses, pose_array([POSE], frame_id, STAMP))):
         outcome = outcome_of(read, bytes(serialize_message(message)))
         assert outcome[-2:] == (wanted[-2:] if is_read else ('bad header',))
 
@@ -136,23 +129,19 @@ def test_mutated_messages_are_read_as_rclpy_reads_them(message_type):
 @pytest.mark.parametrize('kind', [b'\0\3', b'\0\7', b'\0\x09', b'\0\x0b', b'\1\1'])
 def test_another_encapsulation_is_refused_by_its_name(kind):
     """A list of parameters, three forms of XCDR2, and one that nobody has defined."""
-    for read, good in ((PoseReader().read_pose, GOOD), (PoseReader().read_poses, ARRAY)):
+    for read, good in ((read_pose, GOOD), (read_poses, ARRAY)):
         with pytest.raises(MessageError,
                            match=f'encapsulation 0x{kind.hex()} is neither .* use XCDR1'):
             read(kind + good[2:])
 
 
-@pytest.mark.parametrize('warm', [False, True])
 @given(st.one_of(st.binary(max_size=200), st.binary(max_size=100).map(lambda b: GOOD[:4] + b),
                  st.integers(0, len(GOOD) - 1).map(lambda n: GOOD[:n]),
                  st.binary(min_size=4, max_size=9).map(lambda b: GOOD + b)))
-def test_other_bytes_are_refused(warm, data):
-    """Garbage, cut short, too long: MessageError alone, whatever was read before."""
-    reader = PoseReader()
-    if warm:
-        reader.read_pose(GOOD)
+def test_other_bytes_are_refused(data):
+    """Garbage, cut short, too long: MessageError alone."""
     with pytest.raises(MessageError):
-        reader.read_pose(data)
+        read_pose(data)
 
 
 @pytest.mark.parametrize('numbers, reason', [
@@ -160,10 +149,8 @@ def test_other_bytes_are_refused(warm, data):
     ((0, 0, 0, 0, np.nan, 0, 1), 'is not finite'), ((0, 0, 2e50, 0, 0, 0, 1), 'exceeds'),
     ((1e308, 0, 0, 0, 0, 0, 1), 'exceeds'), ((0,) * 7, 'has zero length')])
 def test_a_pose_that_is_none_is_refused_with_its_reason(numbers, reason):
-    reader = PoseReader()
-    reader.read_pose(GOOD)
     with pytest.raises(MessageError, match=reason) as refused:
-        reader.read_pose(bytes(serialize_message(pose_stamped(numbers, 'map', STAMP))))
+        read_pose(bytes(serialize_message(pose_stamped(numbers, 'map', STAMP))))
     assert refused.value.reason == 'bad pose'
 
 
@@ -175,7 +162,7 @@ def test_a_pose_that_is_none_is_refused_with_its_reason(numbers, reason):
     (lambda data: data[:12] + b'\xff' * 4 + data[16:], 'not a')])
 def test_headers_are_checked(change, reason):
     """A second of nanoseconds, a frame that is not UTF-8 or no string, a length beyond the end."""
-    for read, good in ((PoseReader().read_pose, GOOD), (PoseReader().read_poses, ARRAY)):
+    for read, good in ((read_pose, GOOD), (read_poses, ARRAY)):
         with pytest.raises(MessageError) as refused:
             read(change(good))
         assert refused.value.reason.startswith(reason)
@@ -190,7 +177,7 @@ COUNT_AT = ARRAY.index(b'\2\0\0\0')
     ARRAY[:COUNT_AT] + b'\xff' * 4 + ARRAY[COUNT_AT + 4:], GOOD], ids=range(8))
 def test_bytes_that_are_no_pose_array_are_refused(data):
     with pytest.raises(MessageError) as refused:
-        PoseReader().read_poses(data)
+        read_poses(data)
     assert refused.value.reason == 'not a PoseArray'
 
 

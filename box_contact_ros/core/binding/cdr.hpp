@@ -14,13 +14,15 @@ namespace box_contact::binding {
 
 class CdrWriter {
  public:
+  // The second byte of a message in the order of bytes of this machine.
+  static constexpr char kind = __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__;
+
   // Begin a message with its header: the stamp [ns] and the frame.
   void begin(int64_t stamp, std::string_view frame_id) {
     constexpr int64_t second = 1'000'000'000;
     int64_t sec = stamp / second, nanosec = stamp % second;
     if (nanosec < 0) --sec, nanosec += second;
-    constexpr char is_little = __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__;
-    bytes_.assign({0, is_little, 0, 0});
+    bytes_.assign({0, kind, 0, 0});
     number(int32_t(sec));
     number(uint32_t(nanosec));
     text({frame_id});

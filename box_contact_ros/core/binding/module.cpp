@@ -10,6 +10,7 @@
 #include "pair_solver.hpp"
 #include "patch_area.hpp"
 #include "pose_faults.hpp"
+#include "read_pose.hpp"
 #include "tick_writer.hpp"
 
 namespace {
@@ -40,6 +41,9 @@ PyMethodDef module_methods[] = {
      "pose_fault(pose)\n--\n\nReturn why seven numbers are no pose, a PoseFault; 0 if they are."},
     {"pose_faults", method<pose_faults>(), METH_O,
      "pose_faults(poses)\n--\n\nReturn the same of poses (n, 7), (n,)."},
+    {"read_pose", method<read_pose>(), METH_O,
+     "read_pose(data)\n--\n\n"
+     "Return seven numbers, frame_id and stamp [ns] of a PoseStamped's bytes, or None."},
     {"write_poses", method<write_poses>(), METH_FASTCALL,
      "write_poses(to, rows, poses)\n--\n\n"
      "Write a list of poses (7,), or None for NaN, to rows (n,) of an array (m, 7).\n\n"

@@ -36,7 +36,7 @@ from ...solver.checks import are_poses, short_repr
 from ...stream.cdr import MessageError
 from ...stream.pairing import StampedPose
 from ...stream.read_contacts import ReadContacts, read_contacts
-from ...stream.read_poses import PoseReader
+from ...stream.read_poses import read_pose, read_poses
 from ...stream.streams import ALL_BOXES, topics_of
 
 KEPT = 1000  # poses kept per topic: a second at 1 kHz
@@ -128,21 +128,21 @@ def pose_topics(scene: Scene) -> list[PoseTopic]:
     topics = []
     for source, topic in topics_of(scene).items():
         is_array = source == ALL_BOXES
-        names, read = (scene.moving, _read_array) if is_array else ((source,), _read_one)
-        # Each topic has a reader of its own, which knows the topic's frame.
+        names, read = ((scene.moving, partial(_read_array, len(scene.moving))) if is_array else
+                       ((source,), _read_one))
         topics.append(PoseTopic(topic, PoseArray if is_array else PoseStamped, pose_qos(source),
-                                names, partial(read, PoseReader(), len(names))))
+                                names, read))
     return topics
 
 
-def _read_one(reader: PoseReader, _: int, data: bytes) -> StampedPose:
-    pose = reader.read_pose(data)
+def _read_one(data: bytes) -> StampedPose:
+    pose = read_pose(data)
     return pose._replace(numbers=np.array([pose.numbers]))
 
 
-def _read_array(reader: PoseReader, count: int, data: bytes) -> StampedPose:
+def _read_array(count: int, data: bytes) -> StampedPose:
     """Return so many poses, or more. A bad pose becomes NaN: the contact node reports it."""
-    poses = reader.read_poses(data)
+    poses = read_poses(data)
     if len(poses.numbers) < count:
         raise MessageError('wrong number of poses',
                            f'{len(poses.numbers)} poses, but {count} boxes and bodies of the scene '
