@@ -159,6 +159,19 @@ def test_a_free_spin_keeps_its_angular_momentum(rate: float) -> None:
     assert np.linalg.norm(world.spins()[0] - before) <= 1e-3 * np.linalg.norm(before)
 
 
+@pytest.mark.parametrize('size', [CUBE, (1.0, 1.0 + 1e-9, 1.0 - 1e-9), (1.0, 1.00001, 1.0)])
+@pytest.mark.parametrize('rate', [1e-6, 1e-2, 10.0])
+def test_what_is_all_but_a_cube_turns_as_fast_as_it_spins(size: tuple, rate: float) -> None:
+    """Its energy says nothing of its attitude, so none is corrected by it."""
+    world = World((size, 3.0, (0, 0, 0)))
+    world.velocities[0, 3:] = rate * np.array([0.6, 0.0, 0.8])
+    for _ in range(100):
+        before = world.poses[0, 3:]
+        world.step()
+        gone = 2.0 * math.asin(min(1.0, 0.5 * np.linalg.norm(world.poses[0, 3:] - before)))
+        assert 2.0 * gone == pytest.approx(rate * STEP, rel=1e-4, abs=1e-15)
+
+
 # --- momentum and energy --------------------------------------------------------------------------
 
 

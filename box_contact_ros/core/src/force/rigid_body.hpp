@@ -175,14 +175,20 @@ inline void turn_about(int x, double t, double (&q)[4]) {
   q[z] = norm * (at_z - t * at_y);
 }
 
-// Put twice the kinetic energy right. The body turns a little under its angular momentum, which stays.
-inline void keep_energy(const Body& body, double energy, double (&q)[4], Vec<double>& momentum) {
+// Where the angle of momentum and velocity is less [rad], rounding would say how to put the energy right.
+constexpr double least_angle = 0x1p-20;
+
+// Put twice the kinetic energy right. The body turns a little under its angular momentum, which stays: by
+// `most` [rad]. Of a cube, and about a principal axis, there is nothing to put right.
+inline void keep_energy(const Body& body, double energy, double most, double (&q)[4],
+                        Vec<double>& momentum) {
   Vec<double> speed = momentum * body.inverse_inertia;
   double squared = dot(momentum, momentum), found = dot(momentum, speed);
   Vec<double> across = speed - (found / squared) * momentum;
-  double slope = 2.0 * dot(across, speed);
-  if (!(slope > 0.0) || !(std::fabs(found - energy) < turn_limit * energy)) return;
-  Vec<double> turned = momentum - ((found - energy) / slope) * across;
+  double slope = 2.0 * dot(across, across), amount = (found - energy) / slope;
+  if (!(slope > least_angle * least_angle * dot(speed, speed))) return;
+  if (!(amount * amount * slope <= most * most * squared)) return;
+  Vec<double> turned = momentum - amount * across;
   turned = std::sqrt(squared / dot(turned, turned)) * turned;
   Vec<double> half = (0.5 / squared) * cross(turned, momentum);
   double w = q[3], norm = 1.0 / std::sqrt(1.0 + dot(half, half));
@@ -199,20 +205,23 @@ inline void keep_energy(const Body& body, double energy, double (&q)[4], Vec<dou
 inline void tumble(const Body& body, double h, double (&q)[4], Vec<double>& momentum) {
   Vec<double> speed = momentum * body.inverse_inertia;
   double energy = dot(momentum, speed);
-  double turns = std::ceil(std::min(length(speed) * h / turn_limit, double(turns_max)));
+  double angle = length(speed) * h;
+  double turns = std::ceil(std::min(double(turns_max), angle / turn_limit));
   constexpr int axes[] = {0, 1, 2, 1, 0};
   for (int k = int(turns); k-- > 0;)
     for (int step = 0; step < 5; ++step) {
       int x = axes[step], y = (x + 1) % 3, z = (x + 2) % 3;
-      double angle = (step == 2 ? 1.0 : 0.5) * (h / turns) * momentum[x] * body.inverse_inertia[x];
-      double half = 0.5 * angle, t = half + half * half * half / 3.0;  // tan(angle / 2)
+      double part = (step == 2 ? 1.0 : 0.5) * (h / turns);
+      double half = 0.5 * part * momentum[x] * body.inverse_inertia[x],
+             t = half + half * half * half / 3.0;  // tan(angle / 2)
       double scale = 1.0 / (1.0 + t * t), cosine = scale * (1.0 - t * t), sine = 2.0 * scale * t;
       double along_y = momentum[y], along_z = momentum[z];
       momentum[y] = cosine * along_y + sine * along_z;
       momentum[z] = cosine * along_z - sine * along_y;
       turn_about(x, t, q);
     }
-  for (int newton = 0; newton < 2; ++newton) keep_energy(body, energy, q, momentum);
+  for (int newton = 0; newton < 2; ++newton)
+    keep_energy(body, energy, turn_limit * std::min(angle, 1.0), q, momentum);
 }
 
 // Two Newton steps of the midpoint rule are enough up to this turn in a step [rad]. A needle that turned by
