@@ -36,14 +36,6 @@ struct Moving {
   Motion pushed;  // its velocities before relaxation, at the end of the advance
   double load;    // weights that it bears and its own [N]
   int carriers;   // how many patches bear it
-
-  // Move by the velocities for a time.
-  void move(double h) {
-    placed.position += h * linear;
-    if (dot(angular, angular) == 0.0) return;
-    spin(quaternion, angular, h);
-    placed.axes = rotation_matrix(quaternion);
-  }
 };
 
 // How pressing and rocking are solved: the impulses change by −mass·(v + bias + softness·impulses).
@@ -67,7 +59,8 @@ struct Block {
   NormalRows pushing, relaxed;
   Mat<double> friction_mass;
   Vec<double> normal_impulses, friction_impulses;
-  Vec<double> normal_sum, friction_sum;  // of the sub-steps
+  Vec<double> normal_counted, friction_counted;  // what of them is in the sums of the bodies
+  Vec<double> normal_sum, friction_sum;          // of the sub-steps
 };
 
 // Rocking whose centre of pressure is within the spans: N·n at x·e1 + y·e2 has the moment
@@ -153,37 +146,60 @@ inline Vec<double> arm_of(const Moving& body, const Vec<double>& point, double h
   return body.inverse_mass > 0.0 ? arm : arm + 0.5 * h * cross(body.angular, arm);
 }
 
-// Make the rows of a patch, where its bodies are now.
-inline void prepare(const Patch& patch, const Moving& a, const Moving& b, const SubSteps& step,
-                    Block& block) {
-  const Rectangle& shape = patch.shape;
+// Put the point of a patch where its bodies are now. Returns its depth there.
+inline double place(const Patch& patch, const Moving& a, const Moving& b, double h, Block& block) {
   // The patch goes with the body that no force moves, or with the mean of two that are free.
   Vec<double> way_a = carried(patch.asked_a, a.placed, patch.point) - patch.point;
   Vec<double> way_b = carried(patch.asked_b, b.placed, patch.point) - patch.point;
   double share = a.inverse_mass > 0.0 ? b.inverse_mass > 0.0 ? 0.5 : 1.0 : 0.0;
   Vec<double> point = patch.point + (1.0 - share) * way_a + share * way_b;
-  block.arm_a = arm_of(a, point, step.length);
-  block.arm_b = arm_of(b, point, step.length);
-  block.normal = patch.normal;
-  block.surface = patch.surface;
-  block.shape = shape;
-  block.friction = patch.friction;
+  block.arm_a = arm_of(a, point, h);
+  block.arm_b = arm_of(b, point, h);
+  return patch.depth + dot(way_a - way_b, patch.normal);
+}
 
-  const Vec<double>&arm_a = block.arm_a, &arm_b = block.arm_b;
-  Vec<double> about = shape.radius * patch.normal;
+// Make the masses of friction and torsion. Returns how pressing and rocking comply.
+inline Mat<double> weigh(const Moving& a, const Moving& b, Block& block) {
+  const Rectangle& shape = block.shape;
+  const Vec<double>&arm_a = block.arm_a, &arm_b = block.arm_b, &normal = block.normal;
+  Vec<double> about = shape.radius * normal;
   Mat<double> along =
       compliance<2>(a, b, {cross(arm_a, shape.axis_1), cross(arm_a, shape.axis_2), about},
                     {cross(arm_b, shape.axis_1), cross(arm_b, shape.axis_2), about},
                     {shape.axis_1, shape.axis_2});
   block.friction_mass = inverse(along);
   block.least_friction_mass = 1.0 / std::max(std::max(along[0][0], along[1][1]), along[2][2]);
-  Mat<double> across =
-      compliance<1>(a, b, {cross(arm_a, patch.normal), shape.axis_1, shape.axis_2},
-                    {cross(arm_b, patch.normal), shape.axis_1, shape.axis_2}, {patch.normal});
+  Mat<double> across = compliance<1>(a, b, {cross(arm_a, normal), shape.axis_1, shape.axis_2},
+                                     {cross(arm_b, normal), shape.axis_1, shape.axis_2}, {normal});
   block.normal_compliance = across[0][0];
-  double depth = patch.depth + dot(way_a - way_b, patch.normal);
-  block.depth = depth;
-  soften(patch, step, depth, a, b, across, block);
+  return across;
+}
+
+// Make the rows of a patch, where its bodies are now.
+inline void prepare(const Patch& patch, const Moving& a, const Moving& b, const SubSteps& step,
+                    Block& block) {
+  block.normal = patch.normal;
+  block.surface = patch.surface;
+  block.shape = patch.shape;
+  block.friction = patch.friction;
+  block.normal_counted = block.friction_counted = {};
+  block.depth = place(patch, a, b, step.length, block);
+  soften(patch, step, block.depth, a, b, weigh(a, b, block), block);
+}
+
+// Rows stay where they are while their bodies turn by no more than this [rad], and move on each other
+// by no more than this part of a patch; and masses as they are up to the other.
+constexpr double still = 0x1p-30, alike = 0x1p-10;
+
+// Let the rows go with bodies that have moved: impulses by the arms of before would change the angular
+// momentum, and by the inertia of before the energy.
+inline void follow(const Patch& patch, const Moving& a, const Moving& b, double h, Block& block) {
+  double turned = std::max(length(a.angular), length(b.angular));
+  double way = length(b.linear - a.linear);
+  double moved = h * std::max(turned, way / block.shape.half_1);
+  if (moved <= still) return;
+  place(patch, a, b, h, block);
+  if (moved > alike) block.relaxed.mass = softened(weigh(a, b, block), block.relaxed.softness);
 }
 
 // Give B an impulse at the point and an angular impulse, and A the opposite.
@@ -206,10 +222,13 @@ inline void apply_friction(const Block& block, const Vec<double>& x, Moving& a, 
         (block.shape.radius * x[2]) * block.normal, a, b);
 }
 
-// Add up the impulses that its bodies get.
-inline void count(const Block& block, Moving& a, Moving& b) {
+// Add up the impulses that its bodies got since they were counted last.
+inline void count(Block& block, Moving& a, Moving& b) {
   const Rectangle& shape = block.shape;
-  const Vec<double>&normal = block.normal_impulses, &friction = block.friction_impulses;
+  Vec<double> normal = block.normal_impulses - block.normal_counted;
+  Vec<double> friction = block.friction_impulses - block.friction_counted;
+  block.normal_counted = block.normal_impulses;
+  block.friction_counted = block.friction_impulses;
   Vec<double> impulse =
       normal[0] * block.normal + (friction[0] * shape.axis_1 + friction[1] * shape.axis_2);
   Vec<double> turn = (normal[1] * shape.axis_1 + normal[2] * shape.axis_2) +

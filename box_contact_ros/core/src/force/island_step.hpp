@@ -90,9 +90,9 @@ class IslandStep {
       }
       bool is_last = number == steps.count;
       solve(island, steps.rounds * options_.iterations, &Block::pushing);
-      if (is_last) end_pushing(island);
-      for (size_t k = island.body; k < island.body_end; ++k) moving_[k].move(steps.length);
-      solve(island, steps.rounds * options_.relaxations, &Block::relaxed);
+      if (step_.motion.wrenches) count_impulses(island);
+      for (size_t k = island.body; k < island.body_end; ++k) move(moving_[k], steps.length);
+      relax(island, steps);
       if (!is_last && step_.motion.wrenches) count_impulses(island);
       for (size_t k = island.block; k < island.block_end; ++k)
         store(blocks_[k], steps, patches_[size_t(blocks_[k].patch)]);
@@ -127,7 +127,7 @@ class IslandStep {
     Moving moving{};
     moving.body = int32_t(k);
     begin(moving);
-    for (int number = 0; number < step_.steps.count; ++number) moving.move(step_.steps.length);
+    for (int number = 0; number < step_.steps.count; ++number) move(moving, step_.steps.length);
     write_pose(moving);
   }
 
@@ -141,6 +141,7 @@ class IslandStep {
     for (int i = 0; i < 4; ++i) moving.quaternion[i] = scale * step_.poses[k].quaternion[i];
     moving.impulse = moving.angular_impulse = {};
     if (!bodies_[k].is_free()) return;
+    moving.inverse_inertia = inverse_inertia_of(bodies_[k], moving.placed);
     // A caller who moves by the wrenches comes back with the speed of pushing out.
     if (!step_.came_by_wrenches) return;
     const auto& [pushed, relaxed] = ended_[k];
@@ -153,24 +154,10 @@ class IslandStep {
   }
   // Move a body that nothing touches.
   void fly(Moving& moving) const {
-    const Body& body = bodies_[size_t(moving.body)];
-    double h = step_.steps.length;
-    Vec<double> ones{1.0, 1.0, 1.0}, inertia = ones / body.inverse_inertia;
-    Vec<double> momentum =
-        inertia * transposed_times(moving.placed.axes, moving.angular);  // in its own frame
     for (int number = 1; number <= step_.steps.count; ++number) {
-      if (step_.outside) {
-        const bc_wrench& outside = step_.outside[moving.body];
-        moving.linear += (h * body.inverse_mass) * vector(outside.force);
-        momentum += h * transposed_times(moving.placed.axes, vector(outside.torque));
-      }
-      moving.placed.position += h * moving.linear;
-      if (dot(momentum, momentum) == 0.0) continue;
-      tumble(body, h, moving.quaternion, momentum);
-      moving.placed.axes = rotation_matrix(moving.quaternion);
+      drive(moving, number, step_.steps);
+      move(moving, step_.steps.length);
     }
-    moving.angular = moving.placed.axes * (momentum * body.inverse_inertia);
-    moving.pushed = {moving.linear, moving.angular};
   }
 
   // Solve the contacts of an island anew, where its bodies are within the advance.
@@ -183,6 +170,15 @@ class IslandStep {
     }
   }
 
+  // Move a body by its velocities for a time.
+  void move(Moving& moving, double h) const {
+    const Body& body = bodies_[size_t(moving.body)];
+    moving.placed.position += h * moving.linear;
+    turn_freely(body, h, moving.quaternion, moving.placed, moving.angular);
+    if (body.is_free()) moving.inverse_inertia = inverse_inertia_of(body, moving.placed);
+    moving.pushed = {moving.linear, moving.angular};
+  }
+
   // Change velocities by all but contacts, for sub-step `number`.
   void drive(Moving& moving, int number, const SubSteps& steps) const {
     auto k = size_t(moving.body);
@@ -191,10 +187,6 @@ class IslandStep {
       carry(moving, (number - 0.5) / steps.count - 0.5);
       return;
     }
-    moving.inverse_inertia = inverse_inertia_of(bodies_[k], moving.placed);
-    const Mat<double>& axes = moving.placed.axes;
-    moving.angular +=
-        axes * gyroscopic_change(bodies_[k], transposed_times(axes, moving.angular), h);
     if (!step_.outside) return;
     moving.linear += (h * bodies_[k].inverse_mass) * vector(step_.outside[k].force);
     moving.angular += h * (moving.inverse_inertia * vector(step_.outside[k].torque));
@@ -247,17 +239,20 @@ class IslandStep {
     }
   }
 
+  void relax(const Island& island, const SubSteps& steps) const {
+    if (options_.relaxations == 0) return;
+    for (size_t k = island.block; k < island.block_end; ++k) {
+      Block& block = blocks_[k];
+      follow(patches_[size_t(block.patch)], moving_[size_t(block.a)], moving_[size_t(block.b)],
+             steps.length, block);
+    }
+    solve(island, steps.rounds * options_.relaxations, &Block::relaxed);
+  }
+
   void count_impulses(const Island& island) const {
     for (size_t k = island.block; k < island.block_end; ++k) {
-      const Block& block = blocks_[k];
+      Block& block = blocks_[k];
       count(block, moving_[size_t(block.a)], moving_[size_t(block.b)]);
-    }
-  }
-  void end_pushing(const Island& island) const {
-    if (step_.motion.wrenches) count_impulses(island);
-    for (size_t k = island.body; k < island.body_end; ++k) {
-      Moving& moving = moving_[k];
-      moving.pushed = {moving.linear, moving.angular};
     }
   }
   // A sum is finite only if all its numbers are.

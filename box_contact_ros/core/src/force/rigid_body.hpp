@@ -130,38 +130,11 @@ inline Mat<double> inverse_inertia_of(const Body& body, const Placed& placed) {
   return m;
 }
 
-// A body that turns less in a step [rad] has no gyroscopic change: it is beyond the digits of ω.
-constexpr double least_turn = 0x1p-54;
+// A body that turns less at a time [rad] keeps its angular velocity: the change is beyond its digits.
+constexpr double least_turn = 0x1p-40;
 
-// How much the angular velocity ω of a body that turns little changes in a step h by itself; all in its
-// frame.
-//
-// Implicit midpoint, which keeps the energy, by two Newton steps: I·Δ = −h·ω̄ × I·ω̄ with ω̄ = ω + Δ/2.
-// An explicit step gains energy without bound. What Newton leaves of the energy is scaled off.
-inline Vec<double> midpoint_change(const Body& body, const Vec<double>& angular, double h) {
-  if (h * largest(abs(angular)) < least_turn) return {0.0, 0.0, 0.0};
-  const Vec<double>& inverse_inertia = body.inverse_inertia;
-  Vec<double> ones{1.0, 1.0, 1.0}, inertia = ones / inverse_inertia;
-  // Euler's equations: the rate of ω0 is share[0]·ω1·ω2, and so on.
-  Vec<double> share =
-      Vec<double>{inertia[1] - inertia[2], inertia[2] - inertia[0], inertia[0] - inertia[1]} *
-      inverse_inertia;
-  Vec<double> change{0.0, 0.0, 0.0};
-  for (int newton = 0; newton < 2; ++newton) {
-    Vec<double> mean = angular + 0.5 * change, x = (0.5 * h) * share;
-    Vec<double> rate = share * Vec<double>{mean[1] * mean[2], mean[2] * mean[0], mean[0] * mean[1]};
-    Mat<double> slope{{{1.0, -x[0] * mean[2], -x[0] * mean[1]},
-                       {-x[1] * mean[2], 1.0, -x[1] * mean[0]},
-                       {-x[2] * mean[1], -x[2] * mean[0], 1.0}}};
-    change = change - inverse(slope) * (change - h * rate);
-  }
-  Vec<double> after = angular + change;
-  double energy = dot(inertia * angular, angular), found = dot(inertia * after, after);
-  return found > 0.0 ? std::sqrt(energy / found) * after - angular : change;
-}
-
-// A body that nothing touches turns by no more than this at a time [rad], and so often at most: its energy
-// then swings by 4e-5, before it is put right.
+// A body turns by no more than this at a time [rad], and so often at most: its energy then swings by
+// 4e-5, before it is put right.
 constexpr double turn_limit = 0.05;
 constexpr int turns_max = 1000;
 
@@ -198,7 +171,7 @@ inline void keep_energy(const Body& body, double energy, double most, double (&q
   momentum = turned;
 }
 
-// Turn a body that nothing touches for a time h: about each of its own axes in turn, there and back
+// Turn a body on which nothing acts for a time h: about each of its own axes in turn, there and back
 // (Dullweber, Leimkuhler and McLachlan, "Symplectic splitting methods for rigid body molecular dynamics",
 // 1997). Its angular momentum in the common frame stays the same to rounding, and so does its energy.
 // `momentum`: in its own frame.
@@ -224,17 +197,21 @@ inline void tumble(const Body& body, double h, double (&q)[4], Vec<double>& mome
     keep_energy(body, energy, turn_limit * std::min(angle, 1.0), q, momentum);
 }
 
-// Two Newton steps of the midpoint rule are enough up to this turn in a step [rad]. A needle that turned by
-// 0.8 rad in a sub-step had 76 times its speed after some of them, about its axis of least inertia.
-constexpr double midpoint_limit = 0.5;
-
-// How much the angular velocity ω of a body changes in a step h by itself; all in its frame before.
-inline Vec<double> gyroscopic_change(const Body& body, const Vec<double>& angular, double h) {
-  if (h * length(angular) <= midpoint_limit) return midpoint_change(body, angular, h);
-  Vec<double> ones{1.0, 1.0, 1.0}, momentum = (ones / body.inverse_inertia) * angular;
-  double turned[4] = {0.0, 0.0, 0.0, 1.0};
-  tumble(body, h, turned, momentum);
-  return rotation_matrix(turned) * (momentum * body.inverse_inertia) - angular;
+// Turn a body for a time h, and change its angular velocity in the common frame as it does by itself.
+inline void turn_freely(const Body& body, double h, double (&q)[4], Placed& placed,
+                        Vec<double>& angular) {
+  double most = largest(abs(angular));
+  if (most == 0.0) return;
+  if (!body.is_free() || h * most < least_turn) {
+    spin(q, angular, h);
+    placed.axes = rotation_matrix(q);
+    return;
+  }
+  Vec<double> momentum =
+      transposed_times(placed.axes, angular) / body.inverse_inertia;  // in its own frame
+  tumble(body, h, q, momentum);
+  placed.axes = rotation_matrix(q);
+  angular = placed.axes * (momentum * body.inverse_inertia);
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET::force
