@@ -310,15 +310,21 @@ inline double solve_friction(Block& block, Moving& a, Moving& b) {
   return largest(abs(change)) / block.least_friction_mass;
 }
 
+// Velocities along the rows of pressing and rocking, beyond the bias.
+inline Vec<double> pressing_speeds(const Block& block, const NormalRows& rows, const Moving& a,
+                                   const Moving& b) {
+  Vec<double> turns = turning(a, b);
+  return Vec<double>{dot(speed(block, a, b), block.normal), dot(turns, block.shape.axis_1),
+                     dot(turns, block.shape.axis_2)} +
+         rows.bias;
+}
+
 // Solve pressing and rocking. Returns by how much the closing speed changed.
 inline double solve_normal(Block& block, const NormalRows& rows, Moving& a, Moving& b) {
   Vec<double> before = block.normal_impulses;
   const Mat<double>& mass = rows.mass;
   auto error = [&] {
-    Vec<double> turns = turning(a, b);
-    return Vec<double>{dot(speed(block, a, b), block.normal), dot(turns, block.shape.axis_1),
-                       dot(turns, block.shape.axis_2)} +
-           rows.bias + rows.softness * block.normal_impulses;
+    return pressing_speeds(block, rows, a, b) + rows.softness * block.normal_impulses;
   };
   Vec<double> v = error(), next = block.normal_impulses - mass * v;
   if (!(bounded_1(block.shape, next[0], next[1]) == next[1] &&

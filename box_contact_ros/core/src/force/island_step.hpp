@@ -25,6 +25,10 @@ constexpr double least_change = 1e-8;
 // than this [m/s]. What is left of a closing speed comes back as an overlap that is pushed out.
 constexpr double impact_change = 0.01;
 constexpr int impact_iterations = 100;
+// After every so many of them, all that presses in the island is scaled, where the factor is far from 1:
+// by this or more, or by its inverse or less.
+constexpr int scaled_every = 8;
+constexpr double least_factor = 2.0;
 
 // Most sub-steps, iterations or relaxations: their product is a number of 32 bits.
 constexpr int iterations_max = 1000;
@@ -236,7 +240,36 @@ class IslandStep {
         if (a.inverse_mass > 0.0) a.changed = iteration;
         if (b.inverse_mass > 0.0) b.changed = iteration;
       }
+      if (fastest > impact_change && iteration % scaled_every == 0) scale(island, rows, iteration);
     }
+  }
+
+  // Scale what presses by the factor that leaves least energy, which all bounds allow. Iterations hardly
+  // stop a heavy body that falls on light ones, nor take back what stopped it in the sub-step before.
+  void scale(const Island& island, NormalRows Block::* rows, int iteration) const {
+    auto each = [&](const auto& visit) {
+      for (size_t k = island.block; k < island.block_end; ++k)
+        visit(blocks_[k], moving_[size_t(blocks_[k].a)], moving_[size_t(blocks_[k].b)]);
+    };
+    double with = 0.0, without = 0.0;  // power along all impulses [W s]
+    each([&](Block& block, Moving& a, Moving& b) {
+      const Vec<double>& x = block.normal_impulses;
+      with += dot(x, pressing_speeds(block, block.*rows, a, b) + (block.*rows).softness * x);
+    });
+    each([&](Block& block, Moving& a, Moving& b) {
+      apply_normal(block, -block.normal_impulses, a, b);
+    });
+    each([&](Block& block, Moving& a, Moving& b) {
+      without += dot(block.normal_impulses, pressing_speeds(block, block.*rows, a, b));
+    });
+    double factor = with > without ? std::max(0.0, without / (without - with)) : 1.0;
+    if (factor < least_factor && factor * least_factor > 1.0) factor = 1.0;
+    each([&](Block& block, Moving& a, Moving& b) {
+      block.normal_impulses = factor * block.normal_impulses;
+      apply_normal(block, block.normal_impulses, a, b);
+      if (a.inverse_mass > 0.0) a.changed = iteration;
+      if (b.inverse_mass > 0.0) b.changed = iteration;
+    });
   }
 
   void relax(const Island& island, const SubSteps& steps) const {
