@@ -94,7 +94,7 @@ class Heap:
         weight[:, 2] = -GRAVITY * self.masses
         poses, velocities = self.poses, self.velocities
         for dt in self.lengths:
-            poses, velocities, _ = forces.advance(dt, poses, velocities, weight)
+            poses, velocities, *_ = forces.advance(dt, poses, velocities, weight)
             yield poses, velocities
 
 

@@ -257,7 +257,7 @@ class Ours:
             self.answers.append((self.tick + self.late, *self.answer()))
         while self.answers and self.answers[0][0] <= self.tick:
             self.hold(*self.answers.popleft()[1:])
-        boxes.pose, boxes.velocity, _ = self.forces.advance(h, boxes.pose, boxes.velocity, outside)
+        boxes.pose, boxes.velocity, *_ = self.forces.advance(h, boxes.pose, boxes.velocity, outside)
         self.spent += time.perf_counter() - start
         self.time += h
         self.tick += 1

@@ -153,6 +153,9 @@ class Motion(NamedTuple):
     wrenches: np.ndarray
     """(n, 6) of contacts, their mean over the step, with what pushes overlaps out. A simulator that
     moves the bodies by itself calls `PatchForces.wrenches`."""
+    awake: np.ndarray
+    """(n,) bool. False where a body was laid down, or has no mass and does not move: its pose is
+    the one that was given, its velocity 0."""
 
 
 class Loads(NamedTuple):
@@ -198,7 +201,7 @@ class PatchForces:
 
     def __init__(self, bodies: Sequence[Body], *, friction: float = FRICTION, substeps: int = 4,
                  iterations: int = 4, relaxations: int = 2, threads: int = 1,
-                 most_depth: float = 1e-3) -> None:
+                 most_depth: float = 1e-3, rest: bool = True, rest_speed: float = 1e-4) -> None:
         """Begin without patches.
 
         friction: Coulomb's μ of pairs without one of their own.
@@ -209,6 +212,9 @@ class PatchForces:
         most_depth: how deep what rests may be [m], where a load is large for the lighter body.
         With contacts of one's own, its island makes up to 64 times as many sub-steps. `loads`
         tells where that is not enough.
+        rest: whether an island at rest is laid down, where contacts are one's own. `advance` then
+        returns its poses as they were given until an input of it differs.
+        rest_speed: what is slower for half a second, by its energy, is at rest [m/s].
         substeps, iterations and relaxations may be 1,000 each.
         ValueError: names the field and its value.
         """
@@ -217,7 +223,7 @@ class PatchForces:
             as_whole(iterations, 'iterations', 1, ITERATIONS_MAX),
             as_whole(relaxations, 'relaxations', 0, ITERATIONS_MAX),
             as_whole(threads, 'threads', 1, THREADS_MAX), as_number(friction, 'friction'),
-            as_number(most_depth, 'most_depth'))
+            as_number(most_depth, 'most_depth'), as_number(rest_speed, 'rest_speed'), bool(rest))
 
     def set_bodies(self, bodies: Sequence[Body]) -> None:
         """Change masses, add bodies at the end, or drop bodies there with their patches."""

@@ -48,7 +48,7 @@ def main() -> None:
             pairs = [(places[a], places[b]) for _, a, b in answer.names]
             forces.hold(np.reshape(pairs, (-1, 2)), answer.contacts, asked,
                         age=1e-3 * LATENCY_MS, period=1e-3 * PERIOD_MS)
-        poses, velocities, wrenches = forces.advance(1e-3 * STEP_MS, poses, velocities, weights)
+        poses, velocities, wrenches, _ = forces.advance(1e-3 * STEP_MS, poses, velocities, weights)
         if time in (50, 100, 200, 500, 2000):
             print(f'{time} ms: {1e3 * (2.591 - poses[0, 2]):.2f} mm deep, '
                   f'{1e3 * np.linalg.norm(velocities):.1f} mm/s')

@@ -58,7 +58,7 @@ static void drop(void) {
       check(bc_patch_forces_hold(forces, &answer, asked) == BC_OK, "hold");
     }
     outside[0].force[0] = step > 1000 ? 40000.0 : 0.0;
-    bc_motion motion = {sizeof motion, poses, velocities, wrenches};
+    bc_motion motion = {sizeof motion, poses, velocities, wrenches, NULL};
     check(bc_patch_forces_advance(forces, 0.001, poses, velocities, outside, &motion) == BC_OK,
           "advance");
   }

@@ -61,7 +61,7 @@ def tower() -> np.ndarray:
                          + [Body.of_box((1, 1, 1), 600.0)] * (count - 1))
     for _ in range(400):
         forces.hold(pairs, solver.batch(poses, sizes=sizes, pairs=pairs), poses)
-        poses, velocities, _ = forces.advance(h, poses, velocities, weights)
+        poses, velocities, *_ = forces.advance(h, poses, velocities, weights)
     return np.hstack([poses, velocities])
 
 

@@ -197,7 +197,7 @@ def test_forces_have_the_bits_of_python(tmp_path: Path, source: str) -> None:
         if step % 5 == 2:
             forces.hold(pair, contacts, asked, age=0.002)
         outside[0, 0] = 40000.0 if step > 1000 else 0.0
-        poses, velocities, wrenches = forces.advance(0.001, poses, velocities, outside)
+        poses, velocities, wrenches, _ = forces.advance(0.001, poses, velocities, outside)
     assert [float.fromhex(number) for number in found] == [*poses[0, :3], *wrenches[0]]
     assert wrenches[0, 2] == pytest.approx(20000.0 * 9.81, rel=1e-3)
     assert wrenches[0, 0] == pytest.approx(-40000.0, rel=1e-3)

@@ -266,7 +266,7 @@ def test_the_loads_of_three_feet(dt: float) -> None:
     velocities, outside = np.zeros((2, 2, 6))
     outside[1, 2] = -56.0 * GRAVITY
     for _ in range(round(2.0 / dt)):
-        poses, velocities, _ = forces.advance(dt, poses, velocities, outside)
+        poses, velocities, *_ = forces.advance(dt, poses, velocities, outside)
     assert forces.loads().pressing / (56.0 * GRAVITY) == pytest.approx(statics, rel=0.03)
 
 
@@ -290,7 +290,7 @@ def test_two_pads_share_as_rubber_ones(dt: float) -> None:
         poses, velocities, outside = np.zeros((2, 7)), *np.zeros((2, 2, 6))
         poses[:, 6], outside[1, 2] = 1.0, -weight
         for _ in range(round(2.0 / dt)):
-            poses, velocities, _ = forces.advance(dt, poses, velocities, outside)
+            poses, velocities, *_ = forces.advance(dt, poses, velocities, outside)
         loads = forces.loads()
         assert loads.pressing / weight == pytest.approx([0.5 - shift, 0.5 + shift], rel=1e-3)
         assert loads.pressing.sum() == pytest.approx(weight, rel=1e-9)

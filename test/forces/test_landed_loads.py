@@ -42,7 +42,7 @@ def land(size, mass, off, step, *, own=True, degrees=1.0, duration=3.0, down=(0,
             asked, answer = poses, contacts_of(sizes, poses)
         if not own and tick % 5 == 2:  # two steps late
             forces.hold(*answer, asked, age=2 * step, period=5 * step)
-        poses, velocities, _ = forces.advance(step, poses, velocities, weights)[:3]
+        poses, velocities, *_ = forces.advance(step, poses, velocities, weights)[:3]
     return forces.loads(), sizes, poses
 
 

@@ -49,7 +49,7 @@ def deepest(tilt: float, phase: int, *, asks_ahead: bool) -> float:
             contacts = solver.batch(asked[:1], asked[1:])
         if step % PERIOD == LATENCY:
             forces.hold([(0, 1)], contacts, asked, age=LATENCY * STEP, period=PERIOD * STEP)
-        place, velocities, _ = forces.advance(STEP, place, velocities, weights)
+        place, velocities, *_ = forces.advance(STEP, place, velocities, weights)
         depth = max(depth, -solver(*place).separation)
     return 1e3 * depth
 

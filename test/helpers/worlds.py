@@ -54,7 +54,7 @@ class World:
             self.forces.hold(pairs)
 
     def step(self, dt: float = STEP) -> World:
-        self.poses, self.velocities, self.wrenches = self.forces.advance(
+        self.poses, self.velocities, self.wrenches, self.awake = self.forces.advance(
             dt, self.poses, self.velocities, self.outside)
         return self
 

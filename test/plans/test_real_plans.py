@@ -102,7 +102,7 @@ def test_unique_loads_are_those_of_a_simulation(order):
     poses, velocities, weights = plan.poses, np.zeros((len(plan), 6)), np.zeros((len(plan), 6))
     weights[:, 2] = -G * plan.masses
     for _ in range(1000):
-        poses, velocities, _ = forces.advance(1e-3, poses, velocities, weights)[:3]
+        poses, velocities, *_ = forces.advance(1e-3, poses, velocities, weights)[:3]
     simulated = forces.loads()
     unique = 0
     for pair, force in zip(simulated.pairs.tolist(), simulated.pressing):

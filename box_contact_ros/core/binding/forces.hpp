@@ -39,9 +39,10 @@ inline std::vector<bc_body> read_bodies(PyObject* masses, PyObject* inertias, Py
 inline PyObject* forces_new(PyTypeObject* type, PyObject* args, PyObject*) {
   PyObject *masses, *inertias, *centres;
   bc_force_options options = BC_DEFAULT_FORCE_OPTIONS;
-  if (!PyArg_ParseTuple(args, "OOOiiiidd:PatchForces", &masses, &inertias, &centres,
+  if (!PyArg_ParseTuple(args, "OOOiiiidddp:PatchForces", &masses, &inertias, &centres,
                         &options.substeps, &options.iterations, &options.relaxations,
-                        &options.threads, &options.friction, &options.most_depth))
+                        &options.threads, &options.friction, &options.most_depth,
+                        &options.rest_speed, &options.rest))
     return nullptr;
   std::vector<bc_body> bodies = read_bodies(masses, inertias, centres);
   bc_patch_forces* forces;
@@ -157,13 +158,16 @@ inline PyObject* forces_advance(PyObject* self, PyObject* const* args, Py_ssize_
   Array<double> moved, after;
   if (!by_wrenches) moved = make<double>({bodies, 7}), after = make<double>({bodies, 6});
   auto wrenches = make<double>({bodies, 6});
+  Array<bool> awake;
+  if (!by_wrenches) awake = make<bool>({bodies});
   bc_motion motion{sizeof(bc_motion), rows_of<bc_pose>(moved), rows_of<bc_velocity>(after),
-                   rows_of<bc_wrench>(wrenches)};
+                   rows_of<bc_wrench>(wrenches),
+                   reinterpret_cast<unsigned char*>(awake.numbers)};
   check(bc_patch_forces_advance(forces_of(self), dt, rows_of<bc_pose>(poses),
                                 rows_of<bc_velocity>(velocities), rows_of<bc_wrench>(outside),
                                 &motion));
   if (by_wrenches) return wrenches.object.release();
-  return pack(&PyTuple_Type, moved, after, wrenches);
+  return pack(&PyTuple_Type, moved, after, wrenches, awake);
 }
 
 inline PyObject* forces_loads(PyObject* self, PyObject*) {
@@ -226,7 +230,7 @@ inline PyMethodDef forces_methods[] = {
      "until the next call.\n\nReturn None, and change nothing, where one is no plain array."},
     {"advance", method<forces_advance<false>>(), METH_FASTCALL,
      "advance(dt, poses, velocities, outside)\n--\n\nReturn poses (n, 7), velocities and wrenches "
-     "(n, 6).\n\nReturn None, and change nothing, where one is no plain array."},
+     "(n, 6), and who is awake (n,).\n\nReturn None, and change nothing, where one is no plain array."},
     {"loads", method<forces_loads>(), METH_NOARGS,
      "loads()\n--\n\nReturn the columns of what each pair carried."},
     {"forget", method<forces_forget>(), METH_O,
@@ -237,7 +241,8 @@ inline PyMethodDef forces_methods[] = {
     {nullptr, nullptr, 0, nullptr}};
 inline PyType_Slot forces_slots[] = {
     {Py_tp_doc, const_cast<char*>("PatchForces(mass, inertia, centre, substeps, iterations, "
-                                  "relaxations, threads, friction, most_depth)\n--\n\nPatches as velocity constraints. See force.h.")},
+                                  "relaxations, threads, friction, most_depth, rest_speed, "
+                                  "rest)\n--\n\nPatches as velocity constraints. See force.h.")},
     {Py_tp_new, slot<forces_new>()},
     {Py_tp_dealloc, reinterpret_cast<void*>(Holder<Forces>::dealloc)},
     {Py_tp_methods, forces_methods},

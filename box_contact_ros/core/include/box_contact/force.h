@@ -12,7 +12,7 @@
  *   bc_patches answer = {sizeof(bc_patches), 1, pairs, separation, normal, point, volume,
  *                       covariance, NULL, NULL, NULL, 0.0, 0.0};
  *   bc_patch_forces_hold(forces, &answer, poses);
- *   bc_motion motion = {sizeof(bc_motion), poses, velocities, NULL};
+ *   bc_motion motion = {sizeof(bc_motion), poses, velocities, NULL, NULL};
  *   bc_patch_forces_advance(forces, 0.001, poses, velocities, weights, &motion);
  *
  * A body is known by its place, 0 to count − 1, and so is a box. Unless bc_patch_forces_set_boxes says
@@ -87,9 +87,12 @@ typedef struct bc_force_options {
   double most_depth; /* how deep what rests may be at most [m], where a load is large for the lighter
                         body: with contacts of one's own, its island makes up to 64 times as many
                         sub-steps. bc_load tells where that is not enough */
+  double rest_speed; /* [m/s], by the energy of a body: bodies that patches join are laid down once
+                        all were slower for half a second, held by friction */
+  int rest;          /* 0: nothing is laid down */
 } bc_force_options;
 
-#define BC_DEFAULT_FORCE_OPTIONS {sizeof(bc_force_options), 4, 4, 2, 1, 0.5, 1e-3}
+#define BC_DEFAULT_FORCE_OPTIONS {sizeof(bc_force_options), 4, 4, 2, 1, 0.5, 1e-3, 1e-4, 1}
 
 /* What an advance leads to: arrays of a row for each body; NULL: not wanted. The poses and velocities
  * may be those that are given. */
@@ -99,6 +102,8 @@ typedef struct bc_motion {
   bc_velocity* velocities; /* after relaxation */
   bc_wrench* wrenches;     /* of contacts, the mean over the step, with what pushes overlaps out; alone:
                               the caller moves the bodies by them */
+  unsigned char* awake;    /* 0: the body was laid down, or has no mass and does not move: its pose is
+                              the one that is given, its velocity 0 */
 } bc_motion;
 
 /* What the contact of two boxes carried: the mean over the last advance, after relaxation. All forces
@@ -154,6 +159,9 @@ BC_API bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches*
  * the wrenches beside those of contacts, gravity among them, constant over the step; NULL: none.
  * Without poses and velocities in `motion`, the wrenches are taken to move the bodies until the next
  * advance, which then removes the speed of pushing out.
+ * With both, and contacts of one's own, bodies at rest are laid down: poses as they were given,
+ * velocities 0. They wake by a pose, velocity or wrench that is not equal to the bit, a pair that is no
+ * longer held as it was, a body of mass 0 that moves, and what comes to touch them.
  * BC_BAD_ARGUMENT, and nothing changes, for numbers beyond the limits above, and where those of a body
  * would leave the range of float64: the text names it. */
 BC_API bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, const bc_pose* poses,

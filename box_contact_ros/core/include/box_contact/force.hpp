@@ -65,12 +65,15 @@ class PatchForces {
     int threads = 1;        // at most
     double friction = 0.5;  // Coulomb's μ
     double most_depth = 1e-3;  // of what rests [m], where a load is large for the lighter body
+    double rest_speed = 1e-4;  // what is slower for half a second is laid down [m/s]
+    bool rest = true;          // whether anything is
   };
 
   explicit PatchForces(Span<const Body> bodies) : PatchForces(bodies, Options()) {}
   PatchForces(Span<const Body> bodies, const Options& options) {
     bc_force_options plain{sizeof(bc_force_options), options.substeps, options.iterations,
-                           options.relaxations,      options.threads,  options.friction, options.most_depth};
+                           options.relaxations,      options.threads,  options.friction,   options.most_depth,
+                           options.rest_speed,       options.rest};
     bc_patch_forces* made;
     detail::check(bc_patch_forces_create(plain_of(bodies), std::int64_t(bodies.size()), &plain, &made));
     forces_.reset(made);
@@ -120,15 +123,19 @@ class PatchForces {
     detail::check(bc_patch_forces_hold(forces_.get(), &plain, poses.data()));
   }
 
-  // Move the bodies for `dt` [s]; `outside` are all wrenches but those of contacts, or none.
-  void advance(double dt, Span<Pose> poses, Span<Velocity> velocities, Span<const Wrench> outside = {}) {
-    advance(dt, poses, velocities, outside, {sizeof(bc_motion), poses.data(), velocities.data(), nullptr});
+  // Move the bodies for `dt` [s]; `outside` are all wrenches but those of contacts, or none. `awake`: a
+  // row for each body, 0 for those at rest; or none.
+  void advance(double dt, Span<Pose> poses, Span<Velocity> velocities, Span<const Wrench> outside = {},
+               Span<unsigned char> awake = {}) {
+    if (awake.size()) check_count(awake.size());
+    advance(dt, poses, velocities, outside,
+            {sizeof(bc_motion), poses.data(), velocities.data(), nullptr, awake.data()});
   }
   // The mean wrenches of contacts, for a simulator that moves the bodies by itself.
   void wrenches(double dt, Span<const Pose> poses, Span<const Velocity> velocities,
                 Span<const Wrench> outside, Span<Wrench> found) {
     check_count(found.size());
-    advance(dt, poses, velocities, outside, {sizeof(bc_motion), nullptr, nullptr, found.data()});
+    advance(dt, poses, velocities, outside, {sizeof(bc_motion), nullptr, nullptr, found.data(), nullptr});
   }
 
   // What each pair carried, by the lower and the higher box: the mean of the last advance. None if

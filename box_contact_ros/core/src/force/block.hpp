@@ -33,9 +33,11 @@ struct Moving {
   double quaternion[4];  // of length 1
   Placed placed;
   Vec<double> impulse, angular_impulse;  // of contacts, since the advance began [N s], [N m s]
-  Motion pushed;  // its velocities before relaxation, at the end of the advance
-  double load;    // weights that it bears and its own [N]
-  int carriers;   // how many patches bear it
+  Motion pushed;         // its velocities before relaxation, at the end of the advance
+  double load;           // weights that it bears and its own [N]
+  int carriers;          // how many patches bear it
+  double speed_squared;  // twice its energy by its mass, at the end of an advance [m²/s²]
+  bool is_held;          // whether friction holds it
 };
 
 // How pressing and rocking are solved: the impulses change by −mass·(v + bias + softness·impulses).

@@ -137,10 +137,7 @@ class Clock {
   }
   void end(double dt) {
     if (since_ >= 0.0) since_ += dt;
-    advance_ = dt;
   }
-  // Length of the last advance [s].
-  double advance() const { return advance_; }
 
  private:
   double least_interval() const {
@@ -153,7 +150,6 @@ class Clock {
   double since_ = -1.0;                    // the last answer [s]; below 0: there was none
   double period_ = 0.0;                    // between answers [s]
   double late_ = 0.0;                      // age of the last answer when it came [s]
-  double advance_ = 0.0;                   // length of the last one [s]
   double intervals_[intervals_kept] = {};  // between answers, the last one first; 0: none [s]
 };
 

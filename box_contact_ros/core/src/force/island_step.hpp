@@ -36,6 +36,7 @@ constexpr int iterations_max = 1000;
 struct Options {
   int substeps, iterations, relaxations, threads;
   double friction, most_depth;
+  double rest_speed;  // below which an island comes to rest [m/s]; 0: none does
 };
 
 // The velocities with which a body ended the last advance: before relaxation, and after it. Of a body
@@ -330,7 +331,8 @@ class IslandStep {
     loads_[size_t(block.patch)] = {patch.box_a,      patch.box_b,
                                    block.normal_sum, block.friction_sum,
                                    block.normal,     a.placed.position + block.arm_a,
-                                   block.shape,      block.depth > options_.most_depth};
+                                   block.shape,      block.depth > options_.most_depth,
+                                   step_.steps.dt};
   }
   static void write(const Vec<double>& v, const Vec<double>& w, double* linear, double* angular) {
     std::copy_n(v.v, 3, linear);

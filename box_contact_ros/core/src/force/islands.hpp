@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <numeric>
 #include <vector>
 
 #include "block.hpp"
@@ -36,10 +35,12 @@ class Islands {
     by_height.reserve(patches);
   }
 
-  void group(const std::vector<Body>& bodies, const std::vector<Patch>& patches) {
+  // awake: the bodies in islands, in turn.
+  void group(const std::vector<Body>& bodies, const std::vector<int32_t>& awake,
+             const std::vector<Patch>& patches) {
     by_height.resize(patches.size());
-    number(bodies, patches);
-    bodies_.sort(bodies.size(), all.size(), [&](size_t body) { return island_[body]; });
+    number(bodies, awake, patches);
+    bodies_.sort(awake.size(), all.size(), [&](size_t k) { return island_[size_t(awake[k])]; });
     patches_.sort(patches.size(), all.size(), [&](size_t k) {
       const Patch& patch = patches[k];
       return island_[size_t(bodies[size_t(patch.a)].is_free() ? patch.a : patch.b)];
@@ -51,7 +52,7 @@ class Islands {
       Island& here = all[island];
       here.body = moving.size();
       here.block = blocks.size();
-      for (int32_t body : bodies_.of(island)) add(bodies, body);
+      for (int32_t k : bodies_.of(island)) add(bodies, awake[size_t(k)]);
       for (int32_t patch : patches_.of(island)) {
         Block block{};
         block.patch = patch;
@@ -72,24 +73,24 @@ class Islands {
   }
 
   // The root of an island is its lowest body, and islands are in the order of their roots.
-  void number(const std::vector<Body>& bodies, const std::vector<Patch>& patches) {
+  void number(const std::vector<Body>& bodies, const std::vector<int32_t>& awake,
+              const std::vector<Patch>& patches) {
     root_.resize(bodies.size());
-    std::iota(root_.begin(), root_.end(), 0);
+    island_.resize(bodies.size());
+    for (int32_t body : awake) root_[size_t(body)] = body;
     for (const Patch& patch : patches) {
       if (!bodies[size_t(patch.a)].is_free() || !bodies[size_t(patch.b)].is_free()) continue;
       int32_t a = root_of(patch.a), b = root_of(patch.b);
       root_[size_t(std::max(a, b))] = std::min(a, b);
     }
-    island_.assign(bodies.size(), -1);
     all.clear();
-    for (size_t body = 0; body < bodies.size(); ++body) {
-      if (!bodies[body].is_free()) continue;
-      auto root = size_t(root_of(int32_t(body)));
+    for (int32_t body : awake) {
+      int32_t root = root_of(body);
       if (root == body) {
-        island_[body] = int32_t(all.size());
+        island_[size_t(body)] = int32_t(all.size());
         all.push_back({});
       }
-      island_[body] = island_[root];
+      island_[size_t(body)] = island_[size_t(root)];
     }
   }
 
@@ -116,17 +117,15 @@ class Islands {
       starts_.reserve(islands + 1);
       order_.reserve(count);
     }
-    // Counting sort; what is in no island, below 0, is left out.
+    // Counting sort.
     template <class IslandOf>
     void sort(size_t count, size_t islands, IslandOf island_of) {
       starts_.assign(islands + 1, 0);
-      for (size_t k = 0; k < count; ++k)
-        if (island_of(k) >= 0) ++starts_[size_t(island_of(k))];
+      for (size_t k = 0; k < count; ++k) ++starts_[size_t(island_of(k))];
       int32_t end = 0;
       for (int32_t& start : starts_) start = end += start;
       order_.resize(size_t(end));
-      for (size_t k = count; k-- > 0;)
-        if (island_of(k) >= 0) order_[size_t(--starts_[size_t(island_of(k))])] = int32_t(k);
+      for (size_t k = count; k-- > 0;) order_[size_t(--starts_[size_t(island_of(k))])] = int32_t(k);
     }
     Range of(size_t island) const {
       return {order_.data() + starts_[island], order_.data() + starts_[island + 1]};
@@ -136,7 +135,7 @@ class Islands {
     std::vector<int32_t> starts_, order_;
   };
 
-  std::vector<int32_t> root_, island_;  // of each body; −1: no force moves it
+  std::vector<int32_t> root_, island_;  // of each body that is awake
   std::vector<int32_t> place_;          // of each body among those that move, in the last island
   Sorted bodies_, patches_;
 };

@@ -20,54 +20,121 @@ class OwnContacts {
  public:
   // The boxes of the bodies; none: box k is body k, and nobody knows its size.
   const std::vector<bc_body_box>& boxes() const { return boxes_; }
-  size_t count() const { return friction_.size(); }
+  size_t count() const { return asked_.count(); }
 
   void set_boxes(std::vector<bc_body_box> boxes) {
     boxes_ = std::move(boxes);
     sizes_.clear();
     for (const bc_body_box& box : boxes_) sizes_.push_back(box.box.size);
     poses_.resize(boxes_.size());
+    is_placed_.resize(boxes_.size());
     forget();
   }
-  void forget() { resize(0); }
-
-  // Take the pairs of a question. Returns false, and changes nothing, if a pair comes twice.
-  bool ask(const bc_patches& asked, double friction) {
+  void forget() {
     keys_.clear();
-    for (int64_t k = 0; k < asked.count; ++k) {
-      auto a = int32_t(asked.pairs[2 * k]), b = int32_t(asked.pairs[2 * k + 1]);
-      keys_.push_back(std::minmax(a, b));
-    }
-    std::sort(keys_.begin(), keys_.end());
-    if (std::adjacent_find(keys_.begin(), keys_.end()) != keys_.end()) return false;
+    resize(0);
+  }
+
+  // Take the pairs of a question. Where bodies rest, a pair is new until it was solved once.
+  enum class Taken { same, others, pair_twice };
+  Taken ask(const bc_patches& asked, double friction, bool is_any_at_rest) {
     auto n = size_t(asked.count);
+    auto is_same = [](const double* column, const std::vector<double>& held, double otherwise) {
+      return column ? std::equal(held.begin(), held.end(), column)
+                    : std::all_of(held.begin(), held.end(),
+                                  [otherwise](double number) { return number == otherwise; });
+    };
+    if (n > 0 && n == count() &&
+        std::equal(asked.pairs, asked.pairs + 2 * n, asked_.pairs.begin()) &&
+        is_same(asked.friction, asked_.friction, friction) &&
+        is_same(asked.surface, asked_.surface, 0.0) &&
+        is_same(asked.stiffness, asked_.stiffness, 0.0))
+      return Taken::same;
+    next_keys_.clear();
+    for (size_t k = 0; k < n; ++k) {
+      auto a = int32_t(asked.pairs[2 * k]), b = int32_t(asked.pairs[2 * k + 1]);
+      next_keys_.push_back({std::minmax(a, b), k});
+    }
+    if (!std::is_sorted(next_keys_.begin(), next_keys_.end()))
+      std::sort(next_keys_.begin(), next_keys_.end());
+    auto same = [](const Key& p, const Key& q) { return p.pair == q.pair; };
+    if (std::adjacent_find(next_keys_.begin(), next_keys_.end(), same) != next_keys_.end())
+      return Taken::pair_twice;
     resize(n);
-    std::copy_n(asked.pairs, 2 * n, pairs_.begin());
+    if (is_any_at_rest) note_new();
+    keys_.swap(next_keys_);
+    std::copy_n(asked.pairs, 2 * n, asked_.pairs.begin());
     auto copy = [](const double* from, std::vector<double>& to, double otherwise) {
       if (from)
         std::copy_n(from, to.size(), to.begin());
       else
         std::fill(to.begin(), to.end(), otherwise);
     };
-    copy(asked.friction, friction_, friction);
-    copy(asked.surface, surface_, 0.0);
-    copy(asked.stiffness, stiffness_, 0.0);
+    copy(asked.friction, asked_.friction, friction);
+    copy(asked.surface, asked_.surface, 0.0);
+    copy(asked.stiffness, asked_.stiffness, 0.0);
+    return Taken::others;
+  }
+  // Whether the pair of a patch is asked for, with the numbers of the patch.
+  bool is_asked(const Patch& patch) const {
+    auto key = std::lower_bound(keys_.begin(), keys_.end(), Key{patch.pair(), 0});
+    if (key == keys_.end() || key->pair != patch.pair()) return false;
+    size_t k = key->row;
+    double sign = asked_.pairs[2 * k] < asked_.pairs[2 * k + 1] ? 1.0 : -1.0;
+    Vec<double> other = patch.surface - sign * vector_at(&asked_.surface[3 * k]);
+    return patch.friction == asked_.friction[k] && patch.stiffness == asked_.stiffness[k] &&
+           dot(other, other) == 0.0;
+  }
+
+  // Choose which pairs are solved: all but those of which `is_quiet(box)` says that both boxes stay.
+  template <class IsQuiet>
+  void choose(bool is_any_at_rest, const IsQuiet& is_quiet) {
+    is_all_ = !is_any_at_rest;
+    if (is_all_) return;
+    rows_.clear();
+    placed_.clear();
+    std::fill(is_placed_.begin(), is_placed_.end(), uint8_t(0));
+    live_.resize(0);
+    for (size_t k = 0; k < count(); ++k) {
+      auto a = size_t(asked_.pairs[2 * k]), b = size_t(asked_.pairs[2 * k + 1]);
+      if (!is_new_[k] && is_quiet(a) && is_quiet(b)) continue;
+      rows_.push_back(k);
+      live_.add(asked_, k);
+      for (size_t box : {a, b}) {
+        if (!is_placed_[box]) placed_.push_back(box);
+        is_placed_[box] = 1;
+      }
+    }
+  }
+  // All pairs were solved once. Returns whether some were new.
+  bool settle() {
+    if (!is_any_new_) return false;
+    std::fill(is_new_.begin(), is_new_.end(), uint8_t(0));
+    is_any_new_ = false;
     return true;
   }
 
-  // Solve all pairs with the bodies at `poses`. `solve(rows, count, results)` answers rows, and returns
+  // Solve the chosen pairs with the bodies at `poses`. `solve(rows, count, results)` answers rows, and returns
   // the first that is refused, or −1; so does this. A pair apart by no more than `farthest` [m] for which
   // `is_near(a, b, normal, apart)` gets the patch that it has once it touches, and keeps its separation
   // above zero.
   template <class Solve, class IsNear>
   long solve(const bc_pose* poses, double farthest, const Solve& solve, const IsNear& is_near) {
-    for (size_t k = 0; k < boxes_.size(); ++k)
-      poses_[k] = in_common_frame(poses[boxes_[k].body], boxes_[k].box.pose);
+    auto place = [&](size_t box) {
+      poses_[box] = in_common_frame(poses[boxes_[box].body], boxes_[box].box.pose);
+    };
+    if (is_all_)
+      for (size_t k = 0; k < boxes_.size(); ++k) place(k);
+    else
+      std::for_each(placed_.begin(), placed_.end(), place);
+    const Pairs& live = chosen();
+    if (live.count() == 0) return -1;
     auto* numbers = reinterpret_cast<const double*>(poses_.data());
     auto* sizes = reinterpret_cast<const double*>(sizes_.data());
-    detail::Rows rows{numbers, numbers, sizes, sizes, 3, 3, pairs_.data(), long(boxes_.size())};
-    long refused = solve(rows, long(count()), found_.results(farthest));
-    return refused >= 0 ? refused : solve_near(solve, is_near);
+    detail::Rows rows{numbers, numbers, sizes, sizes, 3, 3, live.pairs.data(), long(boxes_.size())};
+    long refused = solve(rows, long(live.count()), found_.results(farthest));
+    if (refused < 0) refused = solve_near(solve, is_near);
+    return refused < 0 || is_all_ ? refused : long(rows_[size_t(refused)]);
   }
   // Solve the pair of a patch anew, with its bodies at other places. A pair that is apart now keeps its
   // patch, which goes with the bodies.
@@ -90,22 +157,51 @@ class OwnContacts {
 
   // What was solved last.
   bc_patches answer() const {
+    const Pairs& live = chosen();
     return {sizeof(bc_patches),
-            int64_t(count()),
-            pairs_.data(),
+            int64_t(live.count()),
+            live.pairs.data(),
             found_.separation.data(),
             found_.normal.data(),
             found_.point.data(),
             found_.volume.data(),
             found_.covariance.data(),
-            friction_.data(),
-            surface_.data(),
-            stiffness_.data(),
+            live.friction.data(),
+            live.surface.data(),
+            live.stiffness.data(),
             0.0,
             0.0};
   }
 
  private:
+  // A pair, and where it is asked for.
+  struct Key {
+    BoxPair pair;
+    size_t row;
+    bool operator<(const Key& other) const { return pair < other.pair; }
+  };
+  struct Pairs {
+    std::vector<int64_t> pairs;  // (n, 2)
+    std::vector<double> friction, surface, stiffness;
+
+    size_t count() const { return friction.size(); }
+    void resize(size_t n) {
+      pairs.resize(2 * n);
+      for (auto* column : {&friction, &stiffness}) column->resize(n);
+      surface.resize(3 * n);
+    }
+    void reserve(size_t n) {
+      pairs.reserve(2 * n);
+      for (auto* column : {&friction, &stiffness}) column->reserve(n);
+      surface.reserve(3 * n);
+    }
+    void add(const Pairs& other, size_t k) {
+      pairs.insert(pairs.end(), &other.pairs[2 * k], &other.pairs[2 * k] + 2);
+      friction.push_back(other.friction[k]);
+      stiffness.push_back(other.stiffness[k]);
+      surface.insert(surface.end(), &other.surface[3 * k], &other.surface[3 * k] + 3);
+    }
+  };
   // Answers to rows.
   struct Columns {
     std::vector<double> separation, normal, point, volume, covariance;
@@ -158,20 +254,36 @@ class OwnContacts {
   };
 
   void resize(size_t n) {
-    pairs_.resize(2 * n);
-    for (auto* column : {&friction_, &stiffness_}) column->resize(n);
-    surface_.resize(3 * n);
+    asked_.resize(n);
+    live_.reserve(n);
+    rows_.reserve(n);
+    placed_.reserve(2 * n);
+    is_new_.assign(n, 0);
+    is_any_new_ = false;
+    is_all_ = true;
     found_.resize(n);
     near_.reserve(n);
+  }
+  const Pairs& chosen() const { return is_all_ ? asked_ : live_; }
+  // Note which of the next keys are not among the last ones.
+  void note_new() {
+    auto last = keys_.begin();
+    for (const Key& key : next_keys_) {
+      while (last != keys_.end() && *last < key) ++last;
+      bool is_known = last != keys_.end() && last->pair == key.pair;
+      is_new_[key.row] = !is_known;
+      is_any_new_ = is_any_new_ || !is_known;
+    }
   }
   template <class Solve, class IsNear>
   long solve_near(const Solve& solve, const IsNear& is_near) {
     near_.clear();
-    for (size_t k = 0; k < count(); ++k) {
+    const Pairs& live = chosen();
+    for (size_t k = 0; k < live.count(); ++k) {
       double apart = found_.separation[k];
       Vec<double> normal = vector_at(&found_.normal[3 * k]);
       if (!(apart > 0.0) || normal[0] != normal[0]) continue;  // in contact, or beyond the farthest
-      auto a = size_t(pairs_[2 * k]), b = size_t(pairs_[2 * k + 1]);
+      auto a = size_t(live.pairs[2 * k]), b = size_t(live.pairs[2 * k + 1]);
       if (is_near(int32_t(a), int32_t(b), normal, apart))
         near_.add(k, poses_[a], poses_[b], sizes_[a], sizes_[b], -apart * normal);
     }
@@ -196,11 +308,18 @@ class OwnContacts {
   std::vector<bc_body_box> boxes_;
   std::vector<bc_size> sizes_;  // of the boxes
   std::vector<bc_pose> poses_;  // of the boxes, in the common frame
-  std::vector<int64_t> pairs_;  // (n, 2)
-  std::vector<double> friction_, surface_, stiffness_;
+  Pairs asked_;
+  std::vector<uint8_t> is_new_;  // of them
+  bool is_any_new_ = false;
+  // Those that are solved, unless all are.
+  bool is_all_ = true;
+  Pairs live_;
+  std::vector<size_t> rows_;    // theirs among those that are asked for
+  std::vector<size_t> placed_;  // their boxes
+  std::vector<uint8_t> is_placed_;
   Columns found_;
   Near near_;
-  std::vector<BoxPair> keys_;
+  std::vector<Key> keys_, next_keys_;  // by pair
 };
 
 }  // namespace box_contact::BOX_CONTACT_SET::force

@@ -42,6 +42,13 @@ struct Patch {
 
   BoxPair pair() const { return {box_a, box_b}; }
 
+  // Keep the impulses of a window that is longer by a factor.
+  void scale(double factor) {
+    window *= factor;
+    for (double* impulse : {&normal_impulse, &torsion_impulse}) *impulse *= factor;
+    for (Vec<double>* impulse : {&friction_impulse, &rocking_impulse}) *impulse = factor * *impulse;
+  }
+
   // Take the geometry of a contact, whose boxes are where the bodies are. `box_axes()`: see rectangle_of.
   template <class BoxAxes>
   void place(const Placed& at_a, const Placed& at_b, const Vec<double>& from_a, const double* at,
@@ -82,9 +89,12 @@ struct Load {
   Vec<double> normal, point;
   Rectangle shape;
   bool is_too_deep;
+  double time;  // of that advance [s]
 
-  // Mean forces over a time [s]. Pressure is bilinear, so that no corner pulls.
-  bc_load over(double time) const {
+  BoxPair pair() const { return {box_a, box_b}; }
+
+  // Mean forces. Pressure is bilinear, so that no corner pulls.
+  bc_load mean() const {
     bc_load load{};
     load.box_a = box_a;
     load.box_b = box_b;

@@ -30,6 +30,7 @@
 #include "island_step.hpp"
 #include "own_contacts.hpp"
 #include "pads.hpp"
+#include "rest.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
@@ -52,25 +53,29 @@ class PatchForces {
         ended_(bodies_.size()),
         fineness_(bodies_.size()),
         poses_(bodies_.size()) {
+    rest_.set_bodies(bodies_);
     make_room(0);
   }
 
   const std::vector<Body>& bodies() const { return bodies_; }
   const std::vector<bc_body_box>& boxes() const { return own_.boxes(); }
-  size_t load_count() const { return loads_.size(); }
+  size_t load_count() const { return loads_.size() + rest_.loads().size(); }
   // Write what each pair carried in the last advance. With boxes, corners are those of the faces, and
   // the pads of two bodies share as rubber ones do.
   void write_loads(bc_load* loads) const {
-    for (size_t k = 0; k < loads_.size(); ++k) loads[k] = loads_[k].over(clock_.advance());
+    std::vector<Load> all(load_count());
+    std::merge(loads_.begin(), loads_.end(), rest_.loads().begin(), rest_.loads().end(),
+               all.begin(), [](const Load& p, const Load& q) { return p.pair() < q.pair(); });
+    for (size_t k = 0; k < all.size(); ++k) loads[k] = all[k].mean();
     if (boxes().empty()) return;
-    std::vector<Pad> pads(loads_.size());
+    std::vector<Pad> pads(all.size());
     std::vector<std::pair<BoxPair, size_t>> pressed;  // by the bodies
-    for (size_t k = 0; k < loads_.size(); ++k) {
+    for (size_t k = 0; k < all.size(); ++k) {
       if (!(loads[k].pressing > 0.0)) continue;
       const bc_body_box &a = boxes()[size_t(loads[k].box_a)], &b = boxes()[size_t(loads[k].box_b)];
       pads[k] = {patch_of_faces(in_common_frame(poses_[size_t(a.body)], a.box.pose), a.box.size,
                                 in_common_frame(poses_[size_t(b.body)], b.box.pose), b.box.size,
-                                loads_[k].normal, face_tolerance),
+                                all[k].normal, face_tolerance),
                  loads[k].pressing, vector(loads[k].centre)};
       if (pads[k].faces.polygon.count == 0) continue;
       pressed.push_back({std::minmax(support(a.body), support(b.body)), k});
@@ -90,6 +95,7 @@ class PatchForces {
 
   // Change masses, add bodies at the end, or drop bodies there with their patches.
   void set_bodies(std::vector<Body> bodies) {
+    wake_all();
     // What is let go, or gripped, has not ended an advance as what it is now.
     for (size_t k = 0; k < std::min(bodies.size(), bodies_.size()); ++k)
       if (bodies[k].is_free() != bodies_[k].is_free()) ended_[k] = {};
@@ -97,6 +103,7 @@ class PatchForces {
     ended_.resize(bodies_.size());
     fineness_.resize(bodies_.size());
     poses_.resize(bodies_.size());
+    rest_.set_bodies(bodies_);
     auto count = int32_t(bodies_.size());
     make_room(patches_.size());
     drop([this, count](const Patch& patch) {
@@ -105,11 +112,13 @@ class PatchForces {
   }
   // Change which boxes the bodies have. Patches of boxes that stay with their body stay.
   void set_boxes(std::vector<bc_body_box> boxes) {
+    wake_all();
     own_.set_boxes(std::move(boxes));
     drop([this](const Patch& patch) { return !is_of_boxes(patch); });
   }
   // Forget the patches of bodies.
   void forget(const int64_t* bodies, int64_t count) {
+    wake_all();
     std::vector<uint8_t> is_forgotten(bodies_.size(), 0);
     for (int64_t k = 0; k < count; ++k) {
       is_forgotten[size_t(bodies[k])] = 1;
@@ -124,6 +133,7 @@ class PatchForces {
     loads_.clear();
     ended_.assign(bodies_.size(), {});
     fineness_.assign(bodies_.size(), {});
+    rest_.set_bodies(bodies_);
     moves_by_wrenches_ = false;
     clock_ = {};
     is_grouped_ = false;
@@ -132,7 +142,7 @@ class PatchForces {
   // Take an answer, and the poses of its question. Pairs that are missing are forgotten. Nothing
   // changes for a pair that comes twice, and for a patch whose numbers leave float64's range.
   Held hold(const bc_patches& answer, const bc_pose* poses) {
-    Held held = take(answer, poses);
+    Held held = take(answer, poses, false);
     if (held != Held::all) return held;
     own_.forget();
     clock_.answer(answer.age, answer.period);
@@ -140,10 +150,17 @@ class PatchForces {
   }
   // Take pairs whose contacts are solved at the start of each advance. Impulses stay.
   Held hold(const bc_patches& pairs) {
-    if (!own_.ask(pairs, options_.friction)) return Held::pair_twice;
+    auto taken = own_.ask(pairs, options_.friction, rest_.is_any());
+    if (taken == OwnContacts::Taken::pair_twice) return Held::pair_twice;
     clock_.answer_each_step();
+    if (taken == OwnContacts::Taken::same) return Held::all;
+    is_chosen_ = false;
     make_room(own_.count());
-    if (own_.count() == 0) drop([](const Patch&) { return true; });
+    rest_.mark_if([this](const Patch& patch) { return !own_.is_asked(patch); });
+    if (rest_.is_any_marked()) wake();
+    if (own_.count() > 0) return Held::all;
+    wake_all();
+    drop([](const Patch&) { return true; });
     return Held::all;
   }
   // Solve the contacts of one's own at the start of a step `dt`, and take them: see OwnContacts::solve.
@@ -152,11 +169,15 @@ class PatchForces {
                  Held& held) {
     held = Held::all;
     if (own_.count() == 0) return -1;
+    if (!is_chosen_)
+      own_.choose(rest_.is_any(),
+                  [this](size_t box) { return rest_.is_quiet(size_t(body_of(int64_t(box)))); });
+    is_chosen_ = true;
     long refused = own_.solve(poses, farthest(dt, outside), solve,
                               [&](int32_t a, int32_t b, const Vec<double>& normal, double apart) {
                                 return is_near(a, b, normal, apart, dt, outside);
                               });
-    if (refused < 0) held = take(own_.answer(), poses);
+    if (refused < 0) held = take(own_.answer(), poses, true);
     return refused;
   }
 
@@ -178,22 +199,27 @@ class PatchForces {
                  moves_by_wrenches_,
                  own_.count() > 0 ? &own_ : nullptr,
                  solve_pair};
-    if (!is_grouped_) islands_.group(bodies_, patches_);
+    if (!is_grouped_) islands_.group(bodies_, rest_.awake(), patches_);
     is_grouped_ = true;
     IslandStep islands(options_, bodies_, step, ended_, fineness_, patches_, loads_, islands_);
     in_chunks(in_threads, [&](const Island& island) { islands.advance(island); });
     int64_t lost = islands.first_lost();
     if (lost >= 0) {
-      patches_.swap(kept_patches_);
-      clock_ = kept_clock_;
-      fineness_ = kept_fineness_;
-      is_grouped_ = false;
+      restore();
       return lost;
     }
     loads_.resize(patches_.size());
+    window_ = step.steps.window;
+    Given given{poses, velocities, outside};
+    bool is_resting =
+        options_.rest_speed > 0.0 && step.own && motion.poses && motion.velocities &&
+        rest_.count(islands_, bodies_, patches_, given, dt, options_.rest_speed, window_);
+    rest_.end(poses);
     islands.write_ends();
-    for (size_t k = 0; k < bodies_.size(); ++k)
-      if (!bodies_[k].is_free()) islands.move_alone(k);
+    for (int32_t k : rest_.fixed()) islands.move_alone(size_t(k));
+    if (is_resting) lay_down();
+    rest_.write_ends(all);
+    if (own_.settle()) is_chosen_ = false;
     if (motion.poses) std::copy_n(motion.poses, bodies_.size(), poses_.data());
     clock_.end(dt);
     moves_by_wrenches_ = motion.wrenches && !motion.poses && !motion.velocities;
@@ -204,7 +230,33 @@ class PatchForces {
     kept_patches_ = patches_;
     kept_clock_ = clock_;
     kept_fineness_ = fineness_;
+    is_rest_kept_ = false;
   }
+  // All is as it was then.
+  void restore() {
+    patches_.swap(kept_patches_);
+    clock_ = kept_clock_;
+    fineness_ = kept_fineness_;
+    is_grouped_ = false;
+    if (!is_rest_kept_) return;
+    std::swap(rest_, kept_rest_);
+    rest_.unmark();
+    loads_.swap(kept_loads_);
+    is_chosen_ = false;
+  }
+  // Wake what rests and is not given as it was, before an advance. One that gives the wrenches alone
+  // moves all bodies.
+  void rouse(const bc_pose* poses, const bc_velocity* velocities, const bc_wrench* outside,
+             const bc_motion& motion) {
+    if (!(motion.poses && motion.velocities)) rest_.mark_all();
+    if (rest_.compare({poses, velocities, outside})) is_chosen_ = false;
+    if (rest_.is_any_marked()) wake();
+  }
+  bool is_as_laid(size_t body, const bc_pose* poses, const bc_velocity* velocities,
+                  const bc_wrench* outside) const {
+    return rest_.is_as_laid(body, {poses, velocities, outside});
+  }
+  bool is_awake(size_t body) const { return !rest_.is_quiet(body); }
 
  private:
   // All that no force moves is one support.
@@ -248,6 +300,40 @@ class PatchForces {
     return found != patches_.end() && found->pair() == pair && found->normal_impulse > 0.0;
   }
 
+  void keep_rest() {
+    if (is_rest_kept_) return;
+    kept_rest_ = rest_;
+    kept_loads_ = loads_;
+    is_rest_kept_ = true;
+  }
+  void wake() {
+    keep_rest();
+    rest_.wake(bodies_, window_, patches_, loads_);
+    is_grouped_ = is_chosen_ = false;
+  }
+  void wake_all() {
+    rest_.mark_all();
+    if (rest_.is_any_marked()) wake();
+  }
+  // Islands that a new patch joins to what is awake wake up. Their patches are those of their poses.
+  void wake_touched() {
+    for (const Patch& patch : next_)
+      for (int32_t body : {patch.a, patch.b}) rest_.mark(size_t(body));
+    if (!rest_.is_any_marked()) return;
+    size_t found = next_.size();
+    for (const Patch& patch : rest_.patches())
+      if (rest_.is_marked(patch)) next_.push_back(patch);
+    for (size_t k = found; k < next_.size(); ++k) next_[k].age = 0.0;
+    wake();
+  }
+  // Bodies that come to rest end where they began.
+  void lay_down() {
+    for (int32_t body : rest_.awake())
+      if (rest_.is_at_rest(size_t(body))) ended_[size_t(body)] = {};
+    rest_.lay_down(bodies_, patches_, loads_);
+    is_grouped_ = is_chosen_ = false;
+  }
+
   bool is_of_boxes(const Patch& patch) const {
     return 0 <= patch.box_a && patch.box_a < patch.box_b && patch.box_b < box_count() &&
            body_of(patch.box_a) == patch.a && body_of(patch.box_b) == patch.b && patch.a >= 0 &&
@@ -261,6 +347,8 @@ class PatchForces {
     kept_patches_.reserve(room_);
     kept_fineness_.reserve(bodies_.size());
     loads_.reserve(room_);
+    kept_loads_.reserve(room_);
+    for (Rest* rest : {&rest_, &kept_rest_}) rest->make_room(bodies_.size(), room_);
     islands_.make_room(bodies_.size(), room_);
   }
   bool moves(int32_t a, int32_t b) const {
@@ -275,7 +363,7 @@ class PatchForces {
     is_grouped_ = false;
   }
 
-  Held take(const bc_patches& answer, const bc_pose* poses) {
+  Held take(const bc_patches& answer, const bc_pose* poses, bool is_own) {
     next_.clear();
     for (int64_t k = 0; k < answer.count; ++k) {
       bool is_stale = answer.separation[k] != answer.separation[k];
@@ -285,12 +373,14 @@ class PatchForces {
       next_.push_back(read(answer, k, is_stale, poses));
       if (!is_stale && !next_.back().has_area()) return Held::no_patch;
     }
+    if (is_own) wake_touched();
     auto before = [](const Patch& p, const Patch& q) { return p.pair() < q.pair(); };
     auto same = [](const Patch& p, const Patch& q) { return p.pair() == q.pair(); };
     if (!std::is_sorted(next_.begin(), next_.end(), before))
       std::sort(next_.begin(), next_.end(), before);
     if (std::adjacent_find(next_.begin(), next_.end(), same) != next_.end())
       return Held::pair_twice;
+    if (!is_own) wake_all();
     keep_impulses();
     patches_.swap(next_);
     is_grouped_ = false;
@@ -384,12 +474,18 @@ class PatchForces {
   std::vector<bc_pose> poses_;         // of the bodies at the end of the last advance
   std::vector<Patch> patches_, next_;  // by pair
   std::vector<Load> loads_;            // of the last advance, by pair
+  Rest rest_;                          // patches and loads of what rests are there
+  double window_ = 0.0;                // of the last advance [s]
   // Memory that calls use again.
   Islands islands_;
   std::vector<Patch> kept_patches_;  // for an advance that fails
   Clock kept_clock_;
   std::vector<Fineness> kept_fineness_;
+  Rest kept_rest_;  // before something woke
+  std::vector<Load> kept_loads_;
+  bool is_rest_kept_ = false;
   size_t room_ = 0;          // for patches
+  bool is_chosen_ = false;   // whether pairs that are solved are those of what is awake
   bool is_grouped_ = false;  // whether islands are those of the patches
 };
 

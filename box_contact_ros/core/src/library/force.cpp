@@ -69,14 +69,16 @@ bc_status read_bodies(const bc_body* given, int64_t count, std::vector<Body>& bo
   return BC_OK;
 }
 
+bc_status check_pose(size_t k, const bc_pose& pose) {
+  const double* numbers = pose.position;
+  if (pose_is_valid(numbers)) return BC_OK;
+  char field[32];
+  std::snprintf(field, sizeof field, "poses[%zu]", k);
+  return refuse_pose(field, numbers);
+}
 bc_status check_poses(size_t count, const bc_pose* poses) {
-  for (size_t k = 0; k < count; ++k) {
-    auto* numbers = reinterpret_cast<const double*>(poses + k);
-    if (pose_is_valid(numbers)) continue;
-    char field[32];
-    std::snprintf(field, sizeof field, "poses[%zu]", k);
-    return refuse_pose(field, numbers);
-  }
+  for (size_t k = 0; k < count; ++k)
+    if (bc_status status = check_pose(k, poses[k])) return status;
   return BC_OK;
 }
 
@@ -142,6 +144,9 @@ bc_status check_options(const bc_force_options& all) {
   if (!(all.most_depth > 0.0 && all.most_depth <= length_max))
     return fail(BC_BAD_ARGUMENT, "most_depth must be above 0 and at most 1e50 m, not %g",
                 all.most_depth);
+  if (!(all.rest_speed >= 0.0 && all.rest_speed <= force::speed_max))
+    return fail(BC_BAD_ARGUMENT, "rest_speed must be within 0 and 1e50 m/s, not %g",
+                all.rest_speed);
   if (!force::is_amount(all.friction))
     return fail(BC_BAD_ARGUMENT, "friction must be within 0 and 1e50, not %g", all.friction);
   return BC_OK;
@@ -217,15 +222,17 @@ bc_status read_boxes(const bc_body_box* given, int64_t count, size_t bodies,
   return BC_OK;
 }
 
-bc_status check_step(double dt, size_t bodies, const bc_pose* poses, const bc_velocity* velocities,
-                     const bc_wrench* outside) {
+// What is given as it was when a body was laid down was checked then.
+bc_status check_step(const PatchForces& self, double dt, const bc_pose* poses,
+                     const bc_velocity* velocities, const bc_wrench* outside) {
   if (!(dt >= force::step_min && dt < force::step_limit))
     return fail(BC_BAD_ARGUMENT, "dt must be at least 1e-50 s and below 1 s, not %g", dt);
-  if (bc_status status = check_poses(bodies, poses)) return status;
   auto* speeds = reinterpret_cast<const double*>(velocities);
   auto* loads = reinterpret_cast<const double*>(outside);
-  for (size_t k = 0; k < bodies; ++k) {
-    bc_status status = check_within("velocities", k, speeds + 6 * k, 6, force::speed_max);
+  for (size_t k = 0; k < self.bodies().size(); ++k) {
+    if (self.is_as_laid(k, poses, velocities, outside)) continue;
+    bc_status status = check_pose(k, poses[k]);
+    if (!status) status = check_within("velocities", k, speeds + 6 * k, 6, force::speed_max);
     if (!status && outside)
       status = check_within("wrenches", k, loads + 6 * k, 6, force::wrench_max);
     if (status) return status;
@@ -250,9 +257,9 @@ bc_status bc_patch_forces_create(const bc_body* bodies, int64_t count,
     if (bc_status status = check_options(all)) return status;
     std::vector<Body> read;
     if (bc_status status = read_bodies(bodies, count, read)) return status;
-    *forces =
-        handle(new PatchForces(std::move(read), {all.substeps, all.iterations, all.relaxations,
-                                                 all.threads, all.friction, all.most_depth}));
+    *forces = handle(new PatchForces(
+        std::move(read), {all.substeps, all.iterations, all.relaxations, all.threads, all.friction,
+                          all.most_depth, all.rest ? all.rest_speed : 0.0}));
     return BC_OK;
   });
 }
@@ -342,13 +349,18 @@ bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, const bc_p
     if (bodies > 0 && !(poses && velocities)) return refuse_null(poses ? "velocities" : "poses");
     bc_motion all{};
     if (!read(motion, all)) return fail(BC_BAD_ABI, "motion.size is unknown");
-    if (bc_status status = check_step(dt, bodies, poses, velocities, outside)) return status;
     PatchForces& self = forces_of(forces);
+    if (bc_status status = check_step(self, dt, poses, velocities, outside)) return status;
     self.keep();
-    if (bc_status status = solve_own(self, dt, poses, outside)) return status;
+    self.rouse(poses, velocities, outside, all);
+    if (bc_status status = solve_own(self, dt, poses, outside)) {
+      self.restore();
+      return status;
+    }
     int64_t lost = self.advance(
         dt, poses, velocities, outside, all, solve_exactly,
         [](long threads, long chunks, const auto& work) { in_threads(threads, chunks, work); });
+    for (size_t k = 0; lost < 0 && all.awake && k < bodies; ++k) all.awake[k] = self.is_awake(k);
     if (lost < 0) return BC_OK;
     return fail(
         BC_BAD_ARGUMENT,

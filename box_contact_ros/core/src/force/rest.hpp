@@ -1,0 +1,320 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// Rest: an island that was slow for a while, and that contacts hold, is laid down. Its bodies keep the
+// poses that were given, without a velocity, and its patches their impulses. Until an input of it
+// differs, nothing of it is solved, looked for or moved.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+#include "islands.hpp"
+
+namespace box_contact::BOX_CONTACT_SET::force {
+
+// An island is laid down once it was slow for this time [s].
+constexpr double rest_time = 0.5;
+// Then it is no faster than when that began, or than this share of what is slow [1]: what begins to tip
+// gains speed.
+constexpr double calm_share = 0.1;
+
+// What an advance is given of each body.
+struct Given {
+  const bc_pose* poses;
+  const bc_velocity* velocities;
+  const bc_wrench* outside;  // none: no wrenches
+};
+
+// Move rows to others, where `goes(place)`. Both are by pair, and there is room.
+template <class Row, class Goes>
+void hand_over(std::vector<Row>& from, std::vector<Row>& to, const Goes& goes) {
+  size_t count = 0, old = to.size(), kept = 0;
+  for (size_t k = 0; k < from.size(); ++k) count += goes(k);
+  size_t end = old + count;
+  to.resize(end);
+  for (size_t k = from.size(); end > old && k-- > 0;) {
+    if (!goes(k)) continue;
+    while (old > 0 && from[k].pair() < to[old - 1].pair()) to[--end] = to[--old];
+    to[--end] = from[k];
+  }
+  for (size_t k = 0; k < from.size(); ++k)
+    if (!goes(k)) from[kept++] = from[k];
+  from.resize(kept);
+}
+
+class Rest {
+ public:
+  // Bodies that forces move, but for those at rest; and bodies that no force moves.
+  const std::vector<int32_t>& awake() const { return awake_; }
+  const std::vector<int32_t>& fixed() const { return fixed_; }
+  const std::vector<Patch>& patches() const { return patches_; }
+  const std::vector<Load>& loads() const { return loads_; }
+  bool is_any() const { return !patches_.empty(); }
+  bool is_at_rest(size_t body) const { return of_[body].island >= 0; }
+  // Whether a body is where it was, and stays there.
+  bool is_quiet(size_t body) const { return is_at_rest(body) || of_[body].is_fixed_still; }
+  // Whether all that is given of a body at rest is as it was when it was laid down, to the bit.
+  bool is_as_laid(size_t k, const Given& given) const {
+    const OfBody& of = of_[k];
+    constexpr bc_velocity none{};
+    constexpr bc_wrench no_wrench{};
+    return of.island >= 0 && std::memcmp(&of.pose, given.poses + k, sizeof of.pose) == 0 &&
+           std::memcmp(&none, given.velocities + k, sizeof none) == 0 &&
+           std::memcmp(&of.outside, given.outside ? given.outside + k : &no_wrench,
+                       sizeof of.outside) == 0;
+  }
+
+  void make_room(size_t bodies, size_t patches) {
+    patches_.reserve(patches);
+    loads_.reserve(patches);
+    is_marked_.reserve(bodies);
+    of_.reserve(bodies);
+    awake_.reserve(bodies);
+    fixed_.reserve(bodies);
+  }
+  // All bodies, which are awake.
+  void set_bodies(const std::vector<Body>& bodies) {
+    of_.assign(bodies.size(), {});
+    is_marked_.assign(bodies.size(), 0);
+    is_any_marked_ = false;
+    patches_.clear();
+    loads_.clear();
+    list(bodies);
+  }
+
+  // Mark islands, which then wake.
+  void mark(size_t body) {
+    if (!is_at_rest(body)) return;
+    is_marked_[size_t(of_[body].island)] = 1;
+    is_any_marked_ = true;
+  }
+  void mark_all() {
+    for (size_t k = 0; k < of_.size(); ++k) mark(k);
+  }
+  template <class Condition>
+  void mark_if(const Condition& condition) {
+    for (const Patch& patch : patches_)
+      if (condition(patch)) mark(patch);
+  }
+  void unmark() {
+    std::fill(is_marked_.begin(), is_marked_.end(), uint8_t(0));
+    is_any_marked_ = false;
+  }
+  bool is_any_marked() const { return is_any_marked_; }
+  bool is_marked(const Patch& patch) const {
+    return is_marked_[size_t(std::max(of_[size_t(patch.a)].island, of_[size_t(patch.b)].island))];
+  }
+
+  // Mark what is given otherwise than when it was laid down, and what lies on a body that no force
+  // moves, and that moves. Returns whether other bodies of mass 0 move than lately.
+  bool compare(const Given& given) {
+    if (is_any())
+      for (size_t k = 0; k < of_.size(); ++k)
+        if (is_at_rest(k) && !is_as_laid(k, given)) mark(k);
+    bool is_other = false, is_bearing = false;
+    for (int32_t body : fixed_) {
+      OfBody& of = of_[size_t(body)];
+      const double* speeds = given.velocities[body].linear;
+      bool is_still = are_within(speeds, 3, 0.0) &&
+                      are_within(given.velocities[body].angular, 3, 0.0) &&
+                      std::memcmp(&of.pose, given.poses + body, sizeof of.pose) == 0;
+      is_other |= is_still != of.is_fixed_still;
+      of.is_fixed_still = is_still;
+      is_bearing |= !is_still && of.bears;
+    }
+    if (is_bearing)
+      mark_if([this](const Patch& patch) {
+        return !is_quiet(size_t(patch.a)) || !is_quiet(size_t(patch.b));
+      });
+    return is_other;
+  }
+
+  // Wake the islands that are marked: their patches and loads go to those that are awake. Impulses are
+  // those of a window, as long as it is now.
+  void wake(const std::vector<Body>& bodies, double window, std::vector<Patch>& patches,
+            std::vector<Load>& loads) {
+    auto wakes = [this](size_t k) { return is_marked(patches_[k]); };
+    for (size_t k = 0; k < patches_.size(); ++k)
+      if (wakes(k)) patches_[k].scale(window / window_of(patches_[k]));
+    hand_over(loads_, loads, wakes);
+    hand_over(patches_, patches, wakes);
+    for (OfBody& of : of_)
+      if (of.island >= 0 && is_marked_[size_t(of.island)]) of = {};
+    unmark();
+    list(bodies);
+  }
+
+  // Count for how long islands are slow at the end of an advance, and note what is given of those that
+  // come to rest. Returns whether any does.
+  bool count(Islands& islands, const std::vector<Body>& bodies, const std::vector<Patch>& patches,
+             const Given& given, double dt, double slow, double window) {
+    bool is_any = false;
+    for (const Island& island : islands.all) {
+      if (!comes_to_rest(island, islands, bodies, patches, dt, slow)) continue;
+      is_any = true;
+      int32_t name = islands.moving[island.body].body;
+      add_loads(island, islands);
+      each_free(island, islands, [&](const Moving& moving) {
+        auto k = size_t(moving.body);
+        of_[k].island = name;
+        of_[k].pose = given.poses[k];
+        of_[k].outside = given.outside ? given.outside[k] : bc_wrench{};
+        of_[k].window = window;
+        for (int i = 0; i < 3; ++i) {
+          of_[k].wrench.force[i] = moving.impulse[i] / dt;
+          of_[k].wrench.torque[i] = moving.angular_impulse[i] / dt;
+        }
+      });
+    }
+    return is_any;
+  }
+  // Lay down the bodies that came to rest, with their patches and loads.
+  void lay_down(const std::vector<Body>& bodies, std::vector<Patch>& patches,
+                std::vector<Load>& loads) {
+    auto rests = [&](size_t k) {
+      return is_at_rest(size_t(patches[k].a)) || is_at_rest(size_t(patches[k].b));
+    };
+    hand_over(loads, loads_, rests);
+    hand_over(patches, patches_, rests);
+    list(bodies);
+  }
+  // Write where bodies at rest end.
+  void write_ends(const bc_motion& motion) const {
+    for (size_t k = 0; k < of_.size(); ++k) {
+      if (!is_at_rest(k)) continue;
+      const OfBody& of = of_[k];
+      motion.poses[k] = of.pose;
+      if (motion.velocities) motion.velocities[k] = {};
+      if (motion.wrenches) motion.wrenches[k] = of.wrench;
+    }
+  }
+  // Keep where the bodies that no force moves were given.
+  void end(const bc_pose* poses) {
+    for (int32_t body : fixed_) of_[size_t(body)].pose = poses[body];
+  }
+
+ private:
+  struct OfBody {
+    // As it was laid down. Of a body that no force moves: its pose in the last advance.
+    bc_pose pose{};
+    bc_wrench outside{};
+    bc_wrench wrench{};           // of contacts: the loads
+    double window = 0.0;          // of its patches' impulses [s]
+    int32_t island = -1;          // the lowest body of its island; −1: it is awake
+    bool is_fixed_still = false;  // of a body that no force moves
+    bool bears = false;           // the same: whether something at rest lies on it
+    // While it is awake.
+    double slow_time = 0.0;  // for how long its island was slow [s]
+    double first = 0.0;      // its square of speed when that began [m²/s²]
+  };
+
+  void mark(const Patch& patch) {
+    mark(size_t(patch.a));
+    mark(size_t(patch.b));
+  }
+  double window_of(const Patch& patch) const {
+    return std::max(of_[size_t(patch.a)].window, of_[size_t(patch.b)].window);
+  }
+  void list(const std::vector<Body>& bodies) {
+    awake_.clear();
+    fixed_.clear();
+    for (size_t k = 0; k < bodies.size(); ++k) {
+      if (!bodies[k].is_free()) {
+        fixed_.push_back(int32_t(k));
+        of_[k].bears = false;
+      } else if (!is_at_rest(k)) {
+        awake_.push_back(int32_t(k));
+      }
+    }
+    for (const Patch& patch : patches_)
+      for (int32_t body : {patch.a, patch.b}) of_[size_t(body)].bears = true;
+  }
+
+  template <class Visit>
+  static void each_free(const Island& island, Islands& islands, const Visit& visit) {
+    for (size_t k = island.body; k < island.body_end; ++k)
+      if (islands.moving[k].inverse_mass > 0.0) visit(islands.moving[k]);
+  }
+
+  // Twice the kinetic energy by the mass [m²/s²]: with pushing out, and after relaxation.
+  static double speed_squared(const Body& body, const Moving& moving) {
+    auto of = [&](const Motion& motion) {
+      Vec<double> turning = transposed_times(moving.placed.axes, motion.angular);
+      return dot(motion.linear, motion.linear) +
+             body.inverse_mass * dot(turning / body.inverse_inertia, turning);
+    };
+    return std::max(of(moving.pushed), of({moving.linear, moving.angular}));
+  }
+
+  // The impulses of an advance as the loads have them: after relaxation.
+  static void add_loads(const Island& island, Islands& islands) {
+    each_free(island, islands,
+              [](Moving& moving) { moving.impulse = moving.angular_impulse = {}; });
+    for (size_t k = island.block; k < island.block_end; ++k) {
+      Block& block = islands.blocks[k];
+      block.normal_impulses = block.normal_sum;
+      block.friction_impulses = block.friction_sum;
+      force::count(block, islands.moving[size_t(block.a)], islands.moving[size_t(block.b)]);
+    }
+  }
+
+  bool comes_to_rest(const Island& island, Islands& islands, const std::vector<Body>& bodies,
+                     const std::vector<Patch>& patches, double dt, double slow) {
+    double least = rest_time, limit = slow * slow, calm = calm_share * calm_share * limit;
+    bool is_slow = island.block < island.block_end, is_calm = true;
+    for (size_t k = island.body; is_slow && k < island.body_end; ++k) {
+      Moving& moving = islands.moving[k];
+      auto body = size_t(moving.body);
+      moving.speed_squared = speed_squared(bodies[body], moving);
+      is_slow = bodies[body].is_free() ? moving.speed_squared < limit : of_[body].is_fixed_still;
+    }
+    each_free(island, islands, [&](const Moving& moving) {
+      OfBody& of = of_[size_t(moving.body)];
+      if (of.slow_time == 0.0) of.first = moving.speed_squared;
+      of.slow_time = is_slow ? of.slow_time + dt : 0.0;
+      least = std::min(least, of.slow_time);
+      is_calm = is_calm && moving.speed_squared <= std::max(of.first, calm);
+    });
+    if (least < rest_time) return false;
+    if (is_calm && is_held(island, islands, patches)) return true;
+    each_free(island, islands,
+              [&](const Moving& moving) { of_[size_t(moving.body)].slow_time = 0.0; });
+    return false;
+  }
+
+  // Whether contacts hold all bodies of an island, from those that no force moves on: friction could stop
+  // them within the advance. What lies on ice, floats or goes on a belt is not at rest.
+  static bool is_held(const Island& island, Islands& islands, const std::vector<Patch>& patches) {
+    for (size_t k = island.body; k < island.body_end; ++k)
+      islands.moving[k].is_held = islands.moving[k].inverse_mass == 0.0;
+    for (bool goes_on = true; goes_on;) {
+      goes_on = false;
+      for (size_t k = island.block; k < island.block_end; ++k) {
+        const Block& block = islands.blocks[k];
+        const Vec<double>& surface = patches[size_t(block.patch)].surface;
+        if (dot(surface, surface) != 0.0) return false;
+        Moving &a = islands.moving[size_t(block.a)], &b = islands.moving[size_t(block.b)];
+        if (a.is_held == b.is_held) continue;
+        const Moving& other = a.is_held ? b : a;
+        double most = block.friction * block.normal_sum[0] * other.inverse_mass;  // [m/s]
+        if (most > 0.0 && other.speed_squared <= most * most)
+          a.is_held = b.is_held = goes_on = true;
+      }
+    }
+    return std::all_of(islands.moving.begin() + long(island.body),
+                       islands.moving.begin() + long(island.body_end),
+                       [](const Moving& moving) { return moving.is_held; });
+  }
+
+  std::vector<OfBody> of_;
+  std::vector<int32_t> awake_, fixed_;
+  std::vector<Patch> patches_;      // of what is at rest, by pair
+  std::vector<Load> loads_;         // theirs
+  std::vector<uint8_t> is_marked_;  // of islands, by their names
+  bool is_any_marked_ = false;
+};
+
+}  // namespace box_contact::BOX_CONTACT_SET::force
