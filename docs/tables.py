@@ -113,14 +113,14 @@ def models() -> str:
                      *(from_c(choice, 'single', of_set) for of_set in (AT_REST, SWAY)),
                      *(point_error(choice, of_set) for of_set in (choice.rest, 'landings'))])
     table = markdown_table(
-        ['one pair', 'Python [µs]', 'C, no covariance [ns], at rest', 'moving',
-         'point error [%], at rest', 'landing'], body)
+        ['one pair', 'Python, at rest [µs]', 'C, at rest [ns]', 'C, moving [ns]',
+         'point error, at rest [%]', 'point error, landing [%]'], body)
     where = fastest(rows('native.csv', set=SWAY, contestant='exact volume, single'))
     assert where
     return (f'{table}\n\nMedians on one core, {SHOWN[where["instruction_set"]]}, '
-            f'{where["processor"]}. The error is within what 99 % of the points are, in % of the '
-            "smaller box's longest edge. MuJoCo from Python is `mj_kinematics` and `mj_collision`. "
-            'A dash: no such call, or two boxes that the network is not trained for.')
+            f'{where["processor"]}. Errors: the 99th percentile of distances, in % of the smaller '
+            "box's longest edge. Python's times hold the size of the patch, and MuJoCo's both "
+            '`mj_kinematics` and `mj_collision`; in C, MuJoCo is as fast. A dash: not measured.')
 
 
 def bench() -> str:

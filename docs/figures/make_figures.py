@@ -95,9 +95,10 @@ def slide(axes: plt.Axes) -> None:
     ends[tilts == 0.0] = np.nan
     axes.plot(degrees, ends, color=CORNER, linewidth=2)
     axes.text(-1.2e-4, 6.1, 'deepest corner', color=CORNER, fontsize=10, va='center', ha='right')
-    axes.legend(title='centroid', title_fontsize=10, fontsize=9, loc='lower right')
-    axes.set_xscale('symlog', linthresh=LEAST_TILT, linscale=0.7)
-    axes.set(title='The deepest corner jumps by 12 m', xlabel='tilt of a container [°]',
+    axes.legend(title='centroid, lowest corner', title_fontsize=10, fontsize=9, loc='lower right')
+    # With this scale the axis has no kink where it turns from linear to logarithmic.
+    axes.set_xscale('symlog', linthresh=LEAST_TILT, linscale=0.9 / math.log(10.0))
+    axes.set(title='The deepest corner jumps by 12 m', xlabel='tilt of a container [°], log scale',
              ylabel='contact point along its length [m]', xlim=(-1.5, 1.5), ylim=(-6.8, 6.8))
     axes.set_xticks([-1, -0.01, -LEAST_TILT, 0, LEAST_TILT, 0.01, 1],
                     ['-1', '-0.01', '', '0', '', '0.01', '1'])
