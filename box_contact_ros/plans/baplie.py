@@ -42,7 +42,7 @@ SLAB = 0.1  # thickness [m]
 SHIP = 'ship'
 UNITS = {'KGM': 1.0, 'LBR': 0.45359237, 'TNE': 1000.0}
 """Of masses [kg]."""
-HEAVIEST = 1e6  # [kg] of a container
+HEAVIEST = 60e3  # [kg] of a container with its goods; the standard allows 36 t
 GROSS = ('WT', 'VGM', 'G', 'AET')
 """What MEA calls the mass of a container with its goods; VGM is that which was weighed."""
 OVERS = {'5': 'in front', '6': 'behind', '7': 'on the right', '8': 'on the left', '9': 'in height'}
@@ -169,7 +169,7 @@ def _weigh(row: Stowed, segment: list[str]) -> None:
 
 def _measure(row: Stowed, segment: list[str]) -> None:
     """Take by how much goods reach beyond the container."""
-    unit, *extents = part(segment, 2).split(':')
+    unit, *extents = next(filter(None, segment[2:]), '').split(':')
     for extent in extents:
         if extent.strip('0.') and part(segment, 1) in OVERS:
             row.over.append(f'{_shown(extent)} {"cm" if unit in ("CM", "CMT") else _shown(unit)} '
@@ -195,6 +195,7 @@ class Placed:
     """A container whose slot and size are known."""
 
     slot: str
+    number: str
     bay: int
     row: int
     tier: int
@@ -210,6 +211,7 @@ class Placed:
 def checked(rows: Iterable[Stowed], faults: list[Fault]) -> list[Placed]:
     """Return the containers that can be placed, and add what is wrong with the others."""
     placed: dict[str, Placed] = {}
+    slot_of: dict[str, str] = {}
     unknown: dict[str, list[str]] = defaultdict(list)
     forms: dict[int, list[str]] = defaultdict(list)
     for row in rows:
@@ -221,13 +223,17 @@ def checked(rows: Iterable[Stowed], faults: list[Fault]) -> list[Placed]:
             forms[len(row.slot)].append(row.name)
         elif row.slot in placed:
             faults.append(Fault('twice', (row.slot,), f'{row.number or "a container"} has the slot '
-                                                      'of another one: left out'))
+                                                      f'of {placed[row.slot].number or "another"}: '
+                                                      'left out'))
         elif size is None:
             unknown[row.kind].append(row.slot)
         else:
+            other = slot_of.setdefault(row.number, row.slot) if row.number else row.slot
+            if other != row.slot:
+                faults.append(Fault('twice', (row.slot,), f'{row.number} is at {other}, too'))
             mass = _mass(row, faults)
-            placed[row.slot] = Placed(row.slot, int(row.slot[:3]), int(row.slot[3:5]),
-                                      int(row.slot[5:]), size, mass)
+            placed[row.slot] = Placed(row.slot, row.number, int(row.slot[:3]),
+                                      int(row.slot[3:5]), int(row.slot[5:]), size, mass)
     for count, names in forms.items():
         faults.append(Fault('slot', tuple(names), (
             f'slots of {count} characters are not known, only 7 digits (bay, row, tier)' if count
@@ -243,22 +249,25 @@ def checked(rows: Iterable[Stowed], faults: list[Fault]) -> list[Placed]:
 
 
 def _mass(row: Stowed, faults: list[Fault]) -> float:
-    """Return the mass [kg] of a container; 0, and a fault, where the file has none."""
+    """Return the mass [kg] of a container; 0 where the file has none. What is odd is a fault."""
     unit, _, number = row.mass.partition(':')
-    number = number.split(':')[0]
-    fault = ''
+    number = number.split(':')[0].strip()
+    mass, fault = 0.0, ''
     if not row.mass:
-        fault = 'has no weight'
+        fault = 'has no weight: taken as 0'
     elif unit not in UNITS:
-        fault = f'its weight has the unit {unit or "none"}, not KGM'
-    elif not re.fullmatch(r'[0-9]+\.?[0-9]*', number.strip()):
-        fault = f'its weight is {number or "missing"}'
-    elif UNITS[unit] * float(number) > HEAVIEST:
-        fault = f'its weight is {number} {unit}, more than any container'
+        fault = f'its weight has the unit {unit or "none"}, not KGM: taken as 0'
+    elif not re.fullmatch(r'[0-9]+\.?[0-9]*', number):
+        fault = f'its weight is {number or "missing"}: taken as 0'
+    else:
+        mass = UNITS[unit] * float(number)
+        if mass == 0.0:
+            fault = 'its weight is 0'
+        elif mass > HEAVIEST:
+            fault = f'its weight is {number} {unit}, more than any container'
     if fault:
-        faults.append(Fault('mass', (row.slot,), f'{fault}: taken as 0'))
-        return 0.0
-    return UNITS[unit] * float(number)
+        faults.append(Fault('mass', (row.slot,), fault))
+    return mass
 
 
 def stow(boxes: list[Placed], faults: list[Fault]) -> Plan:

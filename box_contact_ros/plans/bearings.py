@@ -13,6 +13,10 @@ from ..solver.pose import rotation_matrix
 
 NEGLIGIBLE = 1e-9
 """Share of a patch's stiffness that a point may lack: of triangles with an edge of a micron."""
+CASTING = 0.178
+"""Length of a corner casting [m] (ISO 1161): as far apart two of them still meet."""
+FORTY_FEET = 12.192
+"""Length [m] at which longer containers have castings, too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,16 +47,20 @@ def on_faces(patches: FacePatches) -> Bearings:
 
 
 def on_corners(sizes: np.ndarray, poses: np.ndarray, carried_by: np.ndarray, normal: np.ndarray,
-               patches: FacePatches, slack: float) -> Bearings:
+               patches: FacePatches, slack: float, fixed: np.ndarray) -> Bearings:
     """Return the corners of the upper boxes that are within patches, up to `slack` [m].
 
-    Where there are none, they are those of the lower box, and else those of the rectangle.
+    Only where the lower box has a casting, but that `fixed` ones bear everywhere. Where there are
+    none, they are those of the lower box, and else those of the rectangle.
     """
     point = patches.rectangle.copy()
     within = np.ones(point.shape[:2], bool)
-    for box in carried_by.T:  # the upper one last
+    lower, upper = carried_by.T
+    for box in (lower, upper):
         corner = _face_corners(sizes[box], poses[box], patches.centre, normal)
         inside = _inside(corner, patches, normal, slack)
+        if box is upper:
+            inside &= fixed[lower, None] | _on_castings(corner, sizes[lower], poses[lower], normal)
         rows = inside.any(axis=1)
         point[rows], within[rows] = corner[rows], inside[rows]
     stiffness = within * (patches.area / within.sum(axis=1))[:, None]
@@ -73,6 +81,19 @@ def _face_corners(sizes: np.ndarray, poses: np.ndarray, towards: np.ndarray, nor
     half[rows, :, (face + 1) % 3] = (1, -1, -1, 1)
     half[rows, :, (face + 2) % 3] = (1, 1, -1, -1)
     return poses[:, None, :3] + np.einsum('kij,kpj->kpi', axes, half * sizes[:, None] / 2.0)
+
+
+def _on_castings(points: np.ndarray, sizes: np.ndarray, poses: np.ndarray, normal: np.ndarray,
+                 ) -> np.ndarray:
+    """Return which points (k, p, 3) are above castings of boxes (k, p)."""
+    axes = rotation_matrix(poses[:, 3:])
+    across = np.abs(np.einsum('kij,kpi->kpj', axes, points - poses[:, None, :3]))
+    half = sizes[:, None] / 2.0
+    ends = np.abs(across - half) <= CASTING
+    ends |= (half > FORTY_FEET / 2.0) & (np.abs(across - FORTY_FEET / 2.0) <= CASTING)
+    along = np.abs(np.einsum('ki,kij->kj', normal, axes))
+    ends[np.arange(len(poses)), :, along.argmax(axis=1)] = True
+    return ends.all(axis=2)
 
 
 def _inside(points: np.ndarray, patches: FacePatches, normal: np.ndarray, slack: float,

@@ -91,6 +91,8 @@ FAULTS = {
                         'down to tier 02'),
     'gap to the deck': ('p.edi', baplie('0010086 22G1'), 'gap', '0010086', 'down to the deck'),
     'slot twice': ('p.edi', baplie(PLACED, PLACED), 'twice', '0010082', 'TEST0000001 has the slot'),
+    'number twice': ('p.edi', baplie(PLACED, '0010084 22G1').replace('TEST0000001', 'TEST0000000'),
+                     'twice', '0010084', 'TEST0000000 is at 0010082, too'),
     'slot of 6': ('p.edi', baplie(PLACED, '010082 22G1'), 'slot', '010082', 'of 6 characters'),
     'slot of 8': ('p.edi', baplie(PLACED, '00010082 22G1'), 'slot', '00010082', 'of 8 characters'),
     'slot of signs': ('p.edi', baplie(PLACED, '00100$$ 22G1'), 'slot', '00100$$', '7 digits'),
@@ -104,6 +106,13 @@ FAULTS = {
     'unit': ('p.edi', baplie(PLACED, '0010084 22G1 MEA+WT++XYZ:5'), 'mass', '0010084', 'unit XYZ'),
     'too heavy': ('p.edi', baplie(PLACED, '0010084 22G1 MEA+WT++KGM:99999999'), 'mass', '0010084',
                   'more than any container'),
+    'heavy': ('p.edi', baplie(PLACED, '0010084 22G1 MEA+VGM++KGM:215000'), 'mass', '0010084',
+              '215000 KGM, more than any container'),
+    'weight of 0': ('p.edi', baplie(PLACED, '0010084 22G1 MEA+VGM++KGM:0'), 'mass', '0010084',
+                    'its weight is 0'),
+    'over-height with an empty element': (
+        'p.edi', baplie('0010082 22U1 MEA+WT++KGM:9000 DIM+9++CMT:::45'), 'dimension', '0010082',
+        '45 cm in height'),
     'over-height': ('p.edi', baplie('0010082 22U1 MEA+WT++KGM:9000 DIM+9+CMT:::79'), 'dimension',
                     '0010082', '79 cm in height'),
     'over-width': ('p.edi', baplie('0010082 22P1 MEA+WT++KGM:9000 DIM+7+CMT::30'), 'dimension',
@@ -111,7 +120,8 @@ FAULTS = {
     'end missing': ('p.edi', baplie(PLACED, end='RFF+BM:1'), 'cut', '', 'no UNT'),
     'cut': ('p.edi', baplie(PLACED, end='UNT+99+1'), 'cut', '', 'counts 99 segments, and there '
                                                                 'are 6'),
-    'cut in a message': ('p.edi', baplie(PLACED) + baplie('0010084 22G1').replace('UNT', 'TNU'),
+    'cut in a message': ('p.edi', baplie(PLACED) + baplie('0010084 22G1').replace(
+                             'UNT', 'TNU').replace('TEST0', 'TEST1'),
                          'cut', '', 'no UNT'),
     # CSV
     'size': ('p.csv', sheet(FLAT, 'b,1,-1,1,0,0,1.5'), 'dimension', 'b', '(1, -1, 1) is not '

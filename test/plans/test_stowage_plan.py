@@ -49,7 +49,7 @@ def test_rows_are_beside_a_centre_row():
     rows = [4, 2, 0, 1, 3]
     places = [(10, row, 82) for row in rows], *(
         [(bay, row, tier) for row in rows if row] for bay, tier in ((10, 2), (14, 82)))
-    boxes = [Placed('', *place, (1.0, 1.0, 1.0), 0.0) for bay in places for place in bay]
+    boxes = [Placed('', '', *place, (1.0, 1.0, 1.0), 0.0) for bay in places for place in bay]
     assert (grid(boxes)[1] / 2.5).tolist() == [-2, -1, 0, 1, 2] + 2 * [-1.5, -0.5, 0.5, 1.5]
 
 
