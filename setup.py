@@ -25,7 +25,7 @@ COMPILER = os.environ.get('CXX', 'c++').split()
 os.environ['PATH'] += os.pathsep + sysconfig.get_path('scripts')
 
 PROGRAMS = {'bench': 'bench.bench', 'contact_node': 'node.contact_node',
-            'crane': 'demo.crane_node', 'inspect': 'plans.inspect',
+            'crane': 'demo.crane_node', 'inspect': 'plans.inspect_files',
             'markers': 'view.live.markers', 'soup_node': 'node.soup_node', 'view': 'view.view'}
 """The module of each program, whose `main` starts it."""
 

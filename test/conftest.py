@@ -102,7 +102,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1]))
 os.environ.pop('PYTEST_ADDOPTS', None)
 
 PROGRAMS = {'bench': 'bench.bench', 'contact_node': 'node.contact_node',
-            'crane': 'demo.crane_node', 'inspect': 'plans.inspect',
+            'crane': 'demo.crane_node', 'inspect': 'plans.inspect_files',
             'markers': 'view.live.markers', 'soup_node': 'node.soup_node', 'view': 'view.view'}
 """The module of each program, as setup.py has them."""
 EXTRAS = {

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..arguments import program_parser, within
 from ..extras import MissingExtra, require
-from ..plans.inspect import NOT_READ, one_line
+from ..plans.inspect_files import NOT_READ, one_line
 from ..plans.inspect_plan import inspect_plan
 from ..plans.inspection import CAUSES, Inspection
 from ..plans.read_plan import read_any

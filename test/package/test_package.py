@@ -125,11 +125,11 @@ def test_a_missing_extra_is_one_line_that_names_it() -> None:
 def test_a_program_without_extras_ends_in_one_line(module: str) -> None:
     """Before it imports what it misses. Of a plan, only some files need an extra."""
     absent = [name for modules in EXTRAS.values() for name in modules if name != 'safetensors']
-    arguments = ['docs/examples/files/ship.edi'] if module == 'plans.inspect' else []
+    arguments = ['docs/examples/files/ship.edi'] if module == 'plans.inspect_files' else []
     done = _run('-c', f'import sys; sys.modules.update(dict.fromkeys({absent}))\n'
                       f'import box_contact_ros.{module} as program\n'
                       f'sys.exit(program.main({arguments}))')
-    status = 2 if module == 'plans.inspect' else 1  # there 1 is a plan that is not sound
+    status = 2 if module == 'plans.inspect_files' else 1  # there 1 is a plan that is not sound
     assert (done.returncode, done.stderr.count('\n')) == (status, 1), done.stderr
     assert 'pip install' in done.stderr
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from box_contact_ros.plans import inspect
+from box_contact_ros.plans import inspect_files
 
 pytest.importorskip('clarabel')
 pytest.importorskip('mujoco')
@@ -80,7 +80,7 @@ def judged(path: Path) -> tuple[int, str, float]:
     """Return the exit status of the program, what it prints, and the time of this process [s]."""
     out, start = io.StringIO(), time.process_time()
     with redirect_stdout(out), redirect_stderr(out):
-        status = inspect.main([str(path)])
+        status = inspect_files.main([str(path)])
     return status, out.getvalue(), time.process_time() - start
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from box_contact_ros.plans import inspect
+from box_contact_ros.plans import inspect_files
 
 pytest.importorskip('clarabel')
 
@@ -22,7 +22,7 @@ SHOWN = re.findall(r'^```console\n\$ box_contact_inspect (.*)\n((?:.*\n)*?)```$'
 @pytest.mark.parametrize(('arguments', 'printed'), SHOWN)
 def test_the_page_shows_what_is_printed(arguments, printed, monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
-    assert inspect.main(shlex.split(arguments)) == 1
+    assert inspect_files.main(shlex.split(arguments)) == 1
     assert capsys.readouterr().out == printed
 
 

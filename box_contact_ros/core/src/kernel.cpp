@@ -4,7 +4,7 @@
 // One kernel. It is compiled once for each instruction set, which names it.
 #include "kernel.hpp"
 
-#include "distance/nearest.hpp"
+#include "distance/distances.hpp"
 #include "mlp/mlp_model.hpp"
 #include "mlp/paper_model.hpp"
 #include "overlap/exact.hpp"

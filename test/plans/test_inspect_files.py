@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from box_contact_ros.plans import inspect
+from box_contact_ros.plans import inspect_files
 
 pytest.importorskip('clarabel')
 
@@ -27,7 +27,7 @@ PAIR = ('a,1,1,1,0,0,0.5,100', 'b,1,1,1,0,0,1.5,200')
 def judge(tmp_path, capsys):
     """Return a function that writes a file and judges it: exit status and lines, or stderr's."""
     def run(name: str, text: str, *options: str) -> tuple[int, list[str]]:
-        status = inspect.main([str(written(tmp_path, name, text)), *options])
+        status = inspect_files.main([str(written(tmp_path, name, text)), *options])
         printed = capsys.readouterr()
         return status, (printed.err if status == 2 else printed.out).splitlines()
     return run
@@ -157,10 +157,10 @@ def test_several_files_have_a_line_each(tmp_path, capsys):
     """And the worst exit status."""
     good = str(written(tmp_path, 'a.csv', sheet('a,1,1,1,0,0,0.5')))
     bad = str(written(tmp_path, 'b.csv', sheet('a,1,1,1,0,0,0.7')))
-    assert inspect.main([good, bad]) == 1
+    assert inspect_files.main([good, bad]) == 1
     assert capsys.readouterr().out.splitlines() == [f'{good}: 1 box: sound',
                                                     f'{bad}: 1 box: not sound']
-    assert inspect.main([bad, str(tmp_path / 'none.csv'), good]) == 2
+    assert inspect_files.main([bad, str(tmp_path / 'none.csv'), good]) == 2
     printed = capsys.readouterr()
     assert printed.err == f'{tmp_path / "none.csv"}: No such file or directory\n'
     assert len(printed.out.splitlines()) == 2
@@ -205,5 +205,5 @@ def test_a_line_has_three_names_and_shows_no_control_characters(judge):
 def test_a_picture(tmp_path):
     pytest.importorskip('matplotlib')
     out = tmp_path / 'ship.png'
-    assert inspect.main([str(FILES / 'ship.edi'), '--picture', str(out)]) == 1
+    assert inspect_files.main([str(FILES / 'ship.edi'), '--picture', str(out)]) == 1
     assert out.read_bytes().startswith(b'\x89PNG')
