@@ -43,7 +43,7 @@ def checked_changes(scene: Scene, fixed: Mapping[str, Box], moving: Mapping[str,
             raise SceneError(('absent', number), f'{short_repr(name)} {fault}')
         changes[name] = None
     gone = sum(box is None for box in changes.values())
-    count = len(scene.boxes) - gone + len(changes.keys() - scene.boxes.keys())
+    count = len(scene.boxes) - gone + sum(name not in scene.boxes for name in changes)
     if count < 1:
         raise SceneError(('absent',), 'a scene needs at least one box')
     if count > MOST_BOXES:

@@ -26,6 +26,9 @@ from ..solver.nearest import Nearest, Nearests
 from .changes import checked_changes
 from .scene import NOWHERE, Box, Pair, Scene
 
+NO_BODIES = np.zeros(0, np.int64)
+"""The bodies of boxes, where a scene has none."""
+
 
 class Answer(NamedTuple):
     """What one tick found, as arrays. Boxes are their indices in `scene`."""
@@ -117,10 +120,16 @@ class SceneSolver:
         changes = checked_changes(self.scene, fixed or {}, moving or {}, absent)
         # A box that moves again has its former row.
         scene = self.scene.changed(changes)
+        kept = np.arange(len(self.scene.boxes))
+        index = self.scene.index_of
+        kept[[index[name] for name in changes if name in index]] = -1
+        kept = np.delete(kept, [index[name] for name, box in changes.items() if box is None])
+        kept = np.append(kept, np.full(len(scene.boxes) - len(kept), -1))
         rows = (*self.moving, *(name for name in moving or {} if name not in self.moving))
         solver = object.__new__(SceneSolver)
         vars(solver).update(vars(self))
         solver._take(scene, rows, self.revision + 1)
+        solver._broad_phase.take_fixed(self._broad_phase, kept)
         sizes = np.array([box.size for box in changes.values() if box is not None]).reshape(-1, 3)
         listed = [] if scene.listed_names.isdisjoint(changes) else scene.sizes[scene.rows]
         solver._refuse_sizes(sizes, np.reshape(listed, (-1, 6)))
@@ -150,6 +159,8 @@ class SceneSolver:
 
         Only a corner overlaps: where faces coincide, a soup takes seconds.
         """
+        if isinstance(self.model, str):  # it is in C++, and answers all sizes
+            return
         both = [listed]
         if self.scene.patterns:
             first = np.broadcast_to(self.scene.sizes[0], sizes.shape)
@@ -180,11 +191,12 @@ class SceneSolver:
     def parts(self) -> tuple[native.BroadPhase, ContactSolver, float, int, np.ndarray, np.ndarray,
                              np.ndarray, np.ndarray, np.ndarray]:
         """Return what native.TickWriter answers ticks of the scene by: its first nine arguments."""
-        size, solver = self.scene.sizes[0], self._solver
-        if (self.scene.sizes == size).all():  # model `paper` is in C++ for boxes of one size
+        scene, solver, size = self.scene, self._solver, self.scene.sizes[0]
+        if (scene.sizes == size).all():  # model `paper` is in C++ for boxes of one size
             solver = ContactSolver(size, size, model=self.model, margin=self.margin)
-        return (self._broad_phase, solver, self.margin, self._most_near, self.scene.sizes,
-                self._rows, self._moving, *self.scene.placement)
+        bodies = scene.placement if scene.bodies else (NO_BODIES, self._rows[:0])
+        return (self._broad_phase, solver, self.margin, self._most_near, scene.sizes, self._rows,
+                self._moving, *bodies)
 
     def _set_poses(self, poses: Sequence[np.ndarray | None] | ArrayLike) -> None:
         """Take the poses of the boxes and bodies that move."""

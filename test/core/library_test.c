@@ -208,12 +208,46 @@ static void check_broad_phase(void) {
   bc_broad_phase_destroy(NULL);
 }
 
+/* A fixed tower whose lowest cube goes: a cube that moves meets the two that it met before. */
+static void check_fixed_that_stay(void) {
+  enum { count = 100 };
+  static bc_size sizes[count];
+  static bc_pose poses[count];
+  static bool fixed[count];
+  int64_t kept[count];
+  for (int k = 0; k < count; ++k) {
+    bc_box box = cube_at(1.9 * (k < count - 1 ? k : 50.5));
+    sizes[k] = box.size;
+    poses[k] = box.pose;
+    fixed[k] = k < count - 1;
+    kept[k] = k < count - 2 ? k + 1 : -1;
+  }
+  bc_boxes boxes = {sizeof boxes, count, sizes, fixed, 0.0, NULL, 0, NULL, 0, NULL, NULL};
+  bc_broad_phase *phase, *later;
+  bc_near near = {sizeof near, NULL, 0, NULL, 0, 0};
+  check(bc_broad_phase_create(&boxes, &phase) == BC_OK, "create a fixed tower");
+  check(bc_broad_phase_find(phase, poses, INT64_MAX, &near) == BC_OK && near.count == 2, "find");
+  --boxes.count;
+  fixed[count - 2] = false;
+  poses[count - 2] = poses[count - 1];
+  check(bc_broad_phase_create(&boxes, &later) == BC_OK, "create the later one");
+  check(bc_broad_phase_take_fixed(later, phase, kept) == BC_OK, "take over");
+  check(bc_broad_phase_find(later, poses, INT64_MAX, &near) == BC_OK && near.count == 2, "again");
+  check(near.pairs[0] == 49 && near.pairs[2] == 50, "the same cubes by other numbers");
+  kept[0] = count;
+  check(bc_broad_phase_take_fixed(later, phase, kept) == BC_BAD_ROWS, "no box of the former");
+  check(bc_broad_phase_take_fixed(later, NULL, kept) == BC_BAD_ARGUMENT, "no former one");
+  bc_broad_phase_destroy(phase);
+  bc_broad_phase_destroy(later);
+}
+
 int main(void) {
   check(bc_abi() == BC_ABI, "ABI");
   check_contacts();
   check_rows();
   check_distances();
   check_broad_phase();
+  check_fixed_that_stay();
   check_refusals();
   printf("%s, %s: %d failures\n", bc_version(), bc_instruction_set(), failures);
   return failures != 0;

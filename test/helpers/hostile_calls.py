@@ -320,6 +320,8 @@ def random_calls(seed: int, rounds: int) -> None:
         (native.place_boxes, [rows(), np.array([3, -1]), rows(2)], {}),
         (native.BroadPhase, phase_arguments(), {}),
         (native.BroadPhase(*phase_arguments()).find, [rows(), 10], {}),
+        (native.BroadPhase(*phase_arguments()).take_fixed,
+         [native.BroadPhase(*phase_arguments()), np.array([1, 0, -1, 3])], {}),
         (native.BroadPhase(*phase_arguments()).resize, [np.arange(4), np.ones((4, 3))], {}),
         (native.read_pose, [rng.bytes(int(rng.integers(90)))], {}),
         (native.TickWriter, writer_arguments(), {}),

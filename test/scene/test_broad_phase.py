@@ -247,6 +247,45 @@ def test_boxes_of_other_sizes_are_found_as_if_made_with_them():
         used.resize(boxes - 30, size[30:])
 
 
+@pytest.mark.parametrize('share', [0.02, 0.3])
+def test_fixed_boxes_that_stay_are_taken_over(share):
+    """Where a share of the boxes comes, goes, moves or lands, and groups change: as if made anew.
+
+    Some are asked at each change, some at every third one.
+    """
+    rng, found = np.random.default_rng(15), 0
+    size, pose = made(rng, scattered, 150)
+    fixed, group = rng.random(150) < 0.8, rng.integers(0, 3, 150).astype(np.int32)
+    former = None
+    for change in range(90):
+        allowed = np.triu(rng.integers(0, 3, (3, 3))).astype(np.uint8)
+        phase = broad_phase(size, fixed, groups=group, allowed=allowed)
+        if former is not None:
+            phase.take_fixed(former, kept)  # noqa: F821
+        poses = np.where(fixed[:, None], pose, made(rng, scattered, len(size))[1])
+        if change % 3 == 0 or share > 0.1:
+            pairs = phase.find(poses, PLENTY)[0]
+            fresh = broad_phase(size, fixed, groups=group, allowed=allowed)
+            assert np.array_equal(pairs, fresh.find(poses, PLENTY)[0])
+            found += len(pairs)
+        former, count = phase, len(size)
+        kept = np.arange(count)
+        kept[rng.random(count) < share] = -1
+        kept = np.append(kept[rng.random(count) >= 0.5 * share],
+                         np.full(rng.integers(max(2, int(share * count))), -1))
+        new_size, new_pose = made(rng, scattered, len(kept))
+        is_new = kept < 0
+        size, pose = (np.where(is_new[:, None], new, old[kept])
+                      for new, old in ((new_size, size), (new_pose, pose)))
+        fixed = np.where(is_new, rng.random(len(kept)) < 0.8, fixed[kept])
+        group = np.where(is_new, rng.integers(0, 3, len(kept)), group[kept]).astype(np.int32)
+    assert found > 1000
+    with pytest.raises(ValueError, match=r'kept\[0\] is 150, but there were'):
+        broad_phase(size).take_fixed(former, np.full(len(size), 150))
+    with pytest.raises(ValueError, match='margin 1 is not that of the former one, 0'):
+        broad_phase(size, margin=1.0).take_fixed(former, kept)
+
+
 def test_a_margin_loses_no_pair_within_it():
     rng = np.random.default_rng(6)
     count = 0

@@ -86,7 +86,22 @@ inline PyObject* broad_phase_resize(PyObject* self, PyObject* const* args, Py_ss
   Py_RETURN_NONE;
 }
 
+inline PyTypeObject* broad_phase_type = nullptr;
+
+inline PyObject* broad_phase_take_fixed(PyObject* self, PyObject* const* args, Py_ssize_t count) {
+  if (count != 2 || !Py_IS_TYPE(args[0], broad_phase_type))
+    fail(PyExc_TypeError, "take_fixed(former, kept)");
+  const BroadPhase& phase = Holder<BroadPhase>::of(self);
+  auto kept = read<int64_t>(args[1], "kept", {phase.count});
+  check(bc_broad_phase_take_fixed(phase.made.get(), Holder<BroadPhase>::of(args[0]).made.get(),
+                                  kept.numbers));
+  Py_RETURN_NONE;
+}
+
 inline PyMethodDef broad_phase_methods[] = {
+    {"take_fixed", method<broad_phase_take_fixed>(), METH_FASTCALL,
+     "take_fixed(former, kept)\n--\n\n"
+     "Take over what another one knows of fixed boxes; kept (n,): their indices there, or -1."},
     {"resize", method<broad_phase_resize>(), METH_FASTCALL,
      "resize(boxes, sizes)\n--\n\n"
      "Give boxes (n,) that move other sizes (n, 3) [m], from the next call on."},

@@ -13,7 +13,7 @@
 
 namespace box_contact::binding {
 
-inline PyTypeObject *broad_phase_type = nullptr, *solver_type = nullptr;
+inline PyTypeObject* solver_type = nullptr;
 
 // UTF-8 that lives as long as the text.
 inline std::string_view utf8_of(PyObject* text) {
@@ -90,10 +90,11 @@ inline TickScene read_scene(PyObject* args) {
   auto sizes = read<double>(sizes_given, "sizes", {count, 3});
   auto poses = read<double>(poses_given, "poses", {any_length, 7});
   npy_intp rows = poses.length(0);
-  if (rows < count) fail(PyExc_ValueError, "poses are fewer than boxes");
   auto moving = read<int64_t>(moving_given, "moving", {any_length});
-  auto bodies = read<int64_t>(bodies_given, "bodies", {count});
-  auto local = read<double>(local_given, "local", {count, 7});
+  auto bodies = read<int64_t>(bodies_given, "bodies", {any_length});
+  auto local = read<double>(local_given, "local", {bodies.length(0), 7});
+  if (rows < count || bodies.length(0) > count)
+    fail(PyExc_ValueError, "poses are fewer than boxes, or bodies more");
   auto listed = read<int64_t>(listed_given, "listed", {any_length, 2});
   auto watched = read<int64_t>(watched_given, "watched", {any_length, 4});
   check_places(moving, "moving", 0, rows);

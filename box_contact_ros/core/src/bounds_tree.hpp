@@ -61,7 +61,7 @@ inline Bounds bounds_of(const Pose<double>& pose, const Vec<double>& half) {
 // level, up to the root. A search tests all bounds of a block at once.
 class BoundsTree {
  public:
-  // The boxes, in the order of the tree.
+  // The boxes, in the order of the tree; below 0: one that is in it no more.
   const std::vector<int32_t>& order() const { return order_; }
 
   // Whether searches since the tree was built have visited so many blocks that building it anew
@@ -92,6 +92,15 @@ class BoundsTree {
         size_t index = below - starts_[level - 1];
         blocks_[starts_[level] + index / width].set(index % width, blocks_[below].around());
       }
+  }
+
+  // Give the boxes other numbers; those below 0 are in the tree no more.
+  void renumber(const std::vector<int32_t>& number_of) {
+    for (size_t index = 0; index < order_.size(); ++index) {
+      int32_t& box = order_[index];
+      if (box >= 0) box = number_of[size_t(box)];
+      if (box < 0) blocks_[index / width].set(index % width, nowhere);
+    }
   }
 
   // Call `visit` with each box from index `first` on whose bounds overlap, until it returns false.

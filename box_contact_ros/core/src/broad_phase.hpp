@@ -6,7 +6,8 @@
 // Fat bounds are a bounding box, grown a little. The pairs whose fat bounds overlap are kept from
 // call to call. While a box stays within its fat bounds, it can be near the boxes of its kept pairs
 // alone. So a call tests the kept pairs, and searches for others for the boxes that left their fat
-// bounds. There are two trees to search: one of fixed boxes, and one of the others' fat bounds.
+// bounds. There are trees to search: one of fixed boxes, a small one of those that came later, and one
+// of the others' fat bounds.
 #pragma once
 
 #include <algorithm>
@@ -21,6 +22,9 @@ namespace box_contact::detail {
 // Fat bounds grow by this share of a box's shortest half extent. With more, each call tests more
 // pairs. With less, a box leaves its fat bounds sooner.
 constexpr double fattening = 0.1;
+
+// Fixed boxes that come later are in a tree of their own up to this share of all.
+constexpr size_t later_share = 8;
 
 // Which pairs are asked for: those that are listed, and those that the groups of boxes allow.
 struct Asked {
@@ -73,6 +77,20 @@ class BroadPhase {
   size_t count() const { return half_.size(); }
   bool is_fixed(int64_t box) const { return fixed_[size_t(box)]; }
   void resize(int64_t box, const Vec<double>& half) { half_[size_t(box)] = half; }
+
+  // Take over what `former` knows of fixed boxes, so that only others are read and sorted. kept: the
+  // index in `former` of each box that is of the same size and at the same pose there, or −1.
+  void take_fixed(const BroadPhase& former, const int64_t* kept) {
+    std::vector<int32_t> number_of(former.count(), -1);
+    for (size_t box = 0; box < count(); ++box) {
+      if (kept[box] < 0 || !fixed_[box] || !former.fixed_[size_t(kept[box])]) continue;
+      bounds_[box] = former.bounds_[size_t(kept[box])];
+      number_of[size_t(kept[box])] = int32_t(box);
+    }
+    fixed_tree_ = former.fixed_tree_;
+    fixed_tree_.renumber(number_of);
+    build_fixed();
+  }
 
   // Find the pairs that may touch at `poses` (boxes, 7); seven NaN: the box is not there. The poses
   // of fixed boxes are read once. Stops with more than `most` pairs. Returns −1, or a box without a
@@ -133,10 +151,21 @@ class BroadPhase {
   }
 
   void build_fixed() {
-    boxes_.clear();
-    for (int32_t box = 0; box < int32_t(count()); ++box)
-      if (meets_[size_t(box)] && fixed_[size_t(box)] && is_known(box)) boxes_.push_back(box);
-    fixed_tree_.build(boxes_, bounds_);
+    for (int32_t box : fixed_tree_.order())
+      if (box >= 0) is_changed_[size_t(box)] = 1;
+    std::vector<int32_t> all, later;
+    for (int32_t box = 0; box < int32_t(count()); ++box) {
+      if (!meets_[size_t(box)] || !fixed_[size_t(box)] || !is_known(box)) continue;
+      all.push_back(box);
+      if (!is_changed_[size_t(box)]) later.push_back(box);
+    }
+    is_changed_.assign(count(), 0);
+    size_t gone = fixed_tree_.order().size() + later.size() - all.size();
+    if (later_share * std::max(later.size(), gone) > all.size()) {
+      fixed_tree_.build(all, bounds_);
+      later.clear();
+    }
+    later_tree_.build(later, bounds_);
     auto is_read = [&](int32_t box) { return fixed_[size_t(box)] && is_known(box); };
     to_read_.erase(std::remove_if(to_read_.begin(), to_read_.end(), is_read), to_read_.end());
     is_partial_ = true;
@@ -217,7 +246,7 @@ class BroadPhase {
         return is_twice || add(box, other);
       };
       const Bounds& fat = fat_[size_t(box)];
-      if (!fixed_tree_.each_near(fat, 0, take) ||
+      if (!fixed_tree_.each_near(fat, 0, take) || !later_tree_.each_near(fat, 0, take) ||
           !moving_tree_.each_near(fat, all ? index + 1 : 0, take))
         return false;
     }
@@ -280,7 +309,7 @@ class BroadPhase {
   std::vector<Bounds> fat_;
   std::vector<uint64_t> kept_;
   bool is_partial_ = false;  // not all pairs whose fat bounds overlap are kept
-  BoundsTree fixed_tree_, moving_tree_;
+  BoundsTree fixed_tree_, later_tree_, moving_tree_;
   // Memory that calls use again.
   size_t most_ = 0, searched_count_ = 0, near_count_ = 0;
   std::vector<int32_t> changed_, boxes_;

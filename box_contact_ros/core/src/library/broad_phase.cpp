@@ -93,6 +93,18 @@ bc_status resize(BroadPhase& self, int64_t box, const bc_size& size) {
   return status;
 }
 
+bc_status take_fixed(BroadPhase& self, const BroadPhase& former, const int64_t* kept) {
+  if (self.margin != former.margin)
+    return fail(BC_BAD_ARGUMENT, "margin %g is not that of the former one, %g", self.margin,
+                former.margin);
+  for (size_t box = 0; box < self.count(); ++box)
+    if (kept[box] >= 0 && !is_box(kept[box], int64_t(former.count())))
+      return fail(BC_BAD_ROWS, "kept[%zu] is %lld, but there were %zu boxes", box,
+                  (long long)kept[box], former.count());
+  self.take_fixed(former, kept);
+  return BC_OK;
+}
+
 }  // namespace
 }  // namespace box_contact::detail
 
@@ -118,6 +130,16 @@ bc_status bc_broad_phase_resize(bc_broad_phase* broad_phase, int64_t box, const 
   return guarded([&] {
     if (!broad_phase || !size) return refuse_null(size ? "broad_phase" : "size");
     return resize(*reinterpret_cast<BroadPhase*>(broad_phase), box, *size);
+  });
+}
+
+bc_status bc_broad_phase_take_fixed(bc_broad_phase* broad_phase, const bc_broad_phase* former,
+                                    const int64_t* kept) {
+  return guarded([&] {
+    if (!broad_phase || !former || !kept)
+      return refuse_null(!broad_phase ? "broad_phase" : former ? "kept" : "former");
+    return take_fixed(*reinterpret_cast<BroadPhase*>(broad_phase),
+                      *reinterpret_cast<const BroadPhase*>(former), kept);
   });
 }
 
