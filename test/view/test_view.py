@@ -613,6 +613,27 @@ def test_two_hundred_boxes_in_a_browser():
 
 
 @in_browser
+def test_boxes_that_come_and_go_in_a_browser():
+    """The page draws the boxes of the newest scene, as ~/set_boxes makes it, and no others."""
+    stack = Box(CUBE, ORIGIN)
+    both = Scene({'crane': Box(CUBE), 'stack': stack}, patterns=(('crane', 'stack*'),),
+                 pose_array=True)
+    crane_alone = both.changed({'stack': None})
+    with (closing(Page('127.0.0.1', 8450, SceneRows(crane_alone))) as page,
+          open_page(page.url, 640, 360) as tab):
+        tab.wait_for('document.querySelector("canvas") != null')
+        for scene in (crane_alone, both, crane_alone, crane_alone.changed({'stack2': stack})):
+            rows, deadline = SceneRows(scene), time.monotonic() + PATIENCE
+            placed = np.where(np.isnan(rows.poses), (0, 0, 3, 0, 0, 0, 1), rows.poses)
+            shares = [0.0, 0.0]  # of crane and stack
+            while shares[0] < 1e-3 or (shares[1] > 1e-3) != (len(rows.sizes) == 2):
+                assert time.monotonic() < deadline, (scene.names, shares)
+                bring(page, DrawnTick(rows, START, 'yard', placed, None, math.nan))
+                picture = np.array(Image.open(io.BytesIO(tab.picture())).convert('RGB'), float)
+                shares = [near(picture, colour).mean() for colour in (BOX_A, BOX_B)]
+
+
+@in_browser
 def test_a_landing_in_a_browser(program):
     """Until the stack carries the load, by the model that was asked for.
 
