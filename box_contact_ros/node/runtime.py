@@ -157,7 +157,7 @@ def keep_events_from_interrupting() -> None:
 
     Every reliable publish wakes one. As a batch thread it waits until its core is idle, or until
     its turn comes. Nothing that a tick needs comes through it; the threads that receive stay as
-    they are: docs/contributing/decisions/contact-node.md.
+    they are: docs/contributing/node.md.
     """
     try:
         for task in Path('/proc/self/task').iterdir():

@@ -4,7 +4,7 @@
 """Messages as the bytes that are sent (CDR), without message objects: what all of them share.
 
 Messages are read by what CDR promises, whichever middleware wrote them. All other bytes are
-refused. Bytes halve the latency: docs/contributing/decisions/contact-node.md.
+refused. Bytes take less time than objects: docs/contributing/node.md.
 """
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ENCAPSULATION = 4
 LITTLE = b'\0\1'
 _ORDERS = {b'\0\0': '>', LITTLE: '<'}
 """Byte order by kind: CDR_BE and CDR_LE, which every ROS middleware writes. Others are laid out in
-another way: docs/contributing/decisions/contact-node.md."""
+another way: docs/contributing/node.md."""
 PADDING = 3
 """Most bytes after the body, of any value: RTPS pads a message to a multiple of four."""
 FRAME_AT = 16

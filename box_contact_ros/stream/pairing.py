@@ -50,7 +50,7 @@ the others, although their newest stamps are later. So does a tick with a pose t
 the newest of its box: time may have been set back by less than RESET.
 Policy `latest` makes a tick of every pose that is not OLD, with the last pose of each other box. A
 box is stale there if its newest stamp is more than max_age away from that of the pose.
-Why no library does this: docs/contributing/decisions/contact-node.md.
+Why no library does this: docs/contributing/node.md.
 """
 from __future__ import annotations
 
