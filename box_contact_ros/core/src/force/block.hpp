@@ -9,6 +9,7 @@
 
 #include "clock.hpp"
 #include "patch.hpp"
+#include "pressing.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
@@ -55,8 +56,8 @@ struct Block {
   double friction;
   double depth;  // [m]
   double height, rises,
-      load;  // of its point; of its normal, upward; of the weights above [m], [1], [N]
-  double normal_compliance;    // how much an impulse N alone changes the closing speed [1/kg]
+      load;            // of its point; of its normal, upward; of the weights above [m], [1], [N]
+  Mat<double> across;  // how pressing and rocking change the velocities along their rows
   double least_friction_mass;  // of any row of friction and torsion
   NormalRows pushing, relaxed;
   Mat<double> friction_mass;
@@ -65,14 +66,13 @@ struct Block {
   Vec<double> normal_sum, friction_sum;          // of the sub-steps
 };
 
-// Rocking whose centre of pressure is within the spans: N·n at x·e1 + y·e2 has the moment
-// N·(y·e1 − x·e2).
+// Rocking whose centre of pressure is within the spans.
 inline double clamp(double x, double low, double high) { return std::max(low, std::min(high, x)); }
 inline double bounded_1(const Rectangle& shape, double normal, double rocking) {
-  return clamp(rocking, normal * shape.span_2.low, normal * shape.span_2.high);
+  return clamp(rocking, normal * rocking_1(shape).low, normal * rocking_1(shape).high);
 }
 inline double bounded_2(const Rectangle& shape, double normal, double rocking) {
-  return clamp(rocking, -normal * shape.span_1.high, -normal * shape.span_1.low);
+  return clamp(rocking, normal * rocking_2(shape).low, normal * rocking_2(shape).high);
 }
 inline void bound(Vec<double>& impulses, double limit) {
   double squared = dot(impulses, impulses);
@@ -107,8 +107,10 @@ inline Mat<double> softened(Mat<double> compliance, const Vec<double>& softness)
 // Catto's soft step: a spring and a damper, implicit in time. Relaxation is without them, but for a
 // stiffness of the patch's own. Rocking is soft where answers are late: the wedge of the overlap,
 // which levels a body, is late then.
-inline void soften(const Patch& patch, const SubSteps& step, double depth, const Moving& a,
-                   const Moving& b, const Mat<double>& compliance, Block& block) {
+inline void soften(const Patch& patch, const SubSteps& step, const Moving& a, const Moving& b,
+                   Block& block) {
+  const Mat<double>& compliance = block.across;
+  double depth = block.depth;
   bool is_apart = depth < 0.0;
   double h = step.length;
   block.relaxed = {{0.0, 0.0, 0.0}, {is_apart ? -depth / h : 0.0, 0.0, 0.0}, inverse(compliance)};
@@ -160,8 +162,8 @@ inline double place(const Patch& patch, const Moving& a, const Moving& b, double
   return patch.depth + dot(way_a - way_b, patch.normal);
 }
 
-// Make the masses of friction and torsion. Returns how pressing and rocking comply.
-inline Mat<double> weigh(const Moving& a, const Moving& b, Block& block) {
+// Make the masses of friction and torsion, and how pressing and rocking comply.
+inline void weigh(const Moving& a, const Moving& b, Block& block) {
   const Rectangle& shape = block.shape;
   const Vec<double>&arm_a = block.arm_a, &arm_b = block.arm_b, &normal = block.normal;
   Vec<double> about = shape.radius * normal;
@@ -171,10 +173,8 @@ inline Mat<double> weigh(const Moving& a, const Moving& b, Block& block) {
                     {shape.axis_1, shape.axis_2});
   block.friction_mass = inverse(along);
   block.least_friction_mass = 1.0 / std::max(std::max(along[0][0], along[1][1]), along[2][2]);
-  Mat<double> across = compliance<1>(a, b, {cross(arm_a, normal), shape.axis_1, shape.axis_2},
-                                     {cross(arm_b, normal), shape.axis_1, shape.axis_2}, {normal});
-  block.normal_compliance = across[0][0];
-  return across;
+  block.across = compliance<1>(a, b, {cross(arm_a, normal), shape.axis_1, shape.axis_2},
+                               {cross(arm_b, normal), shape.axis_1, shape.axis_2}, {normal});
 }
 
 // Make the rows of a patch, where its bodies are now.
@@ -186,7 +186,8 @@ inline void prepare(const Patch& patch, const Moving& a, const Moving& b, const 
   block.friction = patch.friction;
   block.normal_counted = block.friction_counted = {};
   block.depth = place(patch, a, b, step.length, block);
-  soften(patch, step, block.depth, a, b, weigh(a, b, block), block);
+  weigh(a, b, block);
+  soften(patch, step, a, b, block);
 }
 
 // Rows stay where they are while their bodies turn by no more than this [rad], and move on each other
@@ -201,7 +202,9 @@ inline void follow(const Patch& patch, const Moving& a, const Moving& b, double 
   double moved = h * std::max(turned, way / block.shape.half_1);
   if (moved <= still) return;
   place(patch, a, b, h, block);
-  if (moved > alike) block.relaxed.mass = softened(weigh(a, b, block), block.relaxed.softness);
+  if (moved <= alike) return;
+  weigh(a, b, block);
+  block.relaxed.mass = softened(block.across, block.relaxed.softness);
 }
 
 // Give B an impulse at the point and an angular impulse, and A the opposite.
@@ -331,19 +334,14 @@ inline double solve_normal(Block& block, const NormalRows& rows, Moving& a, Movi
   Vec<double> v = error(), next = block.normal_impulses - mass * v;
   if (!(bounded_1(block.shape, next[0], next[1]) == next[1] &&
         bounded_2(block.shape, next[0], next[2]) == next[2])) {
-    // The pressure would be negative at the rim: row by row, within the limits.
-    double alone = 1.0 / (block.normal_compliance + rows.softness[0]);
-    next = {std::max(0.0, block.normal_impulses[0] - alone * v[0]), block.normal_impulses[1],
-            block.normal_impulses[2]};
-    apply_normal(block, next - block.normal_impulses, a, b);
-    block.normal_impulses = next;
-    v = error();
-    next[1] = bounded_1(block.shape, next[0], next[1] - mass[1][1] * v[1]);
-    next[2] = bounded_2(block.shape, next[0], next[2] - mass[2][2] * v[2]);
+    // The pressure would be negative at a rim.
+    Mat<double> soft = block.across;
+    for (int i = 0; i < 3; ++i) soft[i][i] += rows.softness[i];
+    next = OnTheRim(block.shape, soft, v - soft * block.normal_impulses).impulses();
   }
   apply_normal(block, next - block.normal_impulses, a, b);
   block.normal_impulses = next;
-  return std::fabs(next[0] - before[0]) * block.normal_compliance;
+  return std::fabs(next[0] - before[0]) * block.across[0][0];
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET::force
