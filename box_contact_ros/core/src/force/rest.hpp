@@ -257,6 +257,7 @@ class Rest {
       Block& block = islands.blocks[k];
       block.normal_impulses = block.normal_sum;
       block.friction_impulses = block.friction_sum;
+      block.normal_counted = block.friction_counted = {};
       force::count(block, islands.moving[size_t(block.a)], islands.moving[size_t(block.b)]);
     }
   }
