@@ -17,8 +17,8 @@ namespace box_contact::BOX_CONTACT_SET::force {
 
 // An island is laid down once it was slow for this time [s].
 constexpr double rest_time = 0.5;
-// Then it is no faster than when that began, or than this share of what is slow [1]: what begins to tip
-// gains speed.
+// Then it is no faster than it was within that time, or than this share of what is slow [1]: what begins
+// to tip gains speed.
 constexpr double calm_share = 0.1;
 
 // What an advance is given of each body.
@@ -208,7 +208,7 @@ class Rest {
     bool bears = false;           // the same: whether something at rest lies on it
     // While it is awake.
     double slow_time = 0.0;  // for how long its island was slow [s]
-    double first = 0.0;      // its square of speed when that began [m²/s²]
+    double least = 0.0;      // the least square of its speed since then [m²/s²]
   };
 
   void mark(const Patch& patch) {
@@ -274,10 +274,11 @@ class Rest {
     }
     each_free(island, islands, [&](const Moving& moving) {
       OfBody& of = of_[size_t(moving.body)];
-      if (of.slow_time == 0.0) of.first = moving.speed_squared;
+      if (of.slow_time == 0.0 || moving.speed_squared < of.least)
+        of.least = moving.speed_squared;
       of.slow_time = is_slow ? of.slow_time + dt : 0.0;
       least = std::min(least, of.slow_time);
-      is_calm = is_calm && moving.speed_squared <= std::max(of.first, calm);
+      is_calm = is_calm && moving.speed_squared <= std::max(of.least, calm);
     });
     if (least < rest_time) return false;
     if (is_calm && is_held(island, islands, patches)) return true;
