@@ -105,6 +105,19 @@ def test_cargo_on_a_deck_that_rolls(degrees: float, slides: bool) -> None:
     assert slides or abs(aside[1]) < 1e-5
 
 
+@pytest.mark.parametrize('dt, line', [(STEP, 1e-5), (FRAME, 8e-4)])
+def test_cargo_stays_on_a_wheel_that_speeds_up(dt: float, line: float) -> None:
+    """By 0.3 g at 1 m from its axis, to 1 rad/s, where friction holds up to 0.5 g."""
+    world = World(((20.0, 20.0, 1.0), 0.0, (0, 0, -0.5)), ((0.2, 0.2, 0.1), 10.0, (1.0, 0, 0.05)))
+    world.run(0.2, dt)
+    rate = 0.3 * GRAVITY
+    for k in range(round(1.0 / rate / dt)):
+        world.velocities[0, 5] = rate * (k + 0.5) * dt
+        world.step(dt)
+    at = rotation_matrix(world.poses[:1, 3:])[0].T @ world.poses[1, :3]
+    assert np.abs(at[:2] - [1.0, 0.0]).max() <= line
+
+
 # --- tipping --------------------------------------------------------------------------------------
 
 

@@ -197,14 +197,16 @@ class IslandStep {
     moving.angular += h * (moving.inverse_inertia * vector(step_.outside[k].torque));
   }
 
-  // A body that no force moves has its linear velocity on the mean of a step, and changes it as it did
-  // lately: if the first sub-step had all of the change, friction would have to give it in so short a
-  // time. `part`: of the step, from its middle [1].
+  // A body that no force moves has its velocity on the mean of a step, and changes it as it did lately: if
+  // the first sub-step had all of the change, friction would have to give it in so short a time. `part`: of
+  // the step, from its middle [1].
   void carry(Moving& moving, double part) const {
     auto k = size_t(moving.body);
     const auto& [before, last] = ended_[k];
     Vec<double> linear = vector(step_.velocities[k].linear);
+    Vec<double> angular = vector(step_.velocities[k].angular);
     moving.linear = linear + part * least_change_of(before.linear, last.linear, linear);
+    moving.angular = angular + part * least_change_of(before.angular, last.angular, angular);
   }
   // The smaller of two changes in turn, where they have one sign (minmod): a jump is none.
   static Vec<double> least_change_of(const Vec<double>& x, const Vec<double>& y,
