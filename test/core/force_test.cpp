@@ -57,7 +57,9 @@ int main() {
     after[k][0] = velocities[0], after[k][1] = velocities[1];
     each->advance(0.001, moved, after[k++], outside);
   }
-  failures += !(after[0][0].linear[2] < -0.009 && after[1][0].linear[2] > -1e-4);
+  // What has forgotten falls by g·dt. The copy is carried: the box turns slowly about its edge.
+  failures += !(after[0][0].linear[2] < -0.009);
+  failures += !(after[1][0].linear[2] - velocities[0].linear[2] > -1e-6);
   failures += copy.loads().size() != 1;
   try {
     copy.advance(0.001, {poses, 1}, velocities, outside);
