@@ -66,7 +66,8 @@ int main() {
     ++failures;
   } catch (const std::invalid_argument&) {
   }
-  const BodyBox boxes[] = {{0, {{{0, 0, 0}, {0, 0, 0, 1}}, size}}, {1, {{{0, 0, 0}, {0, 0, 0, 1}}, size}}};
+  const BodyBox boxes[] = {{0, {{{0, 0, 0}, {0, 0, 0, 1}}, size}},
+                           {1, {{{0, 0, 0}, {0, 0, 0, 1}}, size}}};
   copy.set_boxes(boxes);
   const std::int64_t half_a_pair[3] = {0, 1, 0};
   try {
@@ -78,6 +79,10 @@ int main() {
   const long before = allocations;
   for (int step = 0; step < 10; ++step) copy.advance(0.001, poses, velocities, outside);
   failures += allocations != before;
+  PatchForces twin = copy;
+  const long copied = allocations;
+  for (int step = 0; step < 10; ++step) twin.advance(0.001, poses, velocities, outside);
+  failures += allocations != copied;
   failures += !(copy.loads()[0].pressing > 1e5);
   try {
     const Patches unnamed(Rows{}, Results{});

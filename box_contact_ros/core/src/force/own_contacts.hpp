@@ -35,6 +35,14 @@ class OwnContacts {
     resize(0);
   }
 
+  // What a copy has no room for, so that an advance takes no memory.
+  void make_room() {
+    live_.reserve(count());
+    rows_.reserve(count());
+    placed_.reserve(2 * count());
+    near_.reserve(count());
+  }
+
   // Take the pairs of a question. Where bodies rest, a pair is new until it was solved once.
   enum class Taken { same, others, pair_twice };
   Taken ask(const bc_patches& asked, double friction, bool is_any_at_rest) {
@@ -255,14 +263,11 @@ class OwnContacts {
 
   void resize(size_t n) {
     asked_.resize(n);
-    live_.reserve(n);
-    rows_.reserve(n);
-    placed_.reserve(2 * n);
     is_new_.assign(n, 0);
     is_any_new_ = false;
     is_all_ = true;
     found_.resize(n);
-    near_.reserve(n);
+    make_room();
   }
   const Pairs& chosen() const { return is_all_ ? asked_ : live_; }
   // Note which of the next keys are not among the last ones.

@@ -274,8 +274,7 @@ class Rest {
     }
     each_free(island, islands, [&](const Moving& moving) {
       OfBody& of = of_[size_t(moving.body)];
-      if (of.slow_time == 0.0 || moving.speed_squared < of.least)
-        of.least = moving.speed_squared;
+      if (of.slow_time == 0.0 || moving.speed_squared < of.least) of.least = moving.speed_squared;
       of.slow_time = is_slow ? of.slow_time + dt : 0.0;
       least = std::min(least, of.slow_time);
       is_calm = is_calm && moving.speed_squared <= std::max(of.least, calm);

@@ -269,7 +269,7 @@ bc_status bc_patch_forces_copy(const bc_patch_forces* forces, bc_patch_forces** 
     if (!copy) return refuse_null("copy");
     *copy = nullptr;
     if (!forces) return refuse_null("forces");
-    *copy = handle(new PatchForces(forces_of(forces)));
+    *copy = handle(new PatchForces(forces_of(forces).copy()));
     return BC_OK;
   });
 }
