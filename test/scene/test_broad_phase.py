@@ -163,11 +163,15 @@ def test_a_search_that_ended_early_or_was_refused_leaves_nothing_out():
     fixed = np.arange(90) < 20
     late = np.where((np.arange(90) < 5)[:, None], np.nan, pose)  # fixed boxes that come later
     bad = np.where((np.arange(90) == 70)[:, None], np.inf, pose)
+    moved = np.where((np.arange(90) % 9 == 2)[:, None], pose + 1.0, pose)
+    moved[:, 3:] = pose[:, 3:]
+    moved_bad = np.where((np.arange(90) == 70)[:, None], np.inf, moved)
     used = broad_phase(size, fixed)
     for rows, most in ((bad, PLENTY), (late, 7), (late, PLENTY), (pose, 7), (bad, PLENTY),
-                       (pose, PLENTY), (pose - 1e-3, PLENTY)):
+                       (pose, PLENTY), (pose - 1e-3, PLENTY), (pose - 1e-3, PLENTY),
+                       (moved_bad, PLENTY), (moved, PLENTY), (moved, PLENTY)):
         pairs, stale, refused = used.find(rows, most)
-        if rows is bad:
+        if rows is bad or rows is moved_bad:
             assert refused == 70 and not len(pairs)
             continue
         rows = np.where(fixed[:, None] & ~np.isnan(rows), pose, rows)  # read once
@@ -238,6 +242,7 @@ def test_boxes_of_other_sizes_are_found_as_if_made_with_them():
     size, pose = made(rng, scattered, 90)
     fixed, boxes = np.arange(90) < 30, np.arange(30, 90)
     used = broad_phase(np.where(fixed[:, None], size, 0.01), fixed, margin=0.1)
+    used.find(pose, PLENTY)
     few = len(used.find(pose, PLENTY)[0])
     used.resize(boxes, size[30:])
     pairs = used.find(pose, PLENTY)[0]

@@ -11,7 +11,9 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
+#include <cstring>
 #include <utility>
 #include <vector>
 
@@ -59,6 +61,8 @@ class BroadPhase {
         meets_(half_.size(), 0),
         bounds_(half_.size(), nowhere),
         fat_(half_.size(), nowhere),
+        last_(half_.size()),
+        is_settled_(half_.size(), 0),
         is_changed_(half_.size(), 0) {
     for (size_t k = 0; k + 1 < asked_.listed.size(); k += 2)
       listed_.push_back(pair_of(asked_.listed[k], asked_.listed[k + 1]));
@@ -76,7 +80,10 @@ class BroadPhase {
   const double margin;  // [m]
   size_t count() const { return half_.size(); }
   bool is_fixed(int64_t box) const { return fixed_[size_t(box)]; }
-  void resize(int64_t box, const Vec<double>& half) { half_[size_t(box)] = half; }
+  void resize(int64_t box, const Vec<double>& half) {
+    half_[size_t(box)] = half;
+    is_settled_[size_t(box)] = 0;
+  }
 
   // Take over what `former` knows of fixed boxes, so that only others are read and sorted. kept: the
   // index in `former` of each box that is of the same size and at the same pose there, or −1.
@@ -136,7 +143,12 @@ class BroadPhase {
     for (int32_t box : to_read_) {
       Bounds& bounds = bounds_[size_t(box)];
       const double* p = poses + 7 * int64_t(box);
+      if (is_settled_[size_t(box)] && std::memcmp(p, &last_[size_t(box)], sizeof last_[0]) == 0) {
+        searched_count_ += is_searched(box);
+        continue;
+      }
       bounds = nowhere;
+      is_settled_[size_t(box)] = 0;
       if (std::all_of(p, p + 7, [](double number) { return std::isnan(number); })) continue;
       Pose<double> pose{{p[0], p[1], p[2]}, {p[3], p[4], p[5], p[6]}};
       if (!pose_valid(triple(pose.position), squared_norm(pose.quaternion))) return box;
@@ -144,7 +156,12 @@ class BroadPhase {
       is_fixed_new |= fixed_[size_t(box)];
       if (!is_searched(box)) continue;
       ++searched_count_;
-      if (!bounds.is_within(fat_[size_t(box)])) changed_.push_back(box);
+      if (bounds.is_within(fat_[size_t(box)])) {
+        std::memcpy(&last_[size_t(box)], p, sizeof last_[0]);
+        is_settled_[size_t(box)] = 1;
+      } else {
+        changed_.push_back(box);
+      }
     }
     if (is_fixed_new) build_fixed();
     return -1;
@@ -307,6 +324,8 @@ class BroadPhase {
   std::vector<Row> pairs_, stale_;
   // From call to call.
   std::vector<Bounds> fat_;
+  std::vector<std::array<double, 7>> last_;  // the pose of a box that is settled
+  std::vector<uint8_t> is_settled_;  // whether the bounds are those of it, within the fat ones
   std::vector<uint64_t> kept_;
   bool is_partial_ = false;  // not all pairs whose fat bounds overlap are kept
   BoundsTree fixed_tree_, later_tree_, moving_tree_;
