@@ -135,6 +135,8 @@ class Clock {
     return {dt,     dt / count,       count,   is_late ? substeps : 1,
             window, window / longest, period_, overdue_periods * std::max(period_, dt)};
   }
+  // Since the last answer [s]; 0 with contacts of each step.
+  double since() const { return std::max(0.0, since_); }
   void end(double dt) {
     if (since_ >= 0.0) since_ += dt;
   }

@@ -42,6 +42,17 @@ struct Patch {
 
   BoxPair pair() const { return {box_a, box_b}; }
 
+  // Keep what it gave, of the same pair before.
+  void keep(const Patch& before) {
+    force = before.force;
+    lasting = before.lasting;
+    window = before.window;
+    normal_impulse = before.normal_impulse;
+    torsion_impulse = before.torsion_impulse;
+    friction_impulse = before.friction_impulse;
+    rocking_impulse = before.rocking_impulse;
+    impulse_arm = before.impulse_arm;
+  }
   // Keep the impulses of a window that is longer by a factor.
   void scale(double factor) {
     window *= factor;

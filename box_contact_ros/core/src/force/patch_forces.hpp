@@ -220,9 +220,9 @@ class PatchForces {
     window_ = step.steps.window;
     Given given{poses, velocities, outside};
     bool is_resting =
-        options_.rest_speed > 0.0 && step.own && motion.poses && motion.velocities &&
-        rest_.count(islands_, bodies_, patches_, given, dt, options_.rest_speed, window_);
-    rest_.end(poses);
+        options_.rest_speed > 0.0 && motion.poses && motion.velocities &&
+        rest_.count(islands_, bodies_, patches_, given, step.steps, options_.rest_speed);
+    rest_.end(poses, dt);
     islands.write_ends();
     for (int32_t k : rest_.fixed()) islands.move_alone(size_t(k));
     if (is_resting) lay_down();
@@ -316,7 +316,7 @@ class PatchForces {
   }
   void wake() {
     keep_rest();
-    rest_.wake(bodies_, window_, patches_, loads_);
+    rest_.wake(bodies_, window_, clock_.since(), patches_, loads_);
     is_grouped_ = is_chosen_ = false;
   }
   void wake_all() {
@@ -333,6 +333,32 @@ class PatchForces {
       if (rest_.is_marked(patch)) next_.push_back(patch);
     for (size_t k = found; k < next_.size(); ++k) next_[k].age = 0.0;
     wake();
+  }
+  // Take from an answer what it says of patches at rest. Those of which it says something new wake.
+  void take_at_rest(double age, const bc_pose* asked) {
+    auto next = next_.begin();
+    auto wake_new = [&](const Patch& patch) {
+      if (patch.age >= 0.0 && !rest_.is_of_before(patch, age)) rest_.mark(patch);
+    };
+    for (Patch& patch : rest_.patches()) {
+      for (; next != next_.end() && next->pair() < patch.pair(); ++next) wake_new(*next);
+      bool is_there = next != next_.end() && next->pair() == patch.pair();
+      const Patch* told = is_there ? &*next++ : nullptr;
+      if ((told && told->age < 0.0) || rest_.is_of_before(patch, age)) continue;
+      if (!told || !rest_.is_told_again(patch, *told, asked)) {
+        rest_.mark(patch);
+        continue;
+      }
+      Patch before = patch;
+      patch = *told;
+      patch.keep(before);
+    }
+    std::for_each(next, next_.end(), wake_new);
+    if (rest_.is_any_marked()) wake();
+    auto rests = [this](const Patch& patch) {
+      return rest_.is_at_rest(size_t(patch.a)) || rest_.is_at_rest(size_t(patch.b));
+    };
+    next_.erase(std::remove_if(next_.begin(), next_.end(), rests), next_.end());
   }
   // Bodies that come to rest end where they began.
   void lay_down() {
@@ -388,7 +414,7 @@ class PatchForces {
       std::sort(next_.begin(), next_.end(), before);
     if (std::adjacent_find(next_.begin(), next_.end(), same) != next_.end())
       return Held::pair_twice;
-    if (!is_own) wake_all();
+    if (!is_own && rest_.is_any()) take_at_rest(answer.age, poses);
     keep_impulses();
     patches_.swap(next_);
     is_grouped_ = false;
@@ -442,16 +468,7 @@ class PatchForces {
       bool is_stale = patch.age < 0.0;
       if (is_stale && !is_known) continue;
       Patch next = is_stale ? *old : patch;
-      if (is_known) {
-        next.normal_impulse = old->normal_impulse;
-        next.torsion_impulse = old->torsion_impulse;
-        next.friction_impulse = old->friction_impulse;
-        next.rocking_impulse = old->rocking_impulse;
-        next.impulse_arm = old->impulse_arm;
-        next.window = old->window;
-        next.force = old->force;
-        next.lasting = old->lasting;
-      }
+      if (is_known) next.keep(*old);
       *kept++ = next;
     }
     next_.erase(kept, next_.end());

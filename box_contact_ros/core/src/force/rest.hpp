@@ -20,6 +20,10 @@ constexpr double rest_time = 0.5;
 // Then it is no faster than it was within that time, or than this share of what is slow [1]: what begins
 // to tip gains speed.
 constexpr double calm_share = 0.1;
+// By how much the first answer to a patch at rest may differ from the one that it has [m].
+constexpr double settled_gap = 1e-5;
+// What is awake rests since then [s].
+constexpr double never = -1e300;
 
 // What an advance is given of each body.
 struct Given {
@@ -51,11 +55,29 @@ class Rest {
   const std::vector<int32_t>& awake() const { return awake_; }
   const std::vector<int32_t>& fixed() const { return fixed_; }
   const std::vector<Patch>& patches() const { return patches_; }
+  std::vector<Patch>& patches() { return patches_; }
   const std::vector<Load>& loads() const { return loads_; }
   bool is_any() const { return !patches_.empty(); }
   bool is_at_rest(size_t body) const { return of_[body].island >= 0; }
   // Whether a body is where it was, and stays there.
   bool is_quiet(size_t body) const { return is_at_rest(body) || of_[body].is_fixed_still; }
+  // Whether an answer says of a patch at rest what was known. What was asked before it came to rest tells
+  // nothing; the first answer after that is of poses a little other than those of the patch.
+  bool is_told_again(const Patch& patch, const Patch& next, const bc_pose* asked) const {
+    auto same = [](const auto& p, const auto& q) { return std::memcmp(&p, &q, sizeof p) == 0; };
+    if (!same(of_[size_t(patch.a)].pose, asked[patch.a]) ||
+        !same(of_[size_t(patch.b)].pose, asked[patch.b]) || next.friction != patch.friction ||
+        next.stiffness != patch.stiffness || !same(next.surface, patch.surface))
+      return false;
+    if (same(next.asked_a, patch.asked_a) && same(next.asked_b, patch.asked_b))
+      return same(next.normal, patch.normal) && same(next.point, patch.point) &&
+             next.depth == patch.depth;
+    return std::fabs(next.depth - patch.depth) <= settled_gap;
+  }
+  // Whether a question, asked so long ago, is of the time before the bodies of a patch came to rest.
+  bool is_of_before(const Patch& patch, double age) const {
+    return now_ - age < std::max(of_[size_t(patch.a)].since, of_[size_t(patch.b)].since);
+  }
   // Whether all that is given of a body at rest is as it was when it was laid down, to the bit.
   bool is_as_laid(size_t k, const Given& given) const {
     const OfBody& of = of_[k];
@@ -90,6 +112,10 @@ class Rest {
     if (!is_at_rest(body)) return;
     is_marked_[size_t(of_[body].island)] = 1;
     is_any_marked_ = true;
+  }
+  void mark(const Patch& patch) {
+    mark(size_t(patch.a));
+    mark(size_t(patch.b));
   }
   void mark_all() {
     for (size_t k = 0; k < of_.size(); ++k) mark(k);
@@ -134,11 +160,14 @@ class Rest {
 
   // Wake the islands that are marked: their patches and loads go to those that are awake. Impulses are
   // those of a window, as long as it is now.
-  void wake(const std::vector<Body>& bodies, double window, std::vector<Patch>& patches,
+  void wake(const std::vector<Body>& bodies, double window, double age, std::vector<Patch>& patches,
             std::vector<Load>& loads) {
     auto wakes = [this](size_t k) { return is_marked(patches_[k]); };
-    for (size_t k = 0; k < patches_.size(); ++k)
-      if (wakes(k)) patches_[k].scale(window / window_of(patches_[k]));
+    for (size_t k = 0; k < patches_.size(); ++k) {
+      if (!wakes(k)) continue;
+      patches_[k].scale(window / window_of(patches_[k]));
+      patches_[k].age = age;
+    }
     hand_over(loads_, loads, wakes);
     hand_over(patches_, patches, wakes);
     for (OfBody& of : of_)
@@ -150,10 +179,10 @@ class Rest {
   // Count for how long islands are slow at the end of an advance, and note what is given of those that
   // come to rest. Returns whether any does.
   bool count(Islands& islands, const std::vector<Body>& bodies, const std::vector<Patch>& patches,
-             const Given& given, double dt, double slow, double window) {
+             const Given& given, const SubSteps& steps, double slow) {
     bool is_any = false;
     for (const Island& island : islands.all) {
-      if (!comes_to_rest(island, islands, bodies, patches, dt, slow)) continue;
+      if (!comes_to_rest(island, islands, bodies, patches, steps, slow)) continue;
       is_any = true;
       int32_t name = islands.moving[island.body].body;
       add_loads(island, islands);
@@ -162,10 +191,11 @@ class Rest {
         of_[k].island = name;
         of_[k].pose = given.poses[k];
         of_[k].outside = given.outside ? given.outside[k] : bc_wrench{};
-        of_[k].window = window;
+        of_[k].window = steps.window;
+        of_[k].since = now_;
         for (int i = 0; i < 3; ++i) {
-          of_[k].wrench.force[i] = moving.impulse[i] / dt;
-          of_[k].wrench.torque[i] = moving.angular_impulse[i] / dt;
+          of_[k].wrench.force[i] = moving.impulse[i] / steps.dt;
+          of_[k].wrench.torque[i] = moving.angular_impulse[i] / steps.dt;
         }
       });
     }
@@ -191,8 +221,9 @@ class Rest {
       if (motion.wrenches) motion.wrenches[k] = of.wrench;
     }
   }
-  // Keep where the bodies that no force moves were given.
-  void end(const bc_pose* poses) {
+  // End an advance: keep where the bodies that no force moves were given.
+  void end(const bc_pose* poses, double dt) {
+    now_ += dt;
     for (int32_t body : fixed_) of_[size_t(body)].pose = poses[body];
   }
 
@@ -203,6 +234,7 @@ class Rest {
     bc_wrench outside{};
     bc_wrench wrench{};           // of contacts: the loads
     double window = 0.0;          // of its patches' impulses [s]
+    double since = never;         // when that was [s]
     int32_t island = -1;          // the lowest body of its island; −1: it is awake
     bool is_fixed_still = false;  // of a body that no force moves
     bool bears = false;           // the same: whether something at rest lies on it
@@ -211,10 +243,6 @@ class Rest {
     double least = 0.0;      // the least square of its speed since then [m²/s²]
   };
 
-  void mark(const Patch& patch) {
-    mark(size_t(patch.a));
-    mark(size_t(patch.b));
-  }
   double window_of(const Patch& patch) const {
     return std::max(of_[size_t(patch.a)].window, of_[size_t(patch.b)].window);
   }
@@ -263,7 +291,7 @@ class Rest {
   }
 
   bool comes_to_rest(const Island& island, Islands& islands, const std::vector<Body>& bodies,
-                     const std::vector<Patch>& patches, double dt, double slow) {
+                     const std::vector<Patch>& patches, const SubSteps& steps, double slow) {
     double least = rest_time, limit = slow * slow, calm = calm_share * calm_share * limit;
     bool is_slow = island.block < island.block_end, is_calm = true;
     for (size_t k = island.body; is_slow && k < island.body_end; ++k) {
@@ -275,12 +303,12 @@ class Rest {
     each_free(island, islands, [&](const Moving& moving) {
       OfBody& of = of_[size_t(moving.body)];
       if (of.slow_time == 0.0 || moving.speed_squared < of.least) of.least = moving.speed_squared;
-      of.slow_time = is_slow ? of.slow_time + dt : 0.0;
+      of.slow_time = is_slow ? of.slow_time + steps.dt : 0.0;
       least = std::min(least, of.slow_time);
       is_calm = is_calm && moving.speed_squared <= std::max(of.least, calm);
     });
     if (least < rest_time) return false;
-    if (is_calm && is_held(island, islands, patches)) return true;
+    if (is_calm && is_held(island, islands, patches, steps)) return true;
     each_free(island, islands,
               [&](const Moving& moving) { of_[size_t(moving.body)].slow_time = 0.0; });
     return false;
@@ -288,15 +316,16 @@ class Rest {
 
   // Whether contacts hold all bodies of an island, from those that no force moves on: friction could stop
   // them within the advance. What lies on ice, floats or goes on a belt is not at rest.
-  static bool is_held(const Island& island, Islands& islands, const std::vector<Patch>& patches) {
+  static bool is_held(const Island& island, Islands& islands, const std::vector<Patch>& patches,
+                      const SubSteps& steps) {
     for (size_t k = island.body; k < island.body_end; ++k)
       islands.moving[k].is_held = islands.moving[k].inverse_mass == 0.0;
     for (bool goes_on = true; goes_on;) {
       goes_on = false;
       for (size_t k = island.block; k < island.block_end; ++k) {
         const Block& block = islands.blocks[k];
-        const Vec<double>& surface = patches[size_t(block.patch)].surface;
-        if (dot(surface, surface) != 0.0) return false;
+        const Patch& patch = patches[size_t(block.patch)];
+        if (dot(patch.surface, patch.surface) != 0.0 || patch.age > steps.overdue) return false;
         Moving &a = islands.moving[size_t(block.a)], &b = islands.moving[size_t(block.b)];
         if (a.is_held == b.is_held) continue;
         const Moving& other = a.is_held ? b : a;
@@ -316,6 +345,7 @@ class Rest {
   std::vector<Load> loads_;         // theirs
   std::vector<uint8_t> is_marked_;  // of islands, by their names
   bool is_any_marked_ = false;
+  double now_ = 0.0;  // since the first advance [s]
 };
 
 }  // namespace box_contact::BOX_CONTACT_SET::force
