@@ -117,7 +117,7 @@ EVENTS: dict[str, tuple[Callable[[World], None], list[int]]] = {
     'foot taken': (lambda w: move(w, FOOT, 0, 3, 0), [FOOT, MIDDLE, TOP]),
     'hit from above': (lambda w: push(w, FLOATING, 0, 0, -30, 0, 0, 0), []),
     'slid into': (lambda w: give_speed(w, SLIDER, 2, 0, 0, 0, 0, 0), [SLIDER]),
-    'heavier': (heavier, [ON_PLATE, FOOT, MIDDLE, TOP, SLIDER]),
+    'heavier': (heavier, [FOOT, MIDDLE, TOP]),
     'gravity turned': (tilt, [ON_PLATE, FOOT, MIDDLE, TOP, SLIDER]),
     'weightless': (lambda w: push(w, TOP, 0, 0, 6 * GRAVITY, 0, 0, 0), [FOOT, MIDDLE, TOP]),
     'belt': (lambda w: hold(w, surface_velocity=(0, SLIDER, (1.0, 0, 0))), [SLIDER]),
@@ -125,9 +125,10 @@ EVENTS: dict[str, tuple[Callable[[World], None], list[int]]] = {
                        give_speed(w, SLIDER, 1, 0, 0, 0, 0, 0)), [SLIDER]),
     'spring': (lambda w: hold(w, stiffness=(1, 2, 2e3)), [ON_PLATE]),
     'pair lost': (lambda w: hold(w, pairs_of(w)[1:]), []),
-    'box set anew': (smaller, [ON_PLATE, FOOT, MIDDLE, TOP, SLIDER]),
+    'box set anew': (smaller, [FOOT, MIDDLE, TOP]),
     'answers of others': (others, [FOOT, MIDDLE, TOP]),
     'forgotten': (forgotten, [FOOT, MIDDLE, TOP]),
+    'reset': (lambda w: w.forces.reset(), [ON_PLATE, FOOT, MIDDLE, TOP, SLIDER]),
 }
 
 
@@ -244,6 +245,34 @@ def test_a_pair_listed_late_is_solved_once() -> None:
     assert asleep(world) == [1, 2, 3]
     world.forces.hold([(2, 1), (0, 1), (0, 2)])
     assert asleep(world.step(DT)) == [1, 2]
+
+
+def test_a_body_more_or_less_wakes_what_it_touches(twins: tuple[World, World]) -> None:
+    """Of the bodies and boxes that are set anew, those that stay rest on, and so do forgotten."""
+    world = deepcopy(twins[0])
+    forces, loads = world.forces, world.forces.loads()
+    forces.forget([FLOATING, ON_PLATE])
+    assert not len(forces.loads().pairs)
+    assert asleep(world.step(DT)) == [FOOT, MIDDLE, TOP, SLIDER]
+    assert np.array_equal(forces.loads().pairs, loads.pairs)
+    assert len(asleep(world.run(2.0, DT))) == 5
+    forces.set_bodies([*world.bodies, Body.of_box((1, 1, 1), 5.0)])
+    forces.set_boxes(np.vstack((world.size, [(1, 1, 1)])))
+    pairs = np.vstack((pairs_of(world), [(0, 8), (TOP, 8)]))
+    forces.hold(pairs)
+    more = [np.vstack((rows, rows[-1:])) for rows in (world.poses, world.velocities, world.outside)]
+    more[0][8, :3], more[2][8] = (0, 0, 5), (0, 0, -5 * GRAVITY, 0, 0, 0)
+    awake = forces.advance(DT, *more).awake
+    assert np.flatnonzero(awake).tolist() == [FLOATING, 8]
+    forces.set_boxes(world.size)
+    forces.set_bodies([*world.bodies[:PLATE], world.bodies[PLATE], *world.bodies[2:]])
+    hold(world)
+    assert len(asleep(world.step(DT))) == 5
+    forces.set_boxes(world.size[:-1])
+    forces.set_bodies(world.bodies[:-1])
+    forces.hold(pairs_of(world)[(pairs_of(world) < SLIDER).all(axis=1)])
+    awake = forces.advance(DT, world.poses[:-1], world.velocities[:-1], world.outside[:-1]).awake
+    assert np.flatnonzero(awake).tolist() == [FLOATING]
 
 
 def test_belts_ice_and_what_floats_never_rest() -> None:

@@ -43,9 +43,12 @@ class OwnContacts {
     near_.reserve(count());
   }
 
-  // Take the pairs of a question. Where bodies rest, a pair is new until it was solved once.
+  // Take the pairs of a question. Where bodies rest, a pair is new until it was solved once, unless
+  // `is_known(pair)` says that its patch rests.
   enum class Taken { same, others, pair_twice };
-  Taken ask(const bc_patches& asked, double friction, bool is_any_at_rest) {
+  template <class IsKnown>
+  Taken ask(const bc_patches& asked, double friction, bool is_any_at_rest,
+            const IsKnown& is_known) {
     auto n = size_t(asked.count);
     auto is_same = [](const double* column, const std::vector<double>& held, double otherwise) {
       return column ? std::equal(held.begin(), held.end(), column)
@@ -69,7 +72,7 @@ class OwnContacts {
     if (std::adjacent_find(next_keys_.begin(), next_keys_.end(), same) != next_keys_.end())
       return Taken::pair_twice;
     resize(n);
-    if (is_any_at_rest) note_new();
+    if (is_any_at_rest) note_new(is_known);
     keys_.swap(next_keys_);
     std::copy_n(asked.pairs, 2 * n, asked_.pairs.begin());
     auto copy = [](const double* from, std::vector<double>& to, double otherwise) {
@@ -271,13 +274,14 @@ class OwnContacts {
   }
   const Pairs& chosen() const { return is_all_ ? asked_ : live_; }
   // Note which of the next keys are not among the last ones.
-  void note_new() {
+  template <class IsKnown>
+  void note_new(const IsKnown& is_known) {
     auto last = keys_.begin();
     for (const Key& key : next_keys_) {
       while (last != keys_.end() && *last < key) ++last;
-      bool is_known = last != keys_.end() && last->pair == key.pair;
-      is_new_[key.row] = !is_known;
-      is_any_new_ = is_any_new_ || !is_known;
+      bool is_new = !(last != keys_.end() && last->pair == key.pair) && !is_known(key.pair);
+      is_new_[key.row] = is_new;
+      is_any_new_ = is_any_new_ || is_new;
     }
   }
   template <class Solve, class IsNear>

@@ -67,7 +67,7 @@ class PatchForces {
 
   const std::vector<Body>& bodies() const { return bodies_; }
   const std::vector<bc_body_box>& boxes() const { return own_.boxes(); }
-  size_t load_count() const { return loads_.size() + rest_.loads().size(); }
+  size_t load_count() const { return are_loads_known_ ? loads_.size() + rest_.loads().size() : 0; }
   // Write what each pair carried in the last advance. With boxes, corners are those of the faces, and
   // the pads of two bodies share as rubber ones do.
   void write_loads(bc_load* loads) const {
@@ -103,7 +103,10 @@ class PatchForces {
 
   // Change masses, add bodies at the end, or drop bodies there with their patches.
   void set_bodies(std::vector<Body> bodies) {
-    wake_all();
+    std::vector<uint8_t> is_changed(bodies_.size());
+    for (size_t k = 0; k < bodies_.size(); ++k)
+      is_changed[k] = k >= bodies.size() || !is_same(bodies[k], bodies_[k]);
+    wake(is_changed);
     // What is let go, or gripped, has not ended an advance as what it is now.
     for (size_t k = 0; k < std::min(bodies.size(), bodies_.size()); ++k)
       if (bodies[k].is_free() != bodies_[k].is_free()) ended_[k] = {};
@@ -111,7 +114,8 @@ class PatchForces {
     ended_.resize(bodies_.size());
     fineness_.resize(bodies_.size());
     poses_.resize(bodies_.size());
-    rest_.set_bodies(bodies_);
+    rest_.change_bodies(bodies_, is_changed);
+    is_chosen_ = false;
     auto count = int32_t(bodies_.size());
     make_room(patches_.size());
     drop([this, count](const Patch& patch) {
@@ -120,18 +124,24 @@ class PatchForces {
   }
   // Change which boxes the bodies have. Patches of boxes that stay with their body stay.
   void set_boxes(std::vector<bc_body_box> boxes) {
-    wake_all();
+    auto is_kept = [&](int32_t box) {
+      auto k = size_t(box);
+      return k < boxes.size() && k < this->boxes().size() && is_same(boxes[k], this->boxes()[k]);
+    };
+    rest_.mark_if(
+        [&](const Patch& patch) { return !is_kept(patch.box_a) || !is_kept(patch.box_b); });
+    if (rest_.is_any_marked()) wake();
     own_.set_boxes(std::move(boxes));
     drop([this](const Patch& patch) { return !is_of_boxes(patch); });
   }
   // Forget the patches of bodies.
   void forget(const int64_t* bodies, int64_t count) {
-    wake_all();
     std::vector<uint8_t> is_forgotten(bodies_.size(), 0);
     for (int64_t k = 0; k < count; ++k) {
       is_forgotten[size_t(bodies[k])] = 1;
       ended_[size_t(bodies[k])] = {};
     }
+    wake(is_forgotten);
     drop([&is_forgotten](const Patch& patch) {
       return is_forgotten[size_t(patch.a)] || is_forgotten[size_t(patch.b)];
     });
@@ -144,7 +154,7 @@ class PatchForces {
     rest_.set_bodies(bodies_);
     moves_by_wrenches_ = false;
     clock_ = {};
-    is_grouped_ = false;
+    is_grouped_ = is_chosen_ = false;
   }
 
   // Take an answer, and the poses of its question. Pairs that are missing are forgotten. Nothing
@@ -158,7 +168,8 @@ class PatchForces {
   }
   // Take pairs whose contacts are solved at the start of each advance. Impulses stay.
   Held hold(const bc_patches& pairs) {
-    auto taken = own_.ask(pairs, options_.friction, rest_.is_any());
+    auto taken = own_.ask(pairs, options_.friction, rest_.is_any(),
+                          [this](const BoxPair& pair) { return rest_.has(pair); });
     if (taken == OwnContacts::Taken::pair_twice) return Held::pair_twice;
     clock_.answer_each_step();
     if (taken == OwnContacts::Taken::same) return Held::all;
@@ -217,6 +228,7 @@ class PatchForces {
       return lost;
     }
     loads_.resize(patches_.size());
+    are_loads_known_ = true;
     window_ = step.steps.window;
     Given given{poses, velocities, outside};
     bool is_resting =
@@ -319,6 +331,14 @@ class PatchForces {
     rest_.wake(bodies_, window_, clock_.since(), patches_, loads_);
     is_grouped_ = is_chosen_ = false;
   }
+  void wake(const std::vector<uint8_t>& is_chosen) {  // bodies, and what touches them
+    rest_.mark_those(is_chosen);
+    if (rest_.is_any_marked()) wake();
+  }
+  template <class Numbers>
+  static bool is_same(const Numbers& p, const Numbers& q) {
+    return std::memcmp(&p, &q, sizeof p) == 0;
+  }
   void wake_all() {
     rest_.mark_all();
     if (rest_.is_any_marked()) wake();
@@ -392,7 +412,7 @@ class PatchForces {
   // Loads name boxes, which may be others or none from now on.
   template <class Condition>
   void drop(Condition condition) {
-    loads_.clear();
+    are_loads_known_ = false;
     patches_.erase(std::remove_if(patches_.begin(), patches_.end(), condition), patches_.end());
     is_grouped_ = false;
   }
@@ -499,8 +519,9 @@ class PatchForces {
   std::vector<bc_pose> poses_;         // of the bodies at the end of the last advance
   std::vector<Patch> patches_, next_;  // by pair
   std::vector<Load> loads_;            // of the last advance, by pair
-  Rest rest_;                          // patches and loads of what rests are there
-  double window_ = 0.0;                // of the last advance [s]
+  bool are_loads_known_ = true;
+  Rest rest_;            // patches and loads of what rests are there
+  double window_ = 0.0;  // of the last advance [s]
   // Memory that calls use again.
   Islands islands_;
   std::vector<Patch> kept_patches_;  // for an advance that fails

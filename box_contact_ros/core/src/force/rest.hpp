@@ -58,6 +58,11 @@ class Rest {
   std::vector<Patch>& patches() { return patches_; }
   const std::vector<Load>& loads() const { return loads_; }
   bool is_any() const { return !patches_.empty(); }
+  bool has(const BoxPair& pair) const {
+    auto before = [](const Patch& patch, const BoxPair& pair) { return patch.pair() < pair; };
+    auto found = std::lower_bound(patches_.begin(), patches_.end(), pair, before);
+    return found != patches_.end() && found->pair() == pair;
+  }
   bool is_at_rest(size_t body) const { return of_[body].island >= 0; }
   // Whether a body is where it was, and stays there.
   bool is_quiet(size_t body) const { return is_at_rest(body) || of_[body].is_fixed_still; }
@@ -97,6 +102,14 @@ class Rest {
     awake_.reserve(bodies);
     fixed_.reserve(bodies);
   }
+  // Take other bodies; those that are changed are awake. They begin with no pose of before.
+  void change_bodies(const std::vector<Body>& bodies, const std::vector<uint8_t>& is_changed) {
+    of_.resize(bodies.size());
+    is_marked_.resize(bodies.size());
+    for (size_t k = 0; k < bodies.size(); ++k)
+      if (k < is_changed.size() && is_changed[k]) of_[k] = {};
+    list(bodies);
+  }
   // All bodies, which are awake.
   void set_bodies(const std::vector<Body>& bodies) {
     of_.assign(bodies.size(), {});
@@ -116,6 +129,13 @@ class Rest {
   void mark(const Patch& patch) {
     mark(size_t(patch.a));
     mark(size_t(patch.b));
+  }
+  void mark_those(const std::vector<uint8_t>& is_chosen) {  // and what touches them
+    for (size_t k = 0; k < of_.size(); ++k)
+      if (is_chosen[k]) mark(k);
+    mark_if([&](const Patch& patch) {
+      return is_chosen[size_t(patch.a)] || is_chosen[size_t(patch.b)];
+    });
   }
   void mark_all() {
     for (size_t k = 0; k < of_.size(); ++k) mark(k);
