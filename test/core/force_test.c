@@ -78,9 +78,42 @@ static void drop(void) {
   check(bc_patch_forces_loads(copy, &load, 1) == 1 && load.box_a == 0 && load.box_b == 1, "loads");
   check(fabs(load.pressing - load.friction[2] - wrenches[0].force[2]) < 10.0, "carried");
   check(bc_patch_forces_forget(copy, &pair[1], 1) == BC_OK, "forget");
+  check(bc_patch_forces_loads(copy, &load, 1) == 0, "no loads");
   bc_patch_forces_advance(copy, 0.001, poses, velocities, outside, &pushed);
   check(fabs(wrenches[0].force[2]) < 1e3, "forgotten");
   bc_patch_forces_destroy(copy);
+}
+
+/* A box that is laid down, unless the options say otherwise. What is forgotten has no loads. */
+static void check_rest(void) {
+  for (int rest = 0; rest < 2; ++rest) {
+    bc_force_options options = BC_DEFAULT_FORCE_OPTIONS;
+    options.rest = rest;
+    const bc_body both[2] = {{5, {1, 1, 1}, {0}}, {0, {0}, {0}}};
+    bc_body_box boxes[2] = {{0, {{{0, 0, 0}, {0, 0, 0, 1}}, {{1, 1, 1}}}},
+                            {1, {{{0, 0, 0}, {0, 0, 0, 1}}, {{9, 9, 1}}}}};
+    const int64_t places[2] = {0, 1};
+    bc_patches asked = {.size = sizeof asked, .count = 1, .pairs = places};
+    bc_pose poses[2] = {{{0, 0, 1}, {0, 0, 0, 1}}, {{0, 0, 0}, {0, 0, 0, 1}}};
+    bc_velocity velocities[2] = {{{0}, {0}}, {{0}, {0}}};
+    bc_wrench outside[2] = {{{0, 0, -49.05}, {0}}, {{0}, {0}}};
+    unsigned char awake[2] = {7, 7};
+    bc_patch_forces* forces;
+    check(bc_patch_forces_create(both, 2, &options, &forces) == BC_OK, "create");
+    check(bc_patch_forces_set_boxes(forces, boxes, 2) == BC_OK, "boxes");
+    check(bc_patch_forces_hold(forces, &asked, NULL) == BC_OK, "hold");
+    bc_motion motion = {sizeof motion, poses, velocities, NULL, awake};
+    for (int step = 0; step < 400; ++step)
+      check(!bc_patch_forces_advance(forces, 1 / 240.0, poses, velocities, outside, &motion),
+            "advance");
+    check(awake[0] == !rest && awake[1] == 0, "awake");
+    bc_load load;
+    check(bc_patch_forces_loads(forces, &load, 1) == 1, "loads");
+    check(fabs(load.pressing - 49.05) < 1e-3, "pressing");
+    check(bc_patch_forces_forget(forces, places, 1) == BC_OK, "forget");
+    check(bc_patch_forces_loads(forces, &load, 1) == 0, "no loads");
+    bc_patch_forces_destroy(forces);
+  }
 }
 
 /* What no body has, by the words of its refusal. */
@@ -164,6 +197,7 @@ static void check_refusals(void) {
 
 int main(void) {
   drop();
+  check_rest();
   check_bodies();
   check_refusals();
   printf("%d failures\n", failures);

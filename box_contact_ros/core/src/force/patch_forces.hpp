@@ -71,6 +71,7 @@ class PatchForces {
   // Write what each pair carried in the last advance. With boxes, corners are those of the faces, and
   // the pads of two bodies share as rubber ones do.
   void write_loads(bc_load* loads) const {
+    if (!are_loads_known_) return;
     std::vector<Load> all(load_count());
     std::merge(loads_.begin(), loads_.end(), rest_.loads().begin(), rest_.loads().end(),
                all.begin(), [](const Load& p, const Load& q) { return p.pair() < q.pair(); });
