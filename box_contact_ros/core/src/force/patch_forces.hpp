@@ -28,8 +28,8 @@
 #include "../../include/box_contact/force.h"
 #include "faces.hpp"
 #include "island_step.hpp"
+#include "loads.hpp"
 #include "own_contacts.hpp"
-#include "pads.hpp"
 #include "rest.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
@@ -76,27 +76,7 @@ class PatchForces {
     std::merge(loads_.begin(), loads_.end(), rest_.loads().begin(), rest_.loads().end(),
                all.begin(), [](const Load& p, const Load& q) { return p.pair() < q.pair(); });
     for (size_t k = 0; k < all.size(); ++k) loads[k] = all[k].mean();
-    if (boxes().empty()) return;
-    std::vector<Pad> pads(all.size());
-    std::vector<std::pair<BoxPair, size_t>> pressed;  // by the bodies
-    for (size_t k = 0; k < all.size(); ++k) {
-      if (!(loads[k].pressing > 0.0)) continue;
-      const bc_body_box &a = boxes()[size_t(loads[k].box_a)], &b = boxes()[size_t(loads[k].box_b)];
-      pads[k] = {patch_of_faces(in_common_frame(poses_[size_t(a.body)], a.box.pose), a.box.size,
-                                in_common_frame(poses_[size_t(b.body)], b.box.pose), b.box.size,
-                                all[k].normal, face_tolerance),
-                 loads[k].pressing, vector(loads[k].centre)};
-      if (pads[k].faces.polygon.count == 0) continue;
-      pressed.push_back({std::minmax(support(a.body), support(b.body)), k});
-    }
-    std::sort(pressed.begin(), pressed.end());
-    for (auto first = pressed.begin(), last = first; first != pressed.end(); first = last) {
-      std::vector<Pad*> together;
-      for (; last != pressed.end() && last->first == first->first; ++last)
-        if (pads[last->second].faces.area > 0.0) together.push_back(&pads[last->second]);
-      if (together.size() > 1) share_by_normal(std::move(together));
-    }
-    for (const auto& [bodies, k] : pressed) write(pads[k], loads[k]);
+    if (!boxes().empty()) share_on_faces(all, bodies_, boxes(), poses_, loads);
   }
   int threads() const { return options_.threads; }
   int64_t box_count() const { return int64_t(boxes().empty() ? bodies_.size() : boxes().size()); }
@@ -280,21 +260,6 @@ class PatchForces {
   bool is_awake(size_t body) const { return !rest_.is_quiet(body); }
 
  private:
-  // All that no force moves is one support.
-  int32_t support(int64_t body) const {
-    return bodies_[size_t(body)].is_free() ? int32_t(body) : -1;
-  }
-  static void write(const Pad& pad, bc_load& load) {
-    auto corners = pad.faces.rectangle();
-    auto shares = corner_shares(corners, pad.faces.flat(pad.centre - pad.faces.origin));
-    load.pressing = pad.pressing;
-    std::copy_n(pad.centre.v, 3, load.centre);
-    for (size_t c = 0; c < 4; ++c) {
-      load.corner_loads[c] = shares[c] * load.pressing;
-      std::copy_n(pad.faces.level(corners[c]).v, 3, load.corners[c]);
-    }
-  }
-
   // Whether the boxes of a pair are a constraint in a step, though apart at its start: by no more than
   // what the outside wrenches would fall. A gap would else cost each box of a stack a step of free fall.
   bool is_near(int32_t box_a, int32_t box_b, const Vec<double>& normal, double apart, double dt,

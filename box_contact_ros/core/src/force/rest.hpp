@@ -11,7 +11,7 @@
 #include <cstring>
 #include <vector>
 
-#include "islands.hpp"
+#include "stillness.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
@@ -281,35 +281,6 @@ class Rest {
       for (int32_t body : {patch.a, patch.b}) of_[size_t(body)].bears = true;
   }
 
-  template <class Visit>
-  static void each_free(const Island& island, Islands& islands, const Visit& visit) {
-    for (size_t k = island.body; k < island.body_end; ++k)
-      if (islands.moving[k].inverse_mass > 0.0) visit(islands.moving[k]);
-  }
-
-  // Twice the kinetic energy by the mass [m²/s²]: with pushing out, and after relaxation.
-  static double speed_squared(const Body& body, const Moving& moving) {
-    auto of = [&](const Motion& motion) {
-      Vec<double> turning = transposed_times(moving.placed.axes, motion.angular);
-      return dot(motion.linear, motion.linear) +
-             body.inverse_mass * dot(turning / body.inverse_inertia, turning);
-    };
-    return std::max(of(moving.pushed), of({moving.linear, moving.angular}));
-  }
-
-  // The impulses of an advance as the loads have them: after relaxation.
-  static void add_loads(const Island& island, Islands& islands) {
-    each_free(island, islands,
-              [](Moving& moving) { moving.impulse = moving.angular_impulse = {}; });
-    for (size_t k = island.block; k < island.block_end; ++k) {
-      Block& block = islands.blocks[k];
-      block.normal_impulses = block.normal_sum;
-      block.friction_impulses = block.friction_sum;
-      block.normal_counted = block.friction_counted = {};
-      force::count(block, islands.moving[size_t(block.a)], islands.moving[size_t(block.b)]);
-    }
-  }
-
   bool comes_to_rest(const Island& island, Islands& islands, const std::vector<Body>& bodies,
                      const std::vector<Patch>& patches, const SubSteps& steps, double slow) {
     double least = rest_time, limit = slow * slow, calm = calm_share * calm_share * limit;
@@ -332,31 +303,6 @@ class Rest {
     each_free(island, islands,
               [&](const Moving& moving) { of_[size_t(moving.body)].slow_time = 0.0; });
     return false;
-  }
-
-  // Whether contacts hold all bodies of an island, from those that no force moves on: friction could stop
-  // them within the advance. What lies on ice, floats or goes on a belt is not at rest.
-  static bool is_held(const Island& island, Islands& islands, const std::vector<Patch>& patches,
-                      const SubSteps& steps) {
-    for (size_t k = island.body; k < island.body_end; ++k)
-      islands.moving[k].is_held = islands.moving[k].inverse_mass == 0.0;
-    for (bool goes_on = true; goes_on;) {
-      goes_on = false;
-      for (size_t k = island.block; k < island.block_end; ++k) {
-        const Block& block = islands.blocks[k];
-        const Patch& patch = patches[size_t(block.patch)];
-        if (dot(patch.surface, patch.surface) != 0.0 || patch.age > steps.overdue) return false;
-        Moving &a = islands.moving[size_t(block.a)], &b = islands.moving[size_t(block.b)];
-        if (a.is_held == b.is_held) continue;
-        const Moving& other = a.is_held ? b : a;
-        double most = block.friction * block.normal_sum[0] * other.inverse_mass;  // [m/s]
-        if (most > 0.0 && other.speed_squared <= most * most)
-          a.is_held = b.is_held = goes_on = true;
-      }
-    }
-    return std::all_of(islands.moving.begin() + long(island.body),
-                       islands.moving.begin() + long(island.body_end),
-                       [](const Moving& moving) { return moving.is_held; });
   }
 
   std::vector<OfBody> of_;
