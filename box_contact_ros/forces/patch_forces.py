@@ -212,8 +212,8 @@ class PatchForces:
         most_depth: how deep what rests may be [m], where a load is large for the lighter body.
         With contacts of one's own, its island makes up to 64 times as many sub-steps. `loads`
         tells where that is not enough.
-        rest: whether an island at rest is laid down, where contacts are one's own. `advance` then
-        returns its poses as they were given until an input of it differs.
+        rest: whether bodies at rest are laid down. `advance` then returns their poses as they were
+        given until an input of theirs differs.
         rest_speed: what is slower for half a second, by its energy, is at rest [m/s].
         substeps, iterations and relaxations may be 1,000 each.
         ValueError: names the field and its value.

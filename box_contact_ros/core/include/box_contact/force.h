@@ -159,9 +159,9 @@ BC_API bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches*
  * the wrenches beside those of contacts, gravity among them, constant over the step; NULL: none.
  * Without poses and velocities in `motion`, the wrenches are taken to move the bodies until the next
  * advance, which then removes the speed of pushing out.
- * With both, and contacts of one's own, bodies at rest are laid down: poses as they were given,
- * velocities 0. They wake by a pose, velocity or wrench that is not equal to the bit, a pair that is no
- * longer held as it was, a body of mass 0 that moves, and what comes to touch them.
+ * With both, bodies at rest are laid down: poses as they were given, velocities 0. They wake by a pose,
+ * velocity or wrench that is not equal to the bit, a pair or an answer that is no longer as it was, a
+ * body of mass 0 that moves, and what comes to touch them.
  * BC_BAD_ARGUMENT, and nothing changes, for numbers beyond the limits above, and where those of a body
  * would leave the range of float64: the text names it. */
 BC_API bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, const bc_pose* poses,
