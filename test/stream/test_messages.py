@@ -308,6 +308,24 @@ class Asked:
         return native.Exact().solve(*args)
 
 
+def test_a_model_that_asks_for_a_tick_is_refused():
+    """The core's memory is that of the tick that asks the model; the next tick is answered."""
+    scene, poses, writers = two_boxes((2, 2, 2), (2, 2, 2)), [StampedPose(POSE, 'map', 5)] * 2, []
+
+    class Again(Asked):
+        def solve(self, *args):
+            for writer in writers:
+                writer(poses)
+            return super().solve(*args)
+
+    again = TickWriter(SceneSolver(scene, model=Again()), {})
+    writers.append(again)
+    with pytest.raises(RuntimeError, match='a tick is answered already'):
+        again(poses)
+    writers.clear()
+    assert again(poses) == written(scene, poses)
+
+
 def test_a_tick_in_two_frames_is_refused():
     scene = Scene({name: Box((1.0, 1.0, 1.0)) for name in 'abc'}, patterns=EVERY_PAIR)
     poses = [StampedPose(POSE, 'map', 5), None, StampedPose(POSE, '/map', 7)]

@@ -9,8 +9,8 @@
 
 namespace box_contact::binding {
 
-// Return numbers, frame_id and stamp [ns] of a serialised PoseStamped. Or None: it is refused, or is in
-// the other order of bytes. Python reads it then, or says what is wrong (stream/read_poses.py).
+// Return numbers, frame_id and stamp [ns] of a serialised PoseStamped. Or None: it is refused, or is
+// in the other order of bytes. Python reads it then, or says what is wrong (stream/read_poses.py).
 inline PyObject* read_pose(PyObject*, PyObject* given) {
   constexpr size_t frame_at = 16, pose_size = 7 * sizeof(double), padding_max = 3;
   constexpr uint32_t frame_max = 256;

@@ -32,8 +32,8 @@ inline Owned tuple_of(PyObject* given, const char* name, npy_intp length, bool i
   throw PythonError{};
 }
 
-// The boxes of a scene, and what is known of their pairs by name. Nothing changes from tick to tick but
-// the poses of what moves.
+// The boxes of a scene, and what is known of their pairs by name. Nothing changes from tick to tick
+// but the poses of what moves.
 struct TickScene {
   Owned broad_phase, solver;
   double margin;                // [m]

@@ -63,8 +63,8 @@ class TickWriter {
   explicit TickWriter(TickScene&& scene) : scene_(std::move(scene)) {}
 
   // Answer the stamped poses of all that moves. Returns the message of all contacts, the topics of
-  // pairs in contact with their messages, how many pairs are in contact, and the stale ones. Or None:
-  // the poses are refused, and the solver says why.
+  // pairs in contact with their messages, how many pairs are in contact, and the stale ones. Or
+  // None: the poses are refused, and the solver says why.
   PyObject* answer(PyObject* poses) {
     if (is_busy_) fail(PyExc_RuntimeError, "a tick is answered already");
     struct Busy {

@@ -6,8 +6,8 @@
 // Fat bounds are a bounding box, grown a little. The pairs whose fat bounds overlap are kept from
 // call to call. While a box stays within its fat bounds, it can be near the boxes of its kept pairs
 // alone. So a call tests the kept pairs, and searches for others for the boxes that left their fat
-// bounds. There are trees to search: one of fixed boxes, a small one of those that came later, and one
-// of the others' fat bounds.
+// bounds. There are trees to search: one of fixed boxes, a small one of those that came later, and
+// one of the others' fat bounds.
 #pragma once
 
 #include <algorithm>
@@ -85,8 +85,8 @@ class BroadPhase {
     is_settled_[size_t(box)] = 0;
   }
 
-  // Take over what `former` knows of fixed boxes, so that only others are read and sorted. kept: the
-  // index in `former` of each box that is of the same size and at the same pose there, or −1.
+  // Take over what `former` knows of fixed boxes, so that only others are read and sorted. kept:
+  // the index in `former` of each box that is of the same size and at the same pose there, or −1.
   void take_fixed(const BroadPhase& former, const int64_t* kept) {
     std::vector<int32_t> number_of(former.count(), -1);
     for (size_t box = 0; box < count(); ++box) {

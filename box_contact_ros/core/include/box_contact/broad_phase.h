@@ -63,8 +63,8 @@ BC_API bc_status bc_broad_phase_resize(bc_broad_phase* broad_phase, int64_t box,
                                        const bc_size* size);
 
 /* Take over what `former` knows of fixed boxes, before the first call: only the others are read and
- * sorted then. kept (count): the index in `former` of each box that has the same size and pose there, or
- * -1. Margins are the same. */
+ * sorted then. kept (count): the index in `former` of each box that has the same size and pose
+ * there, or -1. The margins are the same. */
 BC_API bc_status bc_broad_phase_take_fixed(bc_broad_phase* broad_phase,
                                            const bc_broad_phase* former, const int64_t* kept);
 
