@@ -24,12 +24,12 @@ constexpr double least_push = 600.0;
 // Which part of the depth that is wanted is aimed at [1]: what moves presses more than what rests, and the
 // depths of a stack add up.
 constexpr double aimed_depth = 0.36;
-// A factor that grows is larger than needed by this share [1], so that it seldom grows again.
+// A factor that grows is larger than needed by this share [1], and grows only where less than needed by as
+// much: each change moves what rests.
 constexpr double growth = 1.25;
 // Sub-steps are shorter by this factor at most.
 constexpr int finest = 64;
-// A factor that is this many times what is needed is halved after this time [s]: each change moves what
-// rests.
+// A factor that is this many times what is needed is halved after this time [s].
 constexpr int spare_factor = 4;
 constexpr double calm_time = 1.0;
 // What lasts of a force grows by e in this time [s]. An impact is over before.
@@ -65,7 +65,8 @@ class FinenessOf {
     });
     if (held == 1 && needed == 1) return 1;
     bool is_spare = spare_factor * needed <= held;
-    int factor = needed > held                   ? std::min(finest, int(std::ceil(growth * needed)))
+    bool is_short = held == 1 ? needed > 1 : needed > growth * held;
+    int factor = is_short                        ? std::min(finest, int(std::ceil(growth * needed)))
                  : is_spare && calm >= calm_time ? held / 2
                                                  : held;
     each_free(island, [&](size_t body) {
