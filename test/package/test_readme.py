@@ -427,8 +427,8 @@ LIMITS = {
         f'{constant("force/rectangle.hpp", "torsion_share")} times the mean',
         f'last {constant(CLOCK, "intervals_kept")} intervals',
         f'shrinks to 1 / {constant(CLOCK, "step_shrinkage")} per step',
-        f'by more than {constant("force/island_step.hpp", "impact_change")} m/s, up to '
-        f'{constant("force/island_step.hpp", "impact_iterations")} times',
+        f'by more than {constant("force/iterations.hpp", "impact_change")} m/s, up to '
+        f'{constant("force/iterations.hpp", "impact_iterations")} times',
         f'no more than {constant("force/patch_forces.hpp", "gap_share")}·g·dt²',
         f'apart by {1e3 * float(constant("force/patch_forces.hpp", "pressed_gap")):g} mm',
         f'the frequency {SOFT}/window', f'{float(SOFT) ** -2:.1f}·g·h² deep',

@@ -13,22 +13,10 @@
 #include "clock.hpp"
 #include "fineness.hpp"
 #include "islands.hpp"
+#include "iterations.hpp"
 #include "own_contacts.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
-
-// A smaller change of a patch's speeds [m/s] does not make its neighbours be solved again. With 1e-6 a
-// jittered tower of 20 sways for 8 s.
-constexpr double least_change = 1e-8;
-
-// An impact goes on being solved, at most so often, while an iteration changes a closing speed by more
-// than this [m/s]. What is left of a closing speed comes back as an overlap that is pushed out.
-constexpr double impact_change = 0.01;
-constexpr int impact_iterations = 100;
-// After every so many of them, all that presses in the island is scaled, where the factor is far from 1:
-// by this or more, or by its inverse or less.
-constexpr int scaled_every = 8;
-constexpr double least_factor = 2.0;
 
 // Most sub-steps, iterations or relaxations: their product is a number of 32 bits.
 constexpr int iterations_max = 1000;
@@ -70,6 +58,7 @@ class IslandStep {
         loads_(loads),
         moving_(islands.moving),
         blocks_(islands.blocks),
+        iterate_(islands),
         fineness_(fineness),
         fineness_of_(bodies, step.outside, options.most_depth, patches, islands) {}
 
@@ -94,7 +83,7 @@ class IslandStep {
         warm_start(patch, steps.again(patch.window), block, a, b);
       }
       bool is_last = number == steps.count;
-      solve(island, steps.rounds * options_.iterations, &Block::pushing);
+      iterate_(island, steps.rounds * options_.iterations, &Block::pushing);
       if (step_.motion.wrenches) count_impulses(island);
       for (size_t k = island.body; k < island.body_end; ++k) move(moving_[k], steps.length);
       relax(island, steps);
@@ -219,62 +208,6 @@ class IslandStep {
     return change;
   }
 
-  // Solve the blocks of an island in turn, so many times. A block whose bodies have not changed since
-  // its last turn is left out.
-  void solve(const Island& island, int iterations, NormalRows Block::* rows) const {
-    for (size_t k = island.body; k < island.body_end; ++k) moving_[k].changed = 0;
-    bool is_solved = false;
-    double fastest = 0.0;  // change of a closing speed in the last iteration [m/s]
-    auto goes_on = [&](int iteration) {
-      return iteration <= iterations || (fastest > impact_change && iteration <= impact_iterations);
-    };
-    for (int iteration = 1; !is_solved && goes_on(iteration); ++iteration) {
-      is_solved = true;
-      fastest = 0.0;
-      for (size_t k = island.block; k < island.block_end; ++k) {
-        Block& block = blocks_[k];
-        Moving &a = moving_[size_t(block.a)], &b = moving_[size_t(block.b)];
-        if (std::max(a.changed, b.changed) < iteration - 1) continue;
-        double closing = solve_normal(block, block.*rows, a, b);
-        double slipping = solve_friction(block, a, b);  // bounded by what presses now
-        fastest = std::max(fastest, closing);
-        if (std::max(closing, slipping) <= least_change) continue;
-        is_solved = false;
-        if (a.inverse_mass > 0.0) a.changed = iteration;
-        if (b.inverse_mass > 0.0) b.changed = iteration;
-      }
-      if (fastest > impact_change && iteration % scaled_every == 0) scale(island, rows, iteration);
-    }
-  }
-
-  // Scale what presses by the factor that leaves least energy, which all bounds allow. Iterations hardly
-  // stop a heavy body that falls on light ones, nor take back what stopped it in the sub-step before.
-  void scale(const Island& island, NormalRows Block::* rows, int iteration) const {
-    auto each = [&](const auto& visit) {
-      for (size_t k = island.block; k < island.block_end; ++k)
-        visit(blocks_[k], moving_[size_t(blocks_[k].a)], moving_[size_t(blocks_[k].b)]);
-    };
-    double with = 0.0, without = 0.0;  // power along all impulses [W s]
-    each([&](Block& block, Moving& a, Moving& b) {
-      const Vec<double>& x = block.normal_impulses;
-      with += dot(x, pressing_speeds(block, block.*rows, a, b) + (block.*rows).softness * x);
-    });
-    each([&](Block& block, Moving& a, Moving& b) {
-      apply_normal(block, -block.normal_impulses, a, b);
-    });
-    each([&](Block& block, Moving& a, Moving& b) {
-      without += dot(block.normal_impulses, pressing_speeds(block, block.*rows, a, b));
-    });
-    double factor = with > without ? std::max(0.0, without / (without - with)) : 1.0;
-    if (factor < least_factor && factor * least_factor > 1.0) factor = 1.0;
-    each([&](Block& block, Moving& a, Moving& b) {
-      block.normal_impulses = factor * block.normal_impulses;
-      apply_normal(block, block.normal_impulses, a, b);
-      if (a.inverse_mass > 0.0) a.changed = iteration;
-      if (b.inverse_mass > 0.0) b.changed = iteration;
-    });
-  }
-
   void relax(const Island& island, const SubSteps& steps) const {
     if (options_.relaxations == 0) return;
     for (size_t k = island.block; k < island.block_end; ++k) {
@@ -282,7 +215,7 @@ class IslandStep {
       follow(patches_[size_t(block.patch)], moving_[size_t(block.a)], moving_[size_t(block.b)],
              steps.length, block);
     }
-    solve(island, steps.rounds * options_.relaxations, &Block::relaxed);
+    iterate_(island, steps.rounds * options_.relaxations, &Block::relaxed);
   }
 
   void count_impulses(const Island& island) const {
@@ -349,6 +282,7 @@ class IslandStep {
   std::vector<Load>& loads_;
   std::vector<Moving>& moving_;
   std::vector<Block>& blocks_;
+  Iterations iterate_;
   std::vector<Fineness>& fineness_;  // of the bodies
   FinenessOf fineness_of_;
 };
