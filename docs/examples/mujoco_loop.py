@@ -5,8 +5,8 @@
 
 MuJoCo integrates the motion. Its own contact is off. Every 20 ms, a `SceneSolver` lists the pairs
 that may touch soon, as a contact node does, and its list comes 5 ms late. `PatchForces` solves the
-pairs at the poses of each physics step, and gives the wrench. The load lands on a corner, then on an
-edge, and rocks from edge to edge until 0.28 s.
+pairs at the poses of each physics step, and gives the wrench. The load lands on a corner, then on
+an edge, and rocks from edge to edge until 0.28 s.
 
 It prints:
 
