@@ -19,9 +19,9 @@ pytestmark = pytest.mark.usefixtures('signal_handlers')
 def test_signals_are_noted_and_raise_nothing(number):
     with processes.asked_to_end() as signals:
         assert signals == []
-        os.kill(os.getpid(), number)
+        signal.raise_signal(number)
         assert signals == [number]
-    os.kill(os.getpid(), number)  # once more, while the process ends
+    signal.raise_signal(number)  # once more, while the process ends
     assert signals == [number, number]
 
 
