@@ -237,8 +237,8 @@ def main(args: Sequence[str] | None = None) -> int:
     parser = output.report_parser(
         'scenes', __doc__, quick='few boxes and rounds, to try it out', out='scenes.md, scenes.csv')
     options = parser.parse_args(args)
-    folder, machine = output.results_folder(parser, options), output.machine(PACKAGES)
     require('report', 'sim')
+    folder, machine = output.results_folder(parser, options), output.machine(PACKAGES)
     rounds = QUICK_ROUNDS if options.quick else ROUNDS
     grown = grow(QUICK_GROWTH if options.quick else GROWTH, rounds)  # before MuJoCo takes memory
     compared = [

@@ -148,8 +148,8 @@ def main(args: Sequence[str] | None = None) -> int:
         'speed', __doc__, quick='few calls and rounds, to try it out', seed=1,
         out='speed.md, speed_cold.csv')
     options = parser.parse_args(args)
-    folder, machine = output.results_folder(parser, options), output.machine(PACKAGES)
     require('report')
+    folder, machine = output.results_folder(parser, options), output.machine(PACKAGES)
     calls, rounds, pairs, count = (
         (QUICK_COLD_CALLS, QUICK_ROUNDS, QUICK_BATCH, QUICK_STARTS) if options.quick
         else (COLD_CALLS, ROUNDS, BATCH, STARTS))
