@@ -85,8 +85,8 @@ class BroadPhase {
     is_settled_[size_t(box)] = 0;
   }
 
-  // Take over what `former` knows of fixed boxes, so that only others are read and sorted. kept:
-  // the index in `former` of each box that is of the same size and at the same pose there, or −1.
+  // Take over what `former` knows of fixed boxes, so that only others are read and sorted. kept: the index
+  // of each box in `former`; −1: it has another size or pose there, or is not there.
   void take_fixed(const BroadPhase& former, const int64_t* kept) {
     std::vector<int32_t> number_of(former.count(), -1);
     for (size_t box = 0; box < count(); ++box) {

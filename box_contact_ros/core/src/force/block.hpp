@@ -190,8 +190,8 @@ inline void prepare(const Patch& patch, const Moving& a, const Moving& b, const 
   soften(patch, step, a, b, block);
 }
 
-// Rows stay where they are while their bodies turn by no more than this [rad], and move on each other
-// by no more than this part of a patch; and masses as they are up to the other.
+// `still`: rows stay where they are while their bodies turn by no more than this [rad], and slide by no
+// more than this part of a patch. `alike`: the same for masses.
 constexpr double still = 0x1p-30, alike = 0x1p-10;
 
 // Let the rows go with bodies that have moved: impulses by the arms of before would change the angular

@@ -186,9 +186,9 @@ class IslandStep {
     moving.angular += h * (moving.inverse_inertia * vector(step_.outside[k].torque));
   }
 
-  // A body that no force moves has its velocity on the mean of a step, and changes it as it did lately: if
-  // the first sub-step had all of the change, friction would have to give it in so short a time. `part`: of
-  // the step, from its middle [1].
+  // Let the velocity of a body that no force moves change within the step, as it did lately. Its mean is
+  // what was given. Had the first sub-step all of the change, friction would have to give it in so short a
+  // time. `part`: of the step, from its middle [1].
   void carry(Moving& moving, double part) const {
     auto k = size_t(moving.body);
     const auto& [before, last] = ended_[k];

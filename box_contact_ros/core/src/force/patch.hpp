@@ -5,7 +5,9 @@
 // what it carried.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <utility>
 #include <vector>
 
@@ -131,5 +133,24 @@ struct Load {
     return load;
   }
 };
+
+// The order of patches and of loads.
+struct ByPair {
+  template <class P, class Q>
+  bool operator()(const P& p, const Q& q) const {
+    return p.pair() < q.pair();
+  }
+};
+// The patch of a pair among those that are by pair, or null.
+inline const Patch* find(const std::vector<Patch>& patches, const BoxPair& pair) {
+  auto before = [](const Patch& patch, const BoxPair& other) { return patch.pair() < other; };
+  auto found = std::lower_bound(patches.begin(), patches.end(), pair, before);
+  return found != patches.end() && found->pair() == pair ? &*found : nullptr;
+}
+
+template <class Numbers>
+bool have_same_bits(const Numbers& p, const Numbers& q) {
+  return std::memcmp(&p, &q, sizeof p) == 0;
+}
 
 }  // namespace box_contact::BOX_CONTACT_SET::force

@@ -34,8 +34,8 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// A pair is a constraint of a step while it is apart by no more than so many times what it would fall
-// in it [1]: g·dt² in the first step, as much again in the next.
+// A pair apart is a constraint of a step within so many times g·dt² [1]: what it falls in the first step,
+// and as much again in the next.
 constexpr double gap_share = 2.0;
 // A patch that pressed stays while its pair is apart by no more than this [m]: flush sides of goods come
 // and go by nanometres, and with them the friction that bore weight.
@@ -74,7 +74,7 @@ class PatchForces {
     if (!are_loads_known_) return;
     std::vector<Load> all(load_count());
     std::merge(loads_.begin(), loads_.end(), rest_.loads().begin(), rest_.loads().end(),
-               all.begin(), [](const Load& p, const Load& q) { return p.pair() < q.pair(); });
+               all.begin(), ByPair{});
     for (size_t k = 0; k < all.size(); ++k) loads[k] = all[k].mean();
     if (!boxes().empty()) share_on_faces(all, bodies_, boxes(), poses_, loads);
   }
@@ -86,7 +86,7 @@ class PatchForces {
   void set_bodies(std::vector<Body> bodies) {
     std::vector<uint8_t> is_changed(bodies_.size());
     for (size_t k = 0; k < bodies_.size(); ++k)
-      is_changed[k] = k >= bodies.size() || !is_same(bodies[k], bodies_[k]);
+      is_changed[k] = k >= bodies.size() || !have_same_bits(bodies[k], bodies_[k]);
     wake(is_changed);
     // What is let go, or gripped, has not ended an advance as what it is now.
     for (size_t k = 0; k < std::min(bodies.size(), bodies_.size()); ++k)
@@ -107,11 +107,12 @@ class PatchForces {
   void set_boxes(std::vector<bc_body_box> boxes) {
     auto is_kept = [&](int32_t box) {
       auto k = size_t(box);
-      return k < boxes.size() && k < this->boxes().size() && is_same(boxes[k], this->boxes()[k]);
+      return k < boxes.size() && k < this->boxes().size() &&
+             have_same_bits(boxes[k], this->boxes()[k]);
     };
     rest_.mark_if(
         [&](const Patch& patch) { return !is_kept(patch.box_a) || !is_kept(patch.box_b); });
-    if (rest_.is_any_marked()) wake();
+    wake();
     own_.set_boxes(std::move(boxes));
     drop([this](const Patch& patch) { return !is_of_boxes(patch); });
   }
@@ -157,9 +158,10 @@ class PatchForces {
     is_chosen_ = false;
     make_room(own_.count());
     rest_.mark_if([this](const Patch& patch) { return !own_.is_asked(patch); });
-    if (rest_.is_any_marked()) wake();
+    wake();
     if (own_.count() > 0) return Held::all;
-    wake_all();
+    rest_.mark_all();
+    wake();
     drop([](const Patch&) { return true; });
     return Held::all;
   }
@@ -251,7 +253,7 @@ class PatchForces {
              const bc_motion& motion) {
     if (!(motion.poses && motion.velocities)) rest_.mark_all();
     if (rest_.compare({poses, velocities, outside})) is_chosen_ = false;
-    if (rest_.is_any_marked()) wake();
+    wake();
   }
   bool is_as_laid(size_t body, const bc_pose* poses, const bc_velocity* velocities,
                   const bc_wrench* outside) const {
@@ -280,10 +282,8 @@ class PatchForces {
     return std::min(std::max(gap_share * dt * dt * pull, pressed_gap), length_max);
   }
   bool has_pressed(int32_t box_a, int32_t box_b) const {
-    BoxPair pair = std::minmax(box_a, box_b);
-    auto before = [](const Patch& patch, const BoxPair& pair) { return patch.pair() < pair; };
-    auto found = std::lower_bound(patches_.begin(), patches_.end(), pair, before);
-    return found != patches_.end() && found->pair() == pair && found->normal_impulse > 0.0;
+    const Patch* found = find(patches_, std::minmax(box_a, box_b));
+    return found && found->normal_impulse > 0.0;
   }
 
   void keep_rest() {
@@ -292,22 +292,16 @@ class PatchForces {
     kept_loads_ = loads_;
     is_rest_kept_ = true;
   }
+  // Wake the islands that are marked.
   void wake() {
+    if (!rest_.is_any_marked()) return;
     keep_rest();
     rest_.wake(bodies_, window_, clock_.since(), patches_, loads_);
     is_grouped_ = is_chosen_ = false;
   }
   void wake(const std::vector<uint8_t>& is_chosen) {  // bodies, and what touches them
     rest_.mark_those(is_chosen);
-    if (rest_.is_any_marked()) wake();
-  }
-  template <class Numbers>
-  static bool is_same(const Numbers& p, const Numbers& q) {
-    return std::memcmp(&p, &q, sizeof p) == 0;
-  }
-  void wake_all() {
-    rest_.mark_all();
-    if (rest_.is_any_marked()) wake();
+    wake();
   }
   // Islands that a new patch joins to what is awake wake up. Their patches are those of their poses.
   void wake_touched() {
@@ -320,31 +314,13 @@ class PatchForces {
     for (size_t k = found; k < next_.size(); ++k) next_[k].age = 0.0;
     wake();
   }
-  // Take from an answer what it says of patches at rest. Those of which it says something new wake.
+  // Take what an answer says of patches at rest. Those of which it says something new wake.
   void take_at_rest(double age, const bc_pose* asked) {
-    auto next = next_.begin();
-    auto wake_new = [&](const Patch& patch) {
-      if (patch.age >= 0.0 && !rest_.is_of_before(patch, age)) rest_.mark(patch);
-    };
-    for (Patch& patch : rest_.patches()) {
-      for (; next != next_.end() && next->pair() < patch.pair(); ++next) wake_new(*next);
-      bool is_there = next != next_.end() && next->pair() == patch.pair();
-      const Patch* told = is_there ? &*next++ : nullptr;
-      if ((told && told->age < 0.0) || rest_.is_of_before(patch, age)) continue;
-      if (!told || !rest_.is_told_again(patch, *told, asked)) {
-        rest_.mark(patch);
-        continue;
-      }
-      Patch before = patch;
-      patch = *told;
-      patch.keep(before);
-    }
-    std::for_each(next, next_.end(), wake_new);
-    if (rest_.is_any_marked()) wake();
-    auto rests = [this](const Patch& patch) {
-      return rest_.is_at_rest(size_t(patch.a)) || rest_.is_at_rest(size_t(patch.b));
-    };
-    next_.erase(std::remove_if(next_.begin(), next_.end(), rests), next_.end());
+    rest_.take(next_, age, asked);
+    wake();
+    next_.erase(std::remove_if(next_.begin(), next_.end(),
+                               [this](const Patch& patch) { return rest_.rests(patch); }),
+                next_.end());
   }
   // Bodies that come to rest end where they began.
   void lay_down() {
@@ -394,10 +370,9 @@ class PatchForces {
       if (!is_stale && !next_.back().has_area()) return Held::no_patch;
     }
     if (is_own) wake_touched();
-    auto before = [](const Patch& p, const Patch& q) { return p.pair() < q.pair(); };
     auto same = [](const Patch& p, const Patch& q) { return p.pair() == q.pair(); };
-    if (!std::is_sorted(next_.begin(), next_.end(), before))
-      std::sort(next_.begin(), next_.end(), before);
+    if (!std::is_sorted(next_.begin(), next_.end(), ByPair{}))
+      std::sort(next_.begin(), next_.end(), ByPair{});
     if (std::adjacent_find(next_.begin(), next_.end(), same) != next_.end())
       return Held::pair_twice;
     if (!is_own && rest_.is_any()) take_at_rest(answer.age, poses);

@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <cstring>
 #include <vector>
 
 #include "stillness.hpp"
@@ -55,43 +54,20 @@ class Rest {
   const std::vector<int32_t>& awake() const { return awake_; }
   const std::vector<int32_t>& fixed() const { return fixed_; }
   const std::vector<Patch>& patches() const { return patches_; }
-  std::vector<Patch>& patches() { return patches_; }
   const std::vector<Load>& loads() const { return loads_; }
   bool is_any() const { return !patches_.empty(); }
-  bool has(const BoxPair& pair) const {
-    auto before = [](const Patch& patch, const BoxPair& pair) { return patch.pair() < pair; };
-    auto found = std::lower_bound(patches_.begin(), patches_.end(), pair, before);
-    return found != patches_.end() && found->pair() == pair;
-  }
+  bool has(const BoxPair& pair) const { return find(patches_, pair) != nullptr; }
   bool is_at_rest(size_t body) const { return of_[body].island >= 0; }
   // Whether a body is where it was, and stays there.
   bool is_quiet(size_t body) const { return is_at_rest(body) || of_[body].is_fixed_still; }
-  // Whether an answer says of a patch at rest what was known. What was asked before it came to rest tells
-  // nothing; the first answer after that is of poses a little other than those of the patch.
-  bool is_told_again(const Patch& patch, const Patch& next, const bc_pose* asked) const {
-    auto same = [](const auto& p, const auto& q) { return std::memcmp(&p, &q, sizeof p) == 0; };
-    if (!same(of_[size_t(patch.a)].pose, asked[patch.a]) ||
-        !same(of_[size_t(patch.b)].pose, asked[patch.b]) || next.friction != patch.friction ||
-        next.stiffness != patch.stiffness || !same(next.surface, patch.surface))
-      return false;
-    if (same(next.asked_a, patch.asked_a) && same(next.asked_b, patch.asked_b))
-      return same(next.normal, patch.normal) && same(next.point, patch.point) &&
-             next.depth == patch.depth;
-    return std::fabs(next.depth - patch.depth) <= settled_gap;
-  }
-  // Whether a question, asked so long ago, is of the time before the bodies of a patch came to rest.
-  bool is_of_before(const Patch& patch, double age) const {
-    return now_ - age < std::max(of_[size_t(patch.a)].since, of_[size_t(patch.b)].since);
-  }
   // Whether all that is given of a body at rest is as it was when it was laid down, to the bit.
   bool is_as_laid(size_t k, const Given& given) const {
     const OfBody& of = of_[k];
     constexpr bc_velocity none{};
     constexpr bc_wrench no_wrench{};
-    return of.island >= 0 && std::memcmp(&of.pose, given.poses + k, sizeof of.pose) == 0 &&
-           std::memcmp(&none, given.velocities + k, sizeof none) == 0 &&
-           std::memcmp(&of.outside, given.outside ? given.outside + k : &no_wrench,
-                       sizeof of.outside) == 0;
+    return of.island >= 0 && have_same_bits(of.pose, given.poses[k]) &&
+           have_same_bits(none, given.velocities[k]) &&
+           have_same_bits(of.outside, given.outside ? given.outside[k] : no_wrench);
   }
 
   void make_room(size_t bodies, size_t patches) {
@@ -166,7 +142,7 @@ class Rest {
       const double* speeds = given.velocities[body].linear;
       bool is_still = are_within(speeds, 3, 0.0) &&
                       are_within(given.velocities[body].angular, 3, 0.0) &&
-                      std::memcmp(&of.pose, given.poses + body, sizeof of.pose) == 0;
+                      have_same_bits(of.pose, given.poses[body]);
       is_other |= is_still != of.is_fixed_still;
       of.is_fixed_still = is_still;
       is_bearing |= !is_still && of.bears;
@@ -176,6 +152,33 @@ class Rest {
         return !is_quiet(size_t(patch.a)) || !is_quiet(size_t(patch.b));
       });
     return is_other;
+  }
+
+  // Take what an answer, asked so long ago at poses, says of patches at rest: it goes from `next`, by pair.
+  // Islands of which it says something new are marked.
+  void take(std::vector<Patch>& next, double age, const bc_pose* asked) {
+    auto told = next.begin();
+    auto mark_new = [&](const Patch& patch) {
+      if (patch.age >= 0.0 && !is_of_before(patch, age)) mark(patch);
+    };
+    for (Patch& patch : patches_) {
+      for (; told != next.end() && told->pair() < patch.pair(); ++told) mark_new(*told);
+      bool is_told = told != next.end() && told->pair() == patch.pair();
+      const Patch* again = is_told ? &*told++ : nullptr;
+      if ((again && again->age < 0.0) || is_of_before(patch, age)) continue;
+      if (!again || !is_told_again(patch, *again, asked)) {
+        mark(patch);
+        continue;
+      }
+      Patch before = patch;
+      patch = *again;
+      patch.keep(before);
+    }
+    std::for_each(told, next.end(), mark_new);
+  }
+  // Whether a patch is of something at rest.
+  bool rests(const Patch& patch) const {
+    return is_at_rest(size_t(patch.a)) || is_at_rest(size_t(patch.b));
   }
 
   // Wake the islands that are marked: their patches and loads go to those that are awake. Impulses are
@@ -224,11 +227,9 @@ class Rest {
   // Lay down the bodies that came to rest, with their patches and loads.
   void lay_down(const std::vector<Body>& bodies, std::vector<Patch>& patches,
                 std::vector<Load>& loads) {
-    auto rests = [&](size_t k) {
-      return is_at_rest(size_t(patches[k].a)) || is_at_rest(size_t(patches[k].b));
-    };
-    hand_over(loads, loads_, rests);
-    hand_over(patches, patches_, rests);
+    auto goes = [&](size_t k) { return rests(patches[k]); };
+    hand_over(loads, loads_, goes);
+    hand_over(patches, patches_, goes);
     list(bodies);
   }
   // Write where bodies at rest end.
@@ -263,6 +264,24 @@ class Rest {
     double least = 0.0;      // the least square of its speed since then [m²/s²]
   };
 
+  // Whether an answer says of a patch at rest what was known. The first one is of poses a little other
+  // than those of the patch.
+  bool is_told_again(const Patch& patch, const Patch& next, const bc_pose* asked) const {
+    if (!have_same_bits(of_[size_t(patch.a)].pose, asked[patch.a]) ||
+        !have_same_bits(of_[size_t(patch.b)].pose, asked[patch.b]) ||
+        next.friction != patch.friction || next.stiffness != patch.stiffness ||
+        !have_same_bits(next.surface, patch.surface))
+      return false;
+    if (have_same_bits(next.asked_a, patch.asked_a) && have_same_bits(next.asked_b, patch.asked_b))
+      return have_same_bits(next.normal, patch.normal) && have_same_bits(next.point, patch.point) &&
+             next.depth == patch.depth;
+    return std::fabs(next.depth - patch.depth) <= settled_gap;
+  }
+  // Whether a question, asked so long ago, is of the time before the bodies of a patch came to rest: it
+  // tells nothing of them.
+  bool is_of_before(const Patch& patch, double age) const {
+    return now_ - age < std::max(of_[size_t(patch.a)].since, of_[size_t(patch.b)].since);
+  }
   double window_of(const Patch& patch) const {
     return std::max(of_[size_t(patch.a)].window, of_[size_t(patch.b)].window);
   }
