@@ -200,14 +200,16 @@ class TickWriter {
     return Py_BuildValue("(NNnN)", message_.message(), heads.release(), Py_ssize_t(touching),
                          stale.release());
   }
-  void write_names(const int64_t* pair, const TickScene::Pair* known) {
-    std::string_view a = utf8_of(scene_.name(pair[0])), b = utf8_of(scene_.name(pair[1]));
+  // What a pair is called.
+  void write_label(const int64_t* pair, const TickScene::Pair* known) {
     if (known && known->label)
       message_.text({utf8_of(known->label)});
     else
-      message_.text({a, "_", b});
-    message_.text({a});
-    message_.text({b});
+      message_.text({utf8_of(scene_.name(pair[0])), "_", utf8_of(scene_.name(pair[1]))});
+  }
+  void write_names(const int64_t* pair, const TickScene::Pair* known) {
+    write_label(pair, known);
+    for (int k = 0; k < 2; ++k) message_.text({utf8_of(scene_.name(pair[k]))});
   }
   // Point and normal of a pair have the newer stamp of its own poses.
   void append_heads(PyObject* heads, const TickScene::Pair& pair, const double* numbers) {
@@ -247,14 +249,10 @@ class TickWriter {
     message_.number(uint32_t(stale.size() / 2));
     for (size_t k = 0; k < stale.size(); k += 2) {
       const int64_t* pair = stale.data() + k;
-      const TickScene::Pair* known = pair[1] < 0 ? nullptr : scene_.find(pair);
-      std::string_view a = utf8_of(scene_.name(pair[0]));
       if (pair[1] < 0)
-        message_.text({a});
-      else if (known && known->label)
-        message_.text({utf8_of(known->label)});
+        message_.text({utf8_of(scene_.name(pair[0]))});
       else
-        message_.text({a, "_", utf8_of(scene_.name(pair[1]))});
+        write_label(pair, scene_.find(pair));
       PyList_SET_ITEM(rows.get(), Py_ssize_t(k / 2),
                       made(Py_BuildValue("(LL)", (long long)pair[0], (long long)pair[1])));
     }
