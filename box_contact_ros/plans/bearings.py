@@ -56,10 +56,10 @@ def on_corners(sizes: np.ndarray, poses: np.ndarray, carried_by: np.ndarray, nor
     point = patches.rectangle.copy()
     within = np.ones(point.shape[:2], bool)
     lower, upper = carried_by.T
-    for box in (lower, upper):
+    for box, has_castings_below in ((lower, False), (upper, True)):
         corner = _face_corners(sizes[box], poses[box], patches.centre, normal)
         inside = _inside(corner, patches, normal, slack)
-        if box is upper:
+        if has_castings_below:
             inside &= fixed[lower, None] | _on_castings(corner, sizes[lower], poses[lower], normal)
         rows = inside.any(axis=1)
         point[rows], within[rows] = corner[rows], inside[rows]

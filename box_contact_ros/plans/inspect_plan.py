@@ -38,9 +38,10 @@ def inspect_plan(plan: Plan, *, tolerance: float = TOLERANCE, friction: float = 
 
     tolerance: the gap up to which faces touch, and the depth up to which boxes do not overlap [m].
     friction: Coulomb's μ of all pairs.
-    acceleration: (3,) that the boxes feel, gravity included [m/s²]. On a lorry that brakes along +x
-    by 0.4 g it is (3.92, 0, −9.81).
-    bears: 'faces', or 'corners': a box stands on its corners alone, as a container does.
+    acceleration: (3,) that the boxes feel, gravity included [m/s²]: (3.92, 0, −9.81) on a lorry
+    that brakes along +x by 0.4 g.
+    bears: 'faces', or 'corners': a box stands on its corners alone, as a container does. They bear
+    on the ground, and on corner castings of the box below.
     sides: whether boxes beside each other carry by friction.
 
     Loads need the extra `plans`. A plan without masses does without it.
