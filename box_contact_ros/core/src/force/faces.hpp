@@ -100,9 +100,9 @@ struct Face {
 };
 
 // The face of a box most along a direction.
-inline Face face_along(const bc_pose& pose, const bc_size& size, const Vec<double>& origin,
+inline Face face_along(const Placed& box, const bc_size& size, const Vec<double>& origin,
                        const Vec<double>& direction) {
-  Mat<double> axes = rotation_matrix(pose.quaternion);
+  const Mat<double>& axes = box.axes;
   Vec<double> along = transposed_times(axes, direction);
   int k = 0;
   for (int other = 1; other < 3; ++other)
@@ -110,8 +110,8 @@ inline Face face_along(const bc_pose& pose, const bc_size& size, const Vec<doubl
   int next = (k + 1) % 3, last = (k + 2) % 3;
   Vec<double> outward = (along[k] < 0.0 ? -1.0 : 1.0) * column(axes, k);
   auto half = [&](int axis) { return 0.5 * size.extent[axis]; };
-  return {(vector(pose.position) - origin) + half(k) * outward, outward,
-          half(next) * column(axes, next), half(last) * column(axes, last)};
+  return {(box.position - origin) + half(k) * outward, outward, half(next) * column(axes, next),
+          half(last) * column(axes, last)};
 }
 
 // The patch of two faces. Its axes are along the edges of the smaller face; with the normal from A to B
@@ -152,8 +152,8 @@ inline FacePatch patch_of_faces(const bc_pose& pose_a, const bc_size& size_a, co
   FacePatch patch{};
   patch.origin = vector(pose_a.position);
   patch.normal = normal;
-  Face a = face_along(pose_a, size_a, patch.origin, normal);
-  Face b = face_along(pose_b, size_b, patch.origin, -normal);
+  Face a = face_along(box_at(pose_a), size_a, patch.origin, normal);
+  Face b = face_along(box_at(pose_b), size_b, patch.origin, -normal);
   const Vec<double>& edge = (b.area() < a.area() ? b : a).half_1;
   Vec<double> level = edge - dot(edge, normal) * normal;
   patch.axis_1 = (1.0 / length(level)) * level;

@@ -158,11 +158,11 @@ class OwnContacts {
     detail::PairNumbers pair{pose_a.position, pose_b.position, a.box.size.extent,
                              b.box.size.extent};
     if (!solve(pair, found) || !found.colliding) return;
+    Placed box_at_a = box_at(pose_a), box_at_b = box_at(pose_b);
     Patch placed = patch;
     placed.place(at_a, at_b, vector(found.normal), found.point, found.covariance[0], found.volume,
-                 found.separation,
-                 [&] { return rotation_matrix((is_lighter_b ? pose_b : pose_a).quaternion); });
-    placed.end_at_rim(pose_a, a.box.size, pose_b, b.box.size);
+                 found.separation, (is_lighter_b ? box_at_b : box_at_a).axes);
+    placed.end_at_rim(box_at_a, a.box.size, box_at_b, b.box.size);
     if (placed.has_area()) patch = placed;
   }
 

@@ -62,10 +62,10 @@ struct Patch {
     for (Vec<double>* impulse : {&friction_impulse, &rocking_impulse}) *impulse = factor * *impulse;
   }
 
-  // Take the geometry of a contact, whose boxes are where the bodies are. `box_axes()`: see rectangle_of.
-  template <class BoxAxes>
+  // Take the geometry of a contact, whose boxes are where the bodies are. box_axes: see rectangle_of.
   void place(const Placed& at_a, const Placed& at_b, const Vec<double>& from_a, const double* at,
-             const double* covariance, double volume, double separation, const BoxAxes& box_axes) {
+             const double* covariance, double volume, double separation,
+             const Mat<double>& box_axes) {
     asked_a = at_a;
     asked_b = at_b;
     normal = from_a;
@@ -77,10 +77,10 @@ struct Patch {
 
   // Nothing presses beyond the rim of a face. The rectangle of a wedge reaches there: a box would
   // tip late, and one whose middle is beyond an edge would stay.
-  void end_at_rim(const bc_pose& pose_a, const bc_size& size_a, const bc_pose& pose_b,
+  void end_at_rim(const Placed& box_at_a, const bc_size& size_a, const Placed& box_at_b,
                   const bc_size& size_b) {
-    for (const Face& face :
-         {face_along(pose_a, size_a, point, normal), face_along(pose_b, size_b, point, -normal)}) {
+    for (const Face& face : {face_along(box_at_a, size_a, point, normal),
+                             face_along(box_at_b, size_b, point, -normal)}) {
       shape.span_1 = shape.span_1.within(face.span_along(shape.axis_1));
       shape.span_2 = shape.span_2.within(face.span_along(shape.axis_2));
     }

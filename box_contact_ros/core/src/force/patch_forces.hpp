@@ -346,6 +346,8 @@ class PatchForces {
     kept_loads_.reserve(room_);
     for (Rest* rest : {&rest_, &kept_rest_}) rest->make_room(bodies_.size(), room_);
     islands_.make_room(bodies_.size(), room_);
+    bodies_at_.make_room(bodies_.size());
+    boxes_at_.make_room(size_t(box_count()));
   }
   bool moves(int32_t a, int32_t b) const {
     return bodies_[size_t(a)].is_free() || bodies_[size_t(b)].is_free();
@@ -361,12 +363,15 @@ class PatchForces {
 
   Held take(const bc_patches& answer, const bc_pose* poses, bool is_own) {
     next_.clear();
+    bodies_at_.forget(bodies_.size());
+    boxes_at_.forget(size_t(box_count()));
     for (int64_t k = 0; k < answer.count; ++k) {
       bool is_stale = answer.separation[k] != answer.separation[k];
       if (!is_stale && !(answer.volume[k] > 0.0)) continue;
       const int64_t* boxes = answer.pairs + 2 * k;
       if (!moves(int32_t(body_of(boxes[0])), int32_t(body_of(boxes[1])))) continue;
-      next_.push_back(read(answer, k, is_stale, poses));
+      next_.push_back({});
+      read(answer, k, is_stale, poses, next_.back());
       if (!is_stale && !next_.back().has_area()) return Held::no_patch;
     }
     if (is_own) wake_touched();
@@ -383,40 +388,38 @@ class PatchForces {
     return Held::all;
   }
 
-  Patch read(const bc_patches& answer, int64_t k, bool is_stale, const bc_pose* poses) const {
+  void read(const bc_patches& answer, int64_t k, bool is_stale, const bc_pose* poses,
+            Patch& patch) {
     auto a = int32_t(answer.pairs[2 * k]), b = int32_t(answer.pairs[2 * k + 1]);
     double sign = a < b ? 1.0 : -1.0;
-    Patch patch{};
     patch.box_a = std::min(a, b);
     patch.box_b = std::max(a, b);
     patch.a = int32_t(body_of(patch.box_a));
     patch.b = int32_t(body_of(patch.box_b));
     patch.age = is_stale ? -1.0 : 0.0;
-    if (is_stale) return patch;
-    patch.place(placed_at(poses[patch.a], bodies_[size_t(patch.a)].centre),
-                placed_at(poses[patch.b], bodies_[size_t(patch.b)].centre),
+    if (is_stale) return;
+    const Placed &box_at_a = box_placed(patch.box_a, poses[patch.a]),
+                 &box_at_b = box_placed(patch.box_b, poses[patch.b]);
+    patch.place(body_placed(patch.a, poses), body_placed(patch.b, poses),
                 sign * vector_at(answer.normal + 3 * k), answer.point + 3 * k,
-                answer.covariance + 9 * k, answer.volume[k], answer.separation[k], [&] {
-                  bool is_b = is_lighter_b(bodies_, patch);
-                  return axes_of(is_b ? patch.box_b : patch.box_a, poses[is_b ? patch.b : patch.a]);
-                });
-    if (!boxes().empty()) {
-      const bc_body_box &of_a = boxes()[size_t(patch.box_a)], &of_b = boxes()[size_t(patch.box_b)];
-      patch.end_at_rim(in_common_frame(poses[patch.a], of_a.box.pose), of_a.box.size,
-                       in_common_frame(poses[patch.b], of_b.box.pose), of_b.box.size);
-    }
+                answer.covariance + 9 * k, answer.volume[k], answer.separation[k],
+                (is_lighter_b(bodies_, patch) ? box_at_b : box_at_a).axes);
+    if (!boxes().empty())
+      patch.end_at_rim(box_at_a, boxes()[size_t(patch.box_a)].box.size, box_at_b,
+                       boxes()[size_t(patch.box_b)].box.size);
     patch.friction = answer.friction ? answer.friction[k] : options_.friction;
     patch.stiffness = answer.stiffness ? answer.stiffness[k] : 0.0;
     if (answer.surface) patch.surface = sign * vector_at(answer.surface + 3 * k);
     patch.late = answer.age;
-    return patch;
   }
-
-  // The axes of a box, with its body at `body`.
-  Mat<double> axes_of(int32_t box, const bc_pose& body) const {
-    bool is_body = boxes().empty();
-    return rotation_matrix(
-        (is_body ? body : in_common_frame(body, boxes()[size_t(box)].box.pose)).quaternion);
+  const Placed& body_placed(int32_t body, const bc_pose* poses) {
+    return bodies_at_.of(size_t(body),
+                         [&] { return placed_at(poses[body], bodies_[size_t(body)].centre); });
+  }
+  const Placed& box_placed(int32_t box, const bc_pose& body) {
+    return boxes_at_.of(size_t(box), [&] {
+      return box_at(boxes().empty() ? body : in_common_frame(body, boxes()[size_t(box)].box.pose));
+    });
   }
 
   // Hand on the impulses of the patches before, and keep the patches of stale pairs.
@@ -428,9 +431,12 @@ class PatchForces {
       bool is_known = old != patches_.end() && old->pair() == patch.pair();
       bool is_stale = patch.age < 0.0;
       if (is_stale && !is_known) continue;
-      Patch next = is_stale ? *old : patch;
-      if (is_known) next.keep(*old);
-      *kept++ = next;
+      if (is_stale)
+        *kept = *old;
+      else if (&*kept != &patch)
+        *kept = patch;
+      if (is_known) kept->keep(*old);
+      ++kept;
     }
     next_.erase(kept, next_.end());
   }
@@ -464,6 +470,7 @@ class PatchForces {
   Rest rest_;            // patches and loads of what rests are there
   double window_ = 0.0;  // of the last advance [s]
   // Memory that calls use again.
+  PlacedOnce bodies_at_, boxes_at_;  // in the answer that is taken
   Islands islands_;
   std::vector<Patch> kept_patches_;  // for an advance that fails
   Clock kept_clock_;

@@ -80,10 +80,9 @@ inline Vec<double> edge_in_plane(const Vec<double>& normal, const Mat<double>& a
   return (1.0 / length(edge)) * edge;
 }
 
-// `box_axes()` are those of the box whose sides a square has: all directions have its covariance.
-template <class BoxAxes>
-Rectangle rectangle_of(const Vec<double>& normal, const double* covariance,
-                       const BoxAxes& box_axes) {
+// box_axes: those of the box whose sides a square has, as all directions have its covariance.
+inline Rectangle rectangle_of(const Vec<double>& normal, const double* covariance,
+                              const Mat<double>& box_axes) {
   Vec<double> u, v;
   tangents(normal, u, v);
   auto moment = [&](const Vec<double>& p, const Vec<double>& q) {
@@ -100,7 +99,7 @@ Rectangle rectangle_of(const Vec<double>& normal, const double* covariance,
   Vec<double> axis_1 =
       off < 0.0 ? lesser * u + (along_v * larger) * v : larger * u + (along_v * lesser) * v;
   if (spread < square_slack * mean) {
-    axis_1 = edge_in_plane(normal, box_axes());
+    axis_1 = edge_in_plane(normal, box_axes);
     spread = moment(axis_1, axis_1) - mean;
   }
   double e1 = std::max(0.0, mean + spread);

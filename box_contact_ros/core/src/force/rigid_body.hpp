@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
 #include "../../include/box_contact/force.h"
 #include "../poses.hpp"
@@ -86,6 +87,33 @@ inline Placed placed_at(const bc_pose& pose, const Vec<double>& centre) {
   Mat<double> axes = rotation_matrix(pose.quaternion);
   return {vector(pose.position) + axes * centre, axes};
 }
+// The same of a box, about its own centre.
+inline Placed box_at(const bc_pose& pose) {
+  return {vector(pose.position), rotation_matrix(pose.quaternion)};
+}
+
+// Where bodies or boxes are: each is found once, when it is asked for.
+class PlacedOnce {
+ public:
+  void make_room(size_t count) {
+    placed_.reserve(count);
+    is_known_.reserve(count);
+  }
+  void forget(size_t count) {
+    placed_.resize(count);
+    is_known_.assign(count, 0);
+  }
+  template <class Find>
+  const Placed& of(size_t k, const Find& find) {
+    if (!is_known_[k]) placed_[k] = find();
+    is_known_[k] = 1;
+    return placed_[k];
+  }
+
+ private:
+  std::vector<Placed> placed_;
+  std::vector<uint8_t> is_known_;
+};
 
 // Turn a quaternion x y z w by an angular velocity ω, in the common frame, for a time h. Its tan(θ/4) is
 // t + t³/3 with t = h·ω/4, so the angle is short of h·ω by (h·ω)⁵/1920.
