@@ -95,11 +95,14 @@ def package_config(name: str, *options: str) -> str | None:
 
 
 def package_flags(name: str) -> list[str] | None:
-    """Return a library's flags for the compiler and the linker; None where it is not installed."""
+    """Return a library's flags for the compiler and the linker; None where it is not installed.
+
+    The standard is ours: FCL's flags name C++11, which MuJoCo's headers refuse.
+    """
     answer = package_config(name, '--cflags', '--libs')
     if answer is None:
         return None
-    flags = shlex.split(answer)
+    flags = [flag for flag in shlex.split(answer) if not flag.startswith('-std=')]
     return flags + [f'-Wl,-rpath,{flag[2:]}' for flag in flags if flag.startswith('-L')]
 
 

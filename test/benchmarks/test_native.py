@@ -161,11 +161,11 @@ def test_quick_run(tmp_path: Path, program: tuple[Path, list[str]],
 
 @pytest.mark.skipif(shutil.which('pkg-config') is None, reason='no pkg-config')
 def test_flags_of_a_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The library is found when the program starts; without pkg-config there is none."""
+    """The library is found when the program starts; its standard is not taken over."""
     monkeypatch.setenv('PKG_CONFIG_PATH', str(tmp_path))
     assert native.package_flags('planted') is None
     (tmp_path / 'planted.pc').write_text('Name: planted\nDescription: none\nVersion: 7.1\n'
-                                         'Cflags: -I/p/include\nLibs: -L/p/lib -lplanted\n')
+                                         'Cflags: -std=c++11 -I/p/include\nLibs: -L/p/lib -lplanted\n')
     assert native.package_flags('planted') == [
         '-I/p/include', '-L/p/lib', '-lplanted', '-Wl,-rpath,/p/lib']
     monkeypatch.setenv('PATH', str(tmp_path))
