@@ -72,15 +72,19 @@ def compiled(folder: Path) -> tuple[Path, list[str]]:
     mujoco = Path(spec.origin).parent
     options = {name: native.package_flags(name) for name in OPTIONAL}
     rivals = {name: flags for name, flags in options.items() if flags is not None}
-    flags = [flag for name, more in rivals.items() for flag in (f'-DWITH_{name.upper()}', *more)]
+    compiler = [os.environ.get('CXX', 'g++'), '-std=c++17', '-Wall', '-Wextra', '-O2',
+                f'-I{Path(sys.prefix, "include")}', '-Wl,--disable-new-dtags']
+    linked = [name for name in rivals if name != 'fcl']
+    if 'fcl' in rivals:
+        native.run_compiler([*compiler, '-fPIC', '-shared', str(CALLS_FOLDER / 'fcl.cpp'),
+                             '-o', str(folder / 'libfcl_calls.so'), *rivals['fcl']])
     native.run_compiler([
-        os.environ.get('CXX', 'g++'), '-std=c++17', '-Wall', '-Wextra', '-O2',
-        f'-I{Path(sys.prefix, "include")}', f'-I{mujoco / "include"}', '-Wl,--disable-new-dtags',
+        *compiler, f'-I{mujoco / "include"}', *(f'-DWITH_{name.upper()}' for name in rivals),
         str(native.CALLS_FOLDER / 'contestants.cpp'),
-        *[str(CALLS_FOLDER / f'{name}.cpp') for name in ('main', 'ours', 'mujoco', *rivals)],
+        *[str(CALLS_FOLDER / f'{name}.cpp') for name in ('main', 'ours', 'mujoco', *linked)],
         '-o', str(folder / 'distance'), shutil.copy(native.LIBRARY, folder),
         str(next(mujoco.glob('libmujoco.so*'))), '-Wl,-rpath,$ORIGIN', f'-Wl,-rpath,{mujoco}',
-        *flags])
+        *(flag for name in linked for flag in rivals[name]), '-ldl', '-rdynamic'])
     return folder / 'distance', [name for name in OPTIONAL if name not in rivals]
 
 

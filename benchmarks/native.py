@@ -149,9 +149,10 @@ def compiled(folder: Path, sets: Sequence[str]) -> tuple[Path, list[str]]:
 
 
 def copied(program: Path, folder: Path) -> Path:
-    """Return a copy of the program in a new folder, with a library of its own beside it."""
+    """Return a copy of the program in a new folder, with libraries of its own beside it."""
     folder.mkdir()
-    shutil.copy(program.with_name(LIBRARY.name), folder)
+    for library in program.parent.glob('lib*.so'):
+        shutil.copy(library, folder)
     return Path(shutil.copy(program, folder))
 
 

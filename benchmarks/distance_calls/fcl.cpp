@@ -1,7 +1,8 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// FCL through its C++ interface: the distance of two boxes by libccd, with nearest points.
+// FCL through its C++ interface: the distance of two boxes by libccd, with nearest points. The program loads
+// this file as a library.
 #include <fcl/geometry/shape/box.h>
 #include <fcl/narrowphase/distance.h>
 
@@ -35,7 +36,7 @@ struct Query {
 
 }  // namespace
 
-void add_fcl(const Poses& poses, size_t calls, Contestants& all) {
+extern "C" void add_fcl(const Poses& poses, size_t calls, Contestants& all) {
   Query& q = *new Query(poses);
   auto distance = [&q](size_t i) {
     // call: FCL distance

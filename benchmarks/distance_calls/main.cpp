@@ -4,6 +4,8 @@
 // Times of distances by libbox_contact and by other engines, C++ against C++, in turn, in one process.
 //
 // distance POSES ROUNDS CALLS ANSWERS: prints the instruction set, and what `compare` prints.
+#include <dlfcn.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -11,7 +13,13 @@
 #include "../native_calls/contestants.hpp"
 
 #ifdef WITH_FCL
-void add_fcl(const Poses& poses, size_t calls, Contestants& all);
+// FCL and Coal bring other versions of Eigen and OctoMap: with one linker, Coal frees what FCL has made.
+void add_fcl(const Poses& poses, size_t calls, Contestants& all) {
+  void* library = dlopen("libfcl_calls.so", RTLD_NOW | RTLD_LOCAL | RTLD_DEEPBIND);
+  void* add = library ? dlsym(library, "add_fcl") : nullptr;
+  if (!add) fail(dlerror());
+  reinterpret_cast<decltype(&add_fcl)>(add)(poses, calls, all);
+}
 #endif
 
 int main(int count, char** arguments) {
