@@ -44,17 +44,24 @@ struct Polygon {
     if (count < corners_max) corners[size_t(count++)] = corner;
   }
 
-  // What is left of it where `value`, which is linear, is at most 0.
+  // Cut off where `value`, which is linear, is above 0.
   template <class Value>
-  Polygon where_not_above_zero(Value value) const {
+  void cut(Value value) {
+    std::array<double, corners_max> values;
+    bool is_whole = true;
+    for (int k = 0; k < count; ++k) {
+      values[size_t(k)] = value((*this)[k]);
+      is_whole = is_whole && values[size_t(k)] <= 0.0;
+    }
+    if (is_whole) return;
     Polygon left;
     for (int k = 0; k < count; ++k) {
       const Point &here = (*this)[k], &next = after(k);
-      double v = value(here), w = value(next);
+      double v = values[size_t(k)], w = values[size_t(k + 1 < count ? k + 1 : 0)];
       if (v <= 0.0) left.add(here);
       if ((v <= 0.0) != (w <= 0.0)) left.add(here + (v / (v - w)) * (next - here));
     }
-    return left;
+    *this = left;
   }
 };
 
@@ -121,8 +128,8 @@ struct FacePatch {
   Point slope;                                 // height of the patch above the origin, along the
   double height;                               // normal: height + slope · place
   Polygon polygon;                             // along the axes, from the origin [m]
-  double area;                                 // across the normal [m²]
-  Point centroid;
+  double area = 0.0;                           // across the normal [m²]
+  Point centroid = {0.0, 0.0};
 
   Point flat(const Vec<double>& v) const { return {dot(v, axis_1), dot(v, axis_2)}; }
   Vec<double> in_common_frame(const Point& at) const {
@@ -149,7 +156,7 @@ struct FacePatch {
 inline FacePatch patch_of_faces(const bc_pose& pose_a, const bc_size& size_a, const bc_pose& pose_b,
                                 const bc_size& size_b, const Vec<double>& normal,
                                 double tolerance) {
-  FacePatch patch{};
+  FacePatch patch;
   patch.origin = vector(pose_a.position);
   patch.normal = normal;
   Face a = face_along(box_at(pose_a), size_a, patch.origin, normal);
@@ -169,8 +176,7 @@ inline FacePatch patch_of_faces(const bc_pose& pose_a, const bc_size& size_a, co
     Point side = {-across.y, across.x};
     double reach = std::fabs(dot(side, along));
     for (double sign : {1.0, -1.0})
-      patch.polygon = patch.polygon.where_not_above_zero(
-          [&](const Point& at) { return sign * dot(side, at - middle) - reach; });
+      patch.polygon.cut([&](const Point& at) { return sign * dot(side, at - middle) - reach; });
   }
 
   // Heights of both planes along the normal.
@@ -182,8 +188,7 @@ inline FacePatch patch_of_faces(const bc_pose& pose_a, const bc_size& size_a, co
   auto [slope_b, height_b] = plane(b);
   Point slope = slope_b - slope_a;
   double gap = height_b - height_a;
-  patch.polygon = patch.polygon.where_not_above_zero(
-      [&](const Point& at) { return gap + dot(slope, at) - tolerance; });
+  patch.polygon.cut([&](const Point& at) { return gap + dot(slope, at) - tolerance; });
   patch.slope = 0.5 * (slope_a + slope_b);
   patch.height = 0.5 * (height_a + height_b);
   if (patch.polygon.count == 0) return patch;
@@ -214,7 +219,9 @@ struct Pressure {
   double operator()(const Point& from_centre) const { return a + dot(g, from_centre); }
   // What presses of a bed.
   Polygon under(const Polygon& bed, const Point& at) const {
-    return bed.where_not_above_zero([&](const Point& place) { return -(*this)(place - at); });
+    Polygon left = bed;
+    left.cut([&](const Point& place) { return -(*this)(place - at); });
+    return left;
   }
 };
 
