@@ -195,11 +195,9 @@ def linear_mlp() -> native.Mlp:
 
 def other_networks() -> list[Contestant]:
     """Return `mlp` by other sizes, linear and idle, and `paper` by weights for other scenes."""
-    place = WEIGHTS / 'paper-12.192x2.438x2.591-place.safetensors'
     return [*(ours('mlp', weights=str(path), name=name) for name, path in MLP_SIZES.items()),
             ours(linear_mlp(), name='mlp, linear'),
             ours(idle_mlp(), name='mlp, idle'),
-            ours('paper', weights=str(place), name='paper-place'),
             ours('paper', weights=str(AT_REST), name='paper-at-rest')]
 
 

@@ -58,7 +58,7 @@ if TYPE_CHECKING:
 
 TIMED_SETS = {**SETS, 'just apart': apart, 'landings': landings, 'settled': settled.at_rest,
               'settled cubes': settled.cubes_at_rest}
-IN_SHORT = ('exact', 'mlp', 'paper', 'paper-place', 'paper-at-rest', 'soup-1', 'soup-8', 'soup-22')
+IN_SHORT = ('exact', 'mlp', 'paper', 'paper-at-rest', 'soup-1', 'soup-8', 'soup-22')
 """Models in the short table; other sizes of `mlp` are in that of `traded`."""
 QUICK_MODELS = ('exact', 'mlp', 'paper', 'soup-1', 'soup-8')
 ODD_NORMAL = 10.0  # error of an engine's normal that is explained [deg]

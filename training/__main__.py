@@ -67,8 +67,6 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
                         f'{recipe.HIDDEN[1]}), named in the file')
     parser.add_argument('--scene', choices=paper.SCENES,
                         help='pose set that paper is trained for; one of cubes needs --out')
-    parser.add_argument('--output', choices=tuple(paper.SETTINGS), default=paper.ANGLES,
-                        help='of paper --scene: four angles, or x, y and z of the point')
     parser.add_argument('--out', type=Path, metavar='DIR',
                         help='folder to write to (default: weights/, benchmarks/ for what reports '
                         'alone need, and quick-results/ with --quick)')
@@ -122,8 +120,8 @@ def _train_mlp(options: argparse.Namespace, hidden: tuple[int, int] | None = Non
 def _train_scene(options: argparse.Namespace) -> None:
     quick = {'counts': QUICK_COUNTS, 'networks': QUICK_STARTS, 'epochs': QUICK_EPOCHS}
     try:
-        card = paper.train(options.out or jobs.SHIPPED, options.scene, options.output,
-                           seed=options.seed, commit=_commit(), **(quick if options.quick else {}))
+        card = paper.train(options.out or jobs.SHIPPED, options.scene, seed=options.seed,
+                           commit=_commit(), **(quick if options.quick else {}))
     except ValueError as error:
         sys.exit(f'error: {error}')
     print(f'{card["name"]}.safetensors: point {card["metrics"]} [% of the longest edge]')

@@ -5,8 +5,7 @@
 
 The paper draws boxes that just touch, at any angle to ±90°. A scene asks for other pairs. Here the
 8,000 patterns are contacts of the scene, folded by the symmetries as model `paper` folds them
-(benchmarks/paper/numpy_model.py). The outputs are the paper's four angles, or x, y and z of the
-impact point.
+(benchmarks/paper/numpy_model.py).
 """
 from __future__ import annotations
 
@@ -42,15 +41,11 @@ def cubes_nearly_settled(rng: np.random.Generator, n: int) -> Pairs:
 
 
 SCENES: dict[str, Generator] = {**POSE_SETS, **LOADS, 'cubes at rest': cubes_nearly_settled}
-ANGLES, PLACE = 'angles', 'place'
-"""Outputs: the paper's four angles, or x, y and z of the impact point."""
-SETTINGS = {ANGLES: PaperSettings((6, 20, 18, 4), networks=16, epochs=500, rate=0.1, initial=0.7),
-            PLACE: PaperSettings((6, 20, 18, 3), networks=16, epochs=500, rate=0.1, initial=0.7,
-                                 wrap=False)}
+SETTINGS = PaperSettings((6, 20, 18, 4), networks=16, epochs=500, rate=0.1, initial=0.7)
 METRIC_PAIRS = 20_000
 
 
-def scene_patterns(pairs: Pairs, output: str) -> Patterns:
+def scene_patterns(pairs: Pairs) -> Patterns:
     """Return the patterns of pairs of two equal boxes, as model `paper` asks for them."""
     exact = pairs.contacts()
     first, touch = touching_pairs(pairs.pose_a, pairs.pose_b, exact)
@@ -62,13 +57,11 @@ def scene_patterns(pairs: Pairs, output: str) -> Patterns:
     m, n = octant_signs(touch.offset, touch.rotation)
     inputs = network_inputs(m * touch.offset / unit,
                             m[:, :, None] * touch.rotation * n[:, None])
-    if output == PLACE:
-        return Patterns(inputs, m * point / (0.5 * pairs.size_a.max(axis=1, keepdims=True)))
     return Patterns(inputs, np.concatenate(
         [spherical(m * point), spherical(m * touch.normal)], axis=1))
 
 
-def train(folder: Path, scene: str, output: str, *, seed: int, commit: str,
+def train(folder: Path, scene: str, *, seed: int, commit: str,
           counts: tuple[int, ...] = PAPER_COUNTS, networks: int = 0, epochs: int = 0,
           ) -> dict[str, Any]:
     """Train the network for a scene of two equal boxes, and write it; return its model card.
@@ -76,9 +69,8 @@ def train(folder: Path, scene: str, output: str, *, seed: int, commit: str,
     networks, epochs: instead of those of `SETTINGS`. Raises ValueError for a scene of other boxes,
     and where the file would replace the paper's own network.
     """
-    settings = SETTINGS[output]
-    settings = replace(settings, networks=networks or settings.networks,
-                       epochs=epochs or settings.epochs, seed=seed)
+    settings = replace(SETTINGS, networks=networks or SETTINGS.networks,
+                       epochs=epochs or SETTINGS.epochs, seed=seed)
     streams = [drawn(SCENES[scene], np.random.default_rng([seed, number]), count)
                for number, count in enumerate(counts)]
     sizes = np.concatenate([pairs.size_a for pairs in streams]
@@ -87,20 +79,19 @@ def train(folder: Path, scene: str, output: str, *, seed: int, commit: str,
         raise ValueError(f'scene {scene!r} has boxes of several sizes; the network is for two '
                          'equal ones')
     size = '' if is_cube(sizes[0]) else '-' + 'x'.join(f'{extent:g}' for extent in sizes[0])
-    ending = '' if output == ANGLES else f'-{output}'
-    path = folder / f'paper{size}{ending}.safetensors'
+    path = folder / f'paper{size}.safetensors'
     if path == SHIPPED / 'paper.safetensors':
         raise ValueError(f'scene {scene!r} has cubes, but {path} is for the poses of the paper: '
                          'name another folder by --out')
-    sets = dict(zip(SETS, (scene_patterns(pairs, output) for pairs in streams)))
+    sets = dict(zip(SETS, (scene_patterns(pairs) for pairs in streams)))
     fitted = fit(sets['training'], sets['cross-validation'], settings,
-                 progress=f'{scene}, {output}')
+                 progress=scene)
     card: dict[str, Any] = {
         'name': path.stem, 'model': 'paper', 'architecture': {'contact': list(settings.widths)},
         'sizes': [sizes[0].tolist()] * 2, 'seed': seed, 'commit': commit, 'metrics': {},
         'data': {'scene': scene, 'recipe': SCENES[scene].__doc__,
                  'counts': dict(zip(SETS, counts))},
-        'inputs': {'names': INPUTS}, 'outputs': OUTPUTS if output == ANGLES else ('x', 'y', 'z'),
+        'inputs': {'names': INPUTS}, 'outputs': OUTPUTS,
         'training': {'algorithm': 'backpropagation with momentum, stopped by cross-validation',
                      'starts': settings.networks, 'epochs': settings.epochs,
                      'rate': settings.rate, 'momentum': settings.momentum}}

@@ -19,7 +19,7 @@ from box_contact_ros.models.weights_file import Network, Weights
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.pose import rotation_matrix
 
-INPUTS, OUTPUTS, PLACE = 6, 4, 3
+INPUTS, OUTPUTS = 6, 4
 """Of a network: see `box_contact_ros.models.networks.KINDS`."""
 
 
@@ -101,11 +101,8 @@ class NumpyPaper:
 
     def __init__(self, weights: Weights, size: np.ndarray | None = None) -> None:
         """Size: full extents (3,) [m] of both boxes that the weights are for; None: cubes."""
-        contact = weights.networks.get('contact')
-        self._places = contact is not None and contact.widths[-1] == PLACE
-        self._networks = {
-            name: weights.network(name, INPUTS, [PLACE if self._places else outputs], self.name)
-            for name, outputs in self.networks.items()}
+        self._networks = {name: weights.network(name, INPUTS, outputs, self.name)
+                          for name, outputs in self.networks.items()}
         self._cubes = size is None or is_cube(size)
         self._exact = native.Exact()
 
@@ -119,15 +116,11 @@ class NumpyPaper:
     def answer(self, pairs: TouchingPairs) -> tuple[np.ndarray, np.ndarray]:
         """Return directions (n, 3) to the impact point and of the normal, first box's frame.
 
-        Where the network gives x y z, the first is the point itself, in half of the longest edge.
         Models with other networks replace this.
         """
         m, n = octant_signs(pairs.offset, pairs.rotation)
         inputs = network_inputs(m * pairs.offset, m[:, :, None] * pairs.rotation * n[:, None])
-        outputs = forward(self._networks['contact'], inputs)
-        if self._places:
-            return m * outputs.astype(np.float64), pairs.normal
-        point, normal = directions(outputs)
+        point, normal = directions(forward(self._networks['contact'], inputs))
         return m * point, m * normal
 
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
@@ -153,10 +146,7 @@ class NumpyPaper:
         way, normal = self.answer(pairs)
         # The ray leaves the first box at the impact point. Its surface lies half the depth beyond
         # the middle of the overlap.
-        if self._places:
-            point = way * half.max(axis=1, keepdims=True)
-        else:
-            point = way / np.max(np.abs(way) / half, axis=1, keepdims=True)
+        point = way / np.max(np.abs(way) / half, axis=1, keepdims=True)
         point += 0.5 * exact.separation[:, None] * pairs.normal
         axes = rotation_matrix(first[:, 3:])
         from_a = np.where(pairs.first_is_b[:, None], -normal, normal)

@@ -24,18 +24,18 @@ class Kind(NamedTuple):
 
     network: str  # its name in a weights file
     inputs: int
-    outputs: tuple[int, ...]  # one of these
+    outputs: int
     activation: str  # of the hidden units
 
 
 MLP, PAPER = 'mlp', 'paper'
-KINDS = {MLP: Kind('patch', FEATURES, (OUTPUTS,), 'relu'),
-         PAPER: Kind('contact', 6, (4, 3), 'tanh')}
+KINDS = {MLP: Kind('patch', FEATURES, OUTPUTS, 'relu'),
+         PAPER: Kind('contact', 6, 4, 'tanh')}
 """Networks by model.
 
 `mlp` reads what the boxes cut off the patch box, and gives the overlap there. `paper` reads t_x t_y
-t_z roll pitch yaw. It gives azimuth and elevation of the point and of the normal, or x y z of the
-point. They are seen from the first box's centre. Lengths are in halves of the longest edge.
+t_z roll pitch yaw. It gives azimuth and elevation of the point and of the normal, seen from the
+first box's centre. Lengths are in halves of the longest edge.
 """
 GROUP, INPUTS_TOGETHER = 8, 4
 """Units, and inputs, that the core reads together."""

@@ -16,7 +16,6 @@ from __future__ import annotations
 import json
 import os
 from collections import defaultdict
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -57,16 +56,16 @@ class Weights:
     networks: dict[str, Network]
     card: dict[str, Any]
 
-    def network(self, name: str, inputs: int, outputs: Sequence[int], model: str) -> Network:
-        """Return a network for a model, with one of the numbers of outputs.
+    def network(self, name: str, inputs: int, outputs: int, model: str) -> Network:
+        """Return a network for a model.
 
         Raises `WeightsError` if the file has no such shape.
         """
         network = self.networks.get(name)
-        if network is None or network.widths[0] != inputs or network.widths[-1] not in outputs:
+        if network is None or network.widths[0] != inputs or network.widths[-1] != outputs:
             raise WeightsError(
                 f'weights file {short_repr(str(self.path))} has no network {name!r} with {inputs} '
-                f'inputs and {" or ".join(map(str, outputs))} outputs, which model {model!r} needs')
+                f'inputs and {outputs} outputs, which model {model!r} needs')
         return network
 
 

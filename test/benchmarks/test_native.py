@@ -164,8 +164,9 @@ def test_flags_of_a_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     """The library is found when the program starts; its standard is not taken over."""
     monkeypatch.setenv('PKG_CONFIG_PATH', str(tmp_path))
     assert native.package_flags('planted') is None
-    (tmp_path / 'planted.pc').write_text('Name: planted\nDescription: none\nVersion: 7.1\n'
-                                         'Cflags: -std=c++11 -I/p/include\nLibs: -L/p/lib -lplanted\n')
+    (tmp_path / 'planted.pc').write_text(
+        'Name: planted\nDescription: none\nVersion: 7.1\n'
+        'Cflags: -std=c++11 -I/p/include\nLibs: -L/p/lib -lplanted\n')
     assert native.package_flags('planted') == [
         '-I/p/include', '-L/p/lib', '-lplanted', '-Wl,-rpath,/p/lib']
     monkeypatch.setenv('PATH', str(tmp_path))

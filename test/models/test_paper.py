@@ -39,8 +39,7 @@ def test_error_on_touching_boxes():
     assert np.array_equal(found.separation, truth.separation)
 
 
-@pytest.mark.parametrize('file', ['paper', 'paper-12.192x2.438x2.591',
-                                  'paper-12.192x2.438x2.591-place'])
+@pytest.mark.parametrize('file', ['paper', 'paper-12.192x2.438x2.591'])
 def test_it_is_numpys_model(file):
     """In float64 but for the network: differences of float32, and of angles to 1e-5."""
     weights = load_weights(resource_path('weights', f'{file}.safetensors'))
@@ -204,7 +203,7 @@ def test_weights_for_something_else_are_refused():
         ContactSolver(poses.CONTAINER, poses.CONTAINER, model=make_model('paper', weights=cubes))
     with pytest.raises(WeightsError, match='does not exist'):
         make_model('paper', weights='nowhere.safetensors')
-    with pytest.raises(WeightsError, match="no network 'contact' with 6 inputs and 4 or 3 outputs"):
+    with pytest.raises(WeightsError, match="no network 'contact' with 6 inputs and 4 outputs"):
         make_model('paper', weights=resource_path('weights', 'mlp.safetensors'))
     with pytest.raises(ValueError, match='the network does not fit'):
         native.Paper(mlp_numbers(resource_path('weights', 'mlp.safetensors')))

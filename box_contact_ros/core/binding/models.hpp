@@ -66,8 +66,7 @@ inline bool fits(Model model, const std::vector<float>& network) {
   bool is_mlp = model == Model::mlp;
   float inputs = is_mlp ? detail::network_features : detail::paper_inputs;
   float outputs = is_mlp ? detail::network_outputs : detail::paper_outputs;
-  bool fewer = !is_mlp && network[3] == detail::paper_places;
-  if (network[0] != inputs || !(network[3] == outputs || fewer)) return false;
+  if (network[0] != inputs || network[3] != outputs) return false;
   for (int k = 4; k <= 5; ++k)
     if (network[k] != 0.0F && network[k] != 1.0F) return false;
   long wanted = detail::network_header;

@@ -10,8 +10,8 @@ namespace box_contact::detail {
 // of a hidden layer. `network_format` counts changes of what features and outputs mean.
 constexpr int network_format = 5, network_features = 19, network_outputs = 10,
               network_units_max = 64;
-// The same of model `paper`: four angles, or the three coordinates of a point.
-constexpr int paper_inputs = 6, paper_outputs = 4, paper_places = 3;
+// The same of model `paper`.
+constexpr int paper_inputs = 6, paper_outputs = 4;
 // Numbers before the weights of a network: inputs, units of both hidden layers, outputs, whether the
 // hidden units are tanh or rectified, and whether lengths are in half edges of cubes or in metres.
 constexpr int network_header = 6;

@@ -104,12 +104,7 @@ struct Impact {
     features[4] = angle<F>(sine_of_pitch, sqrt(cosine2));
     features[5] = angle<F>(m[1] * r[0][1] * nx, abs(r[0][0]));
     features[6] = features[7] = F{};
-    answer(network, features, network.outputs, outputs);
-    if (network.outputs == detail::paper_places) {  // the point, in half of the longest edge
-      F longest = max<F>(max<F>(half[0], half[1]), half[2]);
-      for (int i = 0; i < 3; ++i) point[i] = longest * (m[i] * outputs[i]), normal[i] = F{};
-      return;
-    }
+    answer(network, features, detail::paper_outputs, outputs);
     Vec<F> way = direction<F>(outputs[0], outputs[1]);
     F farthest =
         max<F>(max<F>(abs(way[0]) / half[0], abs(way[1]) / half[1]), abs(way[2]) / half[2]);
@@ -163,8 +158,7 @@ struct ImpactByNetwork {
     Triple<T> origin = select(touching.first_is_b, pair.origin_b, pair.origin_a);
     Triple<T> at = touching.unit * point + (0.5 * q.axis.separation) * touching.normal;
     T by_length = 1.0 / sqrt(dot(answered, answered));  // of float32, 1 to seven digits
-    bool is_place = network.outputs == detail::paper_places;
-    Triple<T> normal = axes * (is_place ? touching.normal : by_length * answered);
+    Triple<T> normal = axes * (by_length * answered);
     Triple<T> zero{};
     // Zeros keep no sign on a swap.
     normal = select(Mask<T>(touching.first_is_b ^ pair.swapped), zero - normal, zero + normal);
