@@ -15,6 +15,7 @@
 #include "islands.hpp"
 #include "iterations.hpp"
 #include "own_contacts.hpp"
+#include "preparing.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
