@@ -5,6 +5,7 @@
 // the plain data that they share.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "../include/box_contact/box_contact.h"
@@ -46,6 +47,16 @@ constexpr int model_count = 3;
 // Whether a function finds point and volume alone, or all moments.
 enum class Finds { point, patch };
 
+// Blocks of forces side by side, by stages: see force/stages.hpp, and Work for what they take.
+struct ForceKernel {
+  int lanes;
+  size_t group_size;  // [bytes]
+  void (*load)(void*);
+  void (*push)(void*);
+  void (*relax)(void*);
+  void (*end)(void*);
+};
+
 struct Kernel {
   const char* name;   // as BOX_CONTACT_INSTRUCTION_SET has it
   const char* title;  // for people
@@ -62,6 +73,8 @@ struct Kernel {
   // The same of distances.
   bool (*nearest_pair)(const PairNumbers&, bc_nearest& nearest);
   long (*nearest_rows)(const Rows&, long begin, long end, const NearestResults&);
+
+  ForceKernel side;
 };
 
 extern const Kernel kernel_baseline, kernel_avx2, kernel_avx512;

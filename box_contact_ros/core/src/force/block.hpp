@@ -2,27 +2,43 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // A patch as a block of six velocity constraints, and the bodies that its impulses move.
+//
+// Functions are templates over T: `double` for a block alone, or lanes for blocks side by side, and over
+// what the bodies are then: `Moving`, or `Side<T>`. Each lane has the bits of a block alone.
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 
+#include "../lanes/triples.hpp"
 #include "clock.hpp"
 #include "patch.hpp"
 #include "pressing.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
+// What blocks need of a body.
+template <class T>
+struct Speeds {
+  Vec<T> linear;
+  T changed;  // the last iteration that changed them
+  Vec<T> angular;
+  T inverse_mass;
+};
+template <class T>
+struct Where {
+  Mat<T> inverse_inertia;  // common frame
+  PlacedOf<T> placed;
+};
+template <class T>
+struct Sums {
+  Vec<T> impulse, angular_impulse;  // of contacts, since the advance began [N s], [N m s]
+};
+
 // A body in a step.
-struct Moving {
-  Vec<double> linear, angular;
-  double inverse_mass;
-  Mat<double> inverse_inertia;  // common frame
-  int changed;                  // the last iteration that changed its velocities
+struct Moving : Speeds<double>, Where<double>, Sums<double> {
   int32_t body;
+  int32_t side;          // the first group side by side that may have its next block
   double quaternion[4];  // of length 1
-  Placed placed;
-  Vec<double> impulse, angular_impulse;  // of contacts, since the advance began [N s], [N m s]
   Motion pushed;         // its velocities before relaxation, at the end of the advance
   double load;           // weights that it bears and its own [N]
   int carriers;          // how many patches bear it
@@ -30,75 +46,133 @@ struct Moving {
   bool is_held;          // whether friction holds it
 };
 
-// How pressing and rocking are solved: the impulses change by −mass·(v + bias + softness·impulses).
-struct NormalRows {
-  Vec<double> softness, bias;
-  Mat<double> mass;
+// The bodies of blocks side by side.
+template <class T>
+struct Side : Speeds<T> {
+  const Mat<T>& inverse_inertia;
 };
 
+// How pressing and rocking are solved: the impulses change by −mass·(v + bias + softness·impulses).
+template <class T>
+struct NormalRows {
+  Vec<T> softness, bias;
+  Mat<T> mass;
+};
+
+// A patch as an answer has it.
+template <class T>
+struct Asked {
+  Vec<T> normal, point, surface;
+  RectangleOf<T> shape;
+  T friction, asked_depth, stiffness, late, age;
+  Vec<T> local_a, local_b;  // its point in the frames of its bodies
+};
+// The impulses that it gave in the last window, and that window: see Patch.
+template <class T>
+struct Kept {
+  T window, normal_impulse, torsion_impulse;
+  Vec<T> friction_impulse, rocking_impulse, impulse_arm;
+};
+template <class T>
+struct Arms {
+  Vec<T> arm_a, arm_b;  // from the centres of mass to the point
+};
+// What is known of it at the end of a sub-step.
+template <class T>
+struct Reached : Arms<T> {
+  T depth;                          // [m]
+  Vec<T> normal_sum, friction_sum;  // impulses of the sub-steps
+};
+template <class T>
+struct Masses {
+  Mat<T> across;  // how pressing and rocking change the velocities along their rows
+  Mat<T> friction_mass;
+  T least_friction_mass;  // of any row of friction and torsion
+};
 // A patch in a step. Impulses are components: N, τ1, τ2 and f1, f2, m / r.
-struct Block {
+template <class T>
+struct Rows : Asked<T>, Kept<T>, Reached<T>, Masses<T> {
+  NormalRows<T> pushing, relaxed;
+  Vec<T> normal_impulses, friction_impulses;
+  Vec<T> normal_counted, friction_counted;  // what of them is in the sums of the bodies
+};
+struct Block : Rows<double> {
   int32_t a, b;   // places of its bodies among those that move
   int32_t patch;  // its place
-  Vec<double> arm_a, arm_b, normal, surface;
-  Rectangle shape;
-  double friction;
-  double depth;  // [m]
+  int32_t side;   // its place side by side with others
   double height, rises,
-      load;            // of its point; of its normal, upward; of the weights above [m], [1], [N]
-  Mat<double> across;  // how pressing and rocking change the velocities along their rows
-  double least_friction_mass;  // of any row of friction and torsion
-  NormalRows pushing, relaxed;
-  Mat<double> friction_mass;
-  Vec<double> normal_impulses, friction_impulses;
-  Vec<double> normal_counted, friction_counted;  // what of them is in the sums of the bodies
-  Vec<double> normal_sum, friction_sum;          // of the sub-steps
+      load;  // of its point; of its normal, upward; of the weights above [m], [1], [N]
 };
 
-// Rocking whose centre of pressure is within the spans.
-inline double clamp(double x, double low, double high) { return std::max(low, std::min(high, x)); }
-inline double bounded_1(const Rectangle& shape, double normal, double rocking) {
-  return clamp(rocking, normal * rocking_1(shape).low, normal * rocking_1(shape).high);
+// Rocking whose centre of pressure is within the span.
+template <class T>
+BC_INLINE T bounded(const SpanOf<T>& per_pressing, T normal, T rocking) {
+  return max<T>(min<T>(rocking, normal * per_pressing.high), normal * per_pressing.low);
 }
-inline double bounded_2(const Rectangle& shape, double normal, double rocking) {
-  return clamp(rocking, normal * rocking_2(shape).low, normal * rocking_2(shape).high);
+template <class T>
+BC_INLINE void bound(Vec<T>& impulses, T limit) {
+  T squared = dot(impulses, impulses);
+  Mask<T> is_beyond = squared > limit * limit;
+  if (any(is_beyond)) impulses = select(is_beyond, (limit / sqrt(squared)) * impulses, impulses);
 }
-inline void bound(Vec<double>& impulses, double limit) {
-  double squared = dot(impulses, impulses);
-  if (squared > limit * limit) impulses = (limit / std::sqrt(squared)) * impulses;
+
+// Take what an answer, and the last window, say of a patch.
+inline void take(const Patch& patch, Block& block) {
+  auto local = [&](const Placed& asked) {
+    return transposed_times(asked.axes, patch.point - asked.position);
+  };
+  static_cast<Asked<double>&>(block) = {patch.normal,         patch.point,         patch.surface,
+                                        patch.shape,          patch.friction,      patch.depth,
+                                        patch.stiffness,      patch.late,          patch.age,
+                                        local(patch.asked_a), local(patch.asked_b)};
+  static_cast<Kept<double>&>(block) = {patch.window,          patch.normal_impulse,
+                                       patch.torsion_impulse, patch.friction_impulse,
+                                       patch.rocking_impulse, patch.impulse_arm};
+}
+inline void give_back(const Kept<double>& kept, Patch& patch) {
+  patch.window = kept.window;
+  patch.normal_impulse = kept.normal_impulse;
+  patch.torsion_impulse = kept.torsion_impulse;
+  patch.friction_impulse = kept.friction_impulse;
+  patch.rocking_impulse = kept.rocking_impulse;
+  patch.impulse_arm = kept.impulse_arm;
 }
 
 // Give B an impulse at the point and an angular impulse, and A the opposite.
-inline void apply(const Block& block, const Vec<double>& impulse, const Vec<double>& turn,
-                  Moving& a, Moving& b) {
-  if (a.inverse_mass > 0.0) {
+template <class T, class Body>
+BC_INLINE void apply(const Rows<T>& block, const Vec<T>& impulse, const Vec<T>& turn, Body& a,
+                     Body& b) {
+  if (any(a.inverse_mass > 0.0)) {
     a.linear = a.linear - a.inverse_mass * impulse;
     a.angular = a.angular - a.inverse_inertia * (cross(block.arm_a, impulse) + turn);
   }
-  if (b.inverse_mass > 0.0) {
+  if (any(b.inverse_mass > 0.0)) {
     b.linear = b.linear + b.inverse_mass * impulse;
     b.angular = b.angular + b.inverse_inertia * (cross(block.arm_b, impulse) + turn);
   }
 }
-inline void apply_normal(const Block& block, const Vec<double>& x, Moving& a, Moving& b) {
-  apply(block, x[0] * block.normal, x[1] * block.shape.axis_1 + x[2] * block.shape.axis_2, a, b);
+template <class T, class Body>
+BC_INLINE void apply_normal(const Rows<T>& block, const Vec<T>& x, Body& a, Body& b) {
+  apply<T>(block, x[0] * block.normal, x[1] * block.shape.axis_1 + x[2] * block.shape.axis_2, a, b);
 }
-inline void apply_friction(const Block& block, const Vec<double>& x, Moving& a, Moving& b) {
-  apply(block, x[0] * block.shape.axis_1 + x[1] * block.shape.axis_2,
-        (block.shape.radius * x[2]) * block.normal, a, b);
+template <class T, class Body>
+BC_INLINE void apply_friction(const Rows<T>& block, const Vec<T>& x, Body& a, Body& b) {
+  apply<T>(block, x[0] * block.shape.axis_1 + x[1] * block.shape.axis_2,
+           (block.shape.radius * x[2]) * block.normal, a, b);
 }
 
 // Add up the impulses that its bodies got since they were counted last.
-inline void count(Block& block, Moving& a, Moving& b) {
-  const Rectangle& shape = block.shape;
-  Vec<double> normal = block.normal_impulses - block.normal_counted;
-  Vec<double> friction = block.friction_impulses - block.friction_counted;
+template <class T>
+BC_INLINE void count(Rows<T>& block, Sums<T>& a, Sums<T>& b) {
+  const RectangleOf<T>& shape = block.shape;
+  Vec<T> normal = block.normal_impulses - block.normal_counted;
+  Vec<T> friction = block.friction_impulses - block.friction_counted;
   block.normal_counted = block.normal_impulses;
   block.friction_counted = block.friction_impulses;
-  Vec<double> impulse =
+  Vec<T> impulse =
       normal[0] * block.normal + (friction[0] * shape.axis_1 + friction[1] * shape.axis_2);
-  Vec<double> turn = (normal[1] * shape.axis_1 + normal[2] * shape.axis_2) +
-                     (shape.radius * friction[2]) * block.normal;
+  Vec<T> turn = (normal[1] * shape.axis_1 + normal[2] * shape.axis_2) +
+                (shape.radius * friction[2]) * block.normal;
   a.impulse = a.impulse - impulse;
   a.angular_impulse = a.angular_impulse - (cross(block.arm_a, impulse) + turn);
   b.impulse += impulse;
@@ -106,23 +180,25 @@ inline void count(Block& block, Moving& a, Moving& b) {
 }
 
 // The impulses of the last window, about the point of this step.
-inline void remember(const Patch& patch, const Block& block, Vec<double>& normal,
-                     Vec<double>& friction) {
-  const Rectangle& shape = block.shape;
-  Vec<double> moved = patch.impulse_arm - block.arm_a;
-  Vec<double> rocking = patch.rocking_impulse + cross(moved, patch.normal_impulse * patch.normal);
-  double torsion = patch.torsion_impulse + dot(patch.normal, cross(moved, patch.friction_impulse));
-  normal = {patch.normal_impulse,
-            bounded_1(shape, patch.normal_impulse, dot(rocking, shape.axis_1)),
-            bounded_2(shape, patch.normal_impulse, dot(rocking, shape.axis_2))};
-  friction = {dot(patch.friction_impulse, shape.axis_1), dot(patch.friction_impulse, shape.axis_2),
-              shape.radius > 0.0 ? torsion / shape.radius : 0.0};
-  bound(friction, block.friction * normal[0]);
+template <class T>
+BC_INLINE void remember(const Rows<T>& block, Vec<T>& normal, Vec<T>& friction) {
+  const RectangleOf<T>& shape = block.shape;
+  T pressing = block.normal_impulse;
+  Vec<T> moved = block.impulse_arm - block.arm_a;
+  Vec<T> rocking = block.rocking_impulse + cross<T>(moved, pressing * block.normal);
+  T torsion = block.torsion_impulse + dot(block.normal, cross(moved, block.friction_impulse));
+  normal = {pressing, bounded<T>(rocking_1(shape), pressing, dot(rocking, shape.axis_1)),
+            bounded<T>(rocking_2(shape), pressing, dot(rocking, shape.axis_2))};
+  friction = {dot(block.friction_impulse, shape.axis_1), dot(block.friction_impulse, shape.axis_2),
+              select<T>(shape.radius > 0.0, torsion / shape.radius, T{})};
+  bound<T>(friction, block.friction * normal[0]);
 }
 
 // Give a share of them again.
-inline void warm_start(const Patch& patch, double share, Block& block, Moving& a, Moving& b) {
-  remember(patch, block, block.normal_impulses, block.friction_impulses);
+template <class T, class Body>
+BC_INLINE void warm_start(const SubSteps& steps, Rows<T>& block, Body& a, Body& b) {
+  T share = steps.again(block.window);
+  remember(block, block.normal_impulses, block.friction_impulses);
   block.normal_impulses = share * block.normal_impulses;
   block.friction_impulses = share * block.friction_impulses;
   apply_normal(block, block.normal_impulses, a, b);
@@ -130,79 +206,83 @@ inline void warm_start(const Patch& patch, double share, Block& block, Moving& a
 }
 
 // Keep the impulses of this step, and a share of those before.
-inline void store(Block& block, const SubSteps& steps, Patch& patch) {
-  double kept = steps.kept(patch.window);
-  patch.window = steps.window;
+template <class T>
+BC_INLINE void store(const SubSteps& steps, Rows<T>& block) {
+  T kept = steps.kept(block.window);
+  block.window = splat<T>(steps.window);
   block.normal_sum += block.normal_impulses;
   block.friction_sum += block.friction_impulses;
-  if (kept > 0.0) {
-    Vec<double> normal, friction;
-    remember(patch, block, normal, friction);
-    block.normal_impulses += kept * normal;
-    block.friction_impulses += kept * friction;
+  Vec<T> pressed = block.normal_impulses, rubbed = block.friction_impulses;
+  Mask<T> is_kept = kept > 0.0;
+  if (any(is_kept)) {
+    Vec<T> normal, friction;
+    remember(block, normal, friction);
+    pressed = select(is_kept, pressed + kept * normal, pressed);
+    rubbed = select(is_kept, rubbed + kept * friction, rubbed);
   }
-  const Rectangle& shape = block.shape;
-  patch.normal_impulse = block.normal_impulses[0];
-  patch.rocking_impulse =
-      block.normal_impulses[1] * shape.axis_1 + block.normal_impulses[2] * shape.axis_2;
-  patch.friction_impulse =
-      block.friction_impulses[0] * shape.axis_1 + block.friction_impulses[1] * shape.axis_2;
-  patch.torsion_impulse = shape.radius * block.friction_impulses[2];
-  patch.impulse_arm = block.arm_a;
+  const RectangleOf<T>& shape = block.shape;
+  block.normal_impulse = pressed[0];
+  block.rocking_impulse = pressed[1] * shape.axis_1 + pressed[2] * shape.axis_2;
+  block.friction_impulse = rubbed[0] * shape.axis_1 + rubbed[1] * shape.axis_2;
+  block.torsion_impulse = shape.radius * rubbed[2];
+  block.impulse_arm = block.arm_a;
 }
 
 // Velocities of B relative to A: at the point, and angular.
-inline Vec<double> speed(const Block& block, const Moving& a, const Moving& b) {
+template <class T, class Body>
+BC_INLINE Vec<T> speed(const Rows<T>& block, const Body& a, const Body& b) {
   return (b.linear + cross(b.angular, block.arm_b)) - (a.linear + cross(a.angular, block.arm_a));
 }
-inline Vec<double> turning(const Moving& a, const Moving& b) { return b.angular - a.angular; }
 
-// Solve friction and torsion. Returns by how much a speed changed.
-inline double solve_friction(Block& block, Moving& a, Moving& b) {
-  const Rectangle& shape = block.shape;
-  Vec<double> slip = speed(block, a, b) + block.surface;
-  Vec<double> v{dot(slip, shape.axis_1), dot(slip, shape.axis_2),
-                shape.radius * dot(turning(a, b), block.normal)};
-  double limit = block.friction * block.normal_impulses[0];
-  Vec<double> next = block.friction_impulses - block.friction_mass * v;
-  if (dot(next, next) > limit * limit) {
+// Solve friction and torsion of the blocks that are due. Returns by how much a speed changed.
+template <class T, class Body>
+BC_INLINE T solve_friction(Rows<T>& block, Mask<T> due, Body& a, Body& b) {
+  const RectangleOf<T>& shape = block.shape;
+  Vec<T> slip = speed(block, a, b) + block.surface;
+  Vec<T> v{dot(slip, shape.axis_1), dot(slip, shape.axis_2),
+           shape.radius * dot(b.angular - a.angular, block.normal)};
+  T limit = block.friction * block.normal_impulses[0];
+  Vec<T> next = block.friction_impulses - block.friction_mass * v;
+  Mask<T> slides = due & (dot(next, next) > limit * limit);
+  if (any(slides)) {
     // It slides: one factor for all rows turns friction against the motion.
-    next = block.friction_impulses - block.least_friction_mass * v;
-    bound(next, limit);
+    Vec<T> sliding = block.friction_impulses - block.least_friction_mass * v;
+    bound<T>(sliding, limit);
+    next = select(slides, sliding, next);
   }
-  Vec<double> change = next - block.friction_impulses;
-  block.friction_impulses = next;
+  Vec<T> change = next - block.friction_impulses;
+  block.friction_impulses = select(due, next, block.friction_impulses);
   apply_friction(block, change, a, b);
   return largest(abs(change)) / block.least_friction_mass;
 }
 
 // Velocities along the rows of pressing and rocking, beyond the bias.
-inline Vec<double> pressing_speeds(const Block& block, const NormalRows& rows, const Moving& a,
-                                   const Moving& b) {
-  Vec<double> turns = turning(a, b);
-  return Vec<double>{dot(speed(block, a, b), block.normal), dot(turns, block.shape.axis_1),
-                     dot(turns, block.shape.axis_2)} +
+template <class T, class Body>
+BC_INLINE Vec<T> pressing_speeds(const Rows<T>& block, const NormalRows<T>& rows, const Body& a,
+                                 const Body& b) {
+  Vec<T> turns = b.angular - a.angular;
+  return Vec<T>{dot(speed(block, a, b), block.normal), dot(turns, block.shape.axis_1),
+                dot(turns, block.shape.axis_2)} +
          rows.bias;
 }
 
-// Solve pressing and rocking. Returns by how much the closing speed changed.
-inline double solve_normal(Block& block, const NormalRows& rows, Moving& a, Moving& b) {
-  Vec<double> before = block.normal_impulses;
-  const Mat<double>& mass = rows.mass;
-  auto error = [&] {
-    return pressing_speeds(block, rows, a, b) + rows.softness * block.normal_impulses;
-  };
-  Vec<double> v = error(), next = block.normal_impulses - mass * v;
-  if (!(bounded_1(block.shape, next[0], next[1]) == next[1] &&
-        bounded_2(block.shape, next[0], next[2]) == next[2])) {
+// Solve pressing and rocking of those. Returns by how much the closing speed changed.
+template <class T, class Body>
+BC_INLINE T solve_normal(Rows<T>& block, const NormalRows<T>& rows, Mask<T> due, Body& a, Body& b) {
+  const Vec<T> before = block.normal_impulses;
+  Vec<T> v = pressing_speeds(block, rows, a, b) + rows.softness * before;
+  Vec<T> next = before - rows.mass * v;
+  Mask<T> within = (bounded<T>(rocking_1(block.shape), next[0], next[1]) == next[1]) &
+                   (bounded<T>(rocking_2(block.shape), next[0], next[2]) == next[2]);
+  if (bits(due) & ~bits(within)) {
     // The pressure would be negative at a rim.
-    Mat<double> soft = block.across;
+    Mat<T> soft = block.across;
     for (int i = 0; i < 3; ++i) soft[i][i] += rows.softness[i];
-    next = OnTheRim(block.shape, soft, v - soft * block.normal_impulses).impulses();
+    next = select(within, next, OnTheRim<T>(block.shape, soft, v - soft * before).impulses());
   }
-  apply_normal(block, next - block.normal_impulses, a, b);
-  block.normal_impulses = next;
-  return std::fabs(next[0] - before[0]) * block.across[0][0];
+  apply_normal(block, next - before, a, b);
+  block.normal_impulses = select(due, next, before);
+  return abs(next[0] - before[0]) * block.across[0][0];
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET::force

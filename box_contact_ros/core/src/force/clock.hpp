@@ -13,7 +13,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../lanes/target.hpp"
+#include "../lanes/lanes.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
@@ -47,7 +47,8 @@ constexpr double overdue_periods = 3.0;
 constexpr int intervals_kept = 8;
 
 // The frequency of a patch whose answers are late [1/s].
-inline double frequency_of(double late, double period) {
+template <class T>
+T frequency_of(T late, double period) {
   return late_frequency / (late + 0.5 * period);
 }
 
@@ -74,11 +75,14 @@ struct SubSteps {
   }
   // Which share of the impulses of a window `before` is given again at first, and which stays in this
   // one [1].
-  double again(double before) const {
-    return before > 0.0 ? std::min(length / before, most_again) : 1.0;
+  template <class T>
+  T again(T before) const {
+    T share = min(splat<T>(most_again), length / before);
+    return select<T>(before > 0.0, share, splat<T>(1.0));
   }
-  double kept(double before) const {
-    return before > 0.0 ? std::max(0.0, window - length) / before : 0.0;
+  template <class T>
+  T kept(T before) const {
+    return select<T>(before > 0.0, std::max(0.0, window - length) / before, T{});
   }
 };
 

@@ -15,7 +15,7 @@
 #include "islands.hpp"
 #include "iterations.hpp"
 #include "own_contacts.hpp"
-#include "preparing.hpp"
+#include "stages.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
@@ -57,41 +57,17 @@ class IslandStep {
         ended_(ended),
         patches_(patches),
         loads_(loads),
+        islands_(islands),
         moving_(islands.moving),
         blocks_(islands.blocks),
-        iterate_(islands),
         fineness_(fineness),
         fineness_of_(bodies, step.outside, options.most_depth, patches, islands) {}
 
-  void advance(const Island& island) const {
-    for (size_t k = island.body; k < island.body_end; ++k) begin(moving_[k]);
-    if (island.block == island.block_end) {
-      for (size_t k = island.body; k < island.body_end; ++k) fly(moving_[k]);
-      return;
-    }
-    for (size_t k = island.block; k < island.block_end; ++k)
-      blocks_[k].normal_sum = blocks_[k].friction_sum = {};
-    int factor = step_.own ? fineness_of_(island, step_.steps, fineness_) : 1;
-    const SubSteps steps = factor > 1 ? step_.steps.finer(factor) : step_.steps;
-    for (int number = 1; number <= steps.count; ++number) {
-      if (factor > 1 && number > 1 && number % parts_of_a_contact == 1) ask_again(island);
-      for (size_t k = island.body; k < island.body_end; ++k) drive(moving_[k], number, steps);
-      for (size_t k = island.block; k < island.block_end; ++k) {
-        Block& block = blocks_[k];
-        const Patch& patch = patches_[size_t(block.patch)];
-        Moving &a = moving_[size_t(block.a)], &b = moving_[size_t(block.b)];
-        prepare(patch, a, b, steps, block);
-        warm_start(patch, steps.again(patch.window), block, a, b);
-      }
-      bool is_last = number == steps.count;
-      iterate_(island, steps.rounds * options_.iterations, &Block::pushing);
-      if (step_.motion.wrenches) count_impulses(island);
-      for (size_t k = island.body; k < island.body_end; ++k) move(moving_[k], steps.length);
-      relax(island, steps);
-      if (!is_last && step_.motion.wrenches) count_impulses(island);
-      for (size_t k = island.block; k < island.block_end; ++k)
-        store(blocks_[k], steps, patches_[size_t(blocks_[k].patch)]);
-    }
+  void advance(const Chunk& chunk) const {
+    for (Island& island : islands_.of(chunk)) begin(island);
+    // Those whose sub-steps are as fine are advanced together.
+    for (const Island& island : islands_.of(chunk))
+      if (island.factor > 0) advance(chunk, island.factor);
   }
 
   // The first body whose numbers are not finite at the end of the islands, or −1.
@@ -127,6 +103,94 @@ class IslandStep {
   }
 
  private:
+  // Begin an island. One without contacts ends the advance, too.
+  void begin(Island& island) const {
+    for (size_t k = island.body; k < island.body_end; ++k) begin(moving_[k]);
+    island.factor = 0;
+    if (island.block == island.block_end) {
+      for (size_t k = island.body; k < island.body_end; ++k) fly(moving_[k]);
+      return;
+    }
+    each_block(island, [&](Block& block, const Patch& patch, Moving&, Moving&) {
+      take(patch, block);
+      block.normal_sum = block.friction_sum = {};
+    });
+    island.factor = step_.own ? fineness_of_(island, step_.steps, fineness_) : 1;
+  }
+  // Advance the islands whose sub-steps are finer by a factor.
+  void advance(const Chunk& chunk, int factor) const {
+    const SubSteps steps = step_.steps.finer(factor);
+    auto advance = [&](Islands::Range range, const detail::ForceKernel& kernel, void* groups,
+                       size_t count) {
+      bool counts = step_.motion.wrenches;
+      Work work{range.first, range.last, moving_.data(), blocks_.data(),      patches_.data(),
+                groups,      count,      steps,          options_.iterations, options_.relaxations,
+                counts};
+      advance_by(kernel, factor, work);
+    };
+    for (Island& island : islands_.of(chunk)) island.is_shared = island.factor == factor;
+    size_t groups = islands_.share(chunk);
+    if (groups > 0)
+      advance(islands_.of(chunk), *islands_.side(), islands_.groups_of(chunk), groups);
+    for (Island& island : islands_.of(chunk)) {
+      if (!island.is_shared) continue;
+      island.factor = 0;
+      if (groups == 0)
+        advance({&island, &island + 1}, alone, &blocks_[island.block],
+                island.block_end - island.block);
+    }
+  }
+  static constexpr detail::ForceKernel alone = {1,
+                                                sizeof(Block),
+                                                Stages<Block>::load,
+                                                Stages<Block>::push,
+                                                Stages<Block>::relax,
+                                                Stages<Block>::end};
+
+  template <class Visit>
+  void each_block(const Island& island, const Visit& visit) const {
+    for (size_t k = island.block; k < island.block_end; ++k) {
+      Block& block = blocks_[k];
+      visit(block, patches_[size_t(block.patch)], moving_[size_t(block.a)],
+            moving_[size_t(block.b)]);
+    }
+  }
+
+  void advance_by(const detail::ForceKernel& kernel, int factor, Work& work) const {
+    auto each_island = [&](const auto& visit) {
+      for (const Island* island = work.first; island < work.last; ++island)
+        if (island->is_shared) visit(*island);
+    };
+    auto each_body = [&](const auto& visit) {
+      each_island([&](const Island& island) {
+        for (size_t k = island.body; k < island.body_end; ++k) visit(moving_[k]);
+      });
+    };
+    auto end = [&] {
+      kernel.end(&work);
+      each_island([&](const Island& island) {
+        each_block(island, [](const Block& block, Patch& patch, Moving&, Moving&) {
+          give_back(block, patch);
+        });
+      });
+    };
+    const SubSteps& steps = work.steps;
+    kernel.load(&work);
+    for (int number = 1; number <= steps.count; ++number) {
+      if (factor > 1 && number > 1 && number % parts_of_a_contact == 1) {
+        end();
+        each_island([&](const Island& island) { ask_again(island); });
+        kernel.load(&work);
+      }
+      work.is_last = number == steps.count;
+      each_body([&](Moving& moving) { drive(moving, number, steps); });
+      kernel.push(&work);
+      each_body([&](Moving& moving) { move(moving, steps.length); });
+      kernel.relax(&work);
+    }
+    end();
+  }
+
   void begin(Moving& moving) const {
     auto k = size_t(moving.body);
     moving.placed = placed_at(step_.poses[k], bodies_[k].centre);
@@ -157,12 +221,11 @@ class IslandStep {
 
   // Solve the contacts of an island anew, where its bodies are within the advance.
   void ask_again(const Island& island) const {
-    for (size_t k = island.block; k < island.block_end; ++k) {
-      Patch& patch = patches_[size_t(blocks_[k].patch)];
-      const Moving &a = moving_[size_t(blocks_[k].a)], &b = moving_[size_t(blocks_[k].b)];
+    each_block(island, [&](Block& block, Patch& patch, Moving& a, Moving& b) {
       step_.own->solve_again(step_.solve_pair, pose_of(a), pose_of(b), a.placed, b.placed,
                              is_lighter_b(bodies_, patch), patch);
-    }
+      take(patch, block);
+    });
   }
 
   // Move a body by its velocities for a time.
@@ -195,8 +258,10 @@ class IslandStep {
     const auto& [before, last] = ended_[k];
     Vec<double> linear = vector(step_.velocities[k].linear);
     Vec<double> angular = vector(step_.velocities[k].angular);
-    moving.linear = linear + part * least_change_of(before.linear, last.linear, linear);
-    moving.angular = angular + part * least_change_of(before.angular, last.angular, angular);
+    // Lanes add zeros of either sign to it: only a positive one stays as it is.
+    moving.linear = (linear + part * least_change_of(before.linear, last.linear, linear)) + 0.0;
+    moving.angular =
+        (angular + part * least_change_of(before.angular, last.angular, angular)) + 0.0;
   }
   // The smaller of two changes in turn, where they have one sign (minmod): a jump is none.
   static Vec<double> least_change_of(const Vec<double>& x, const Vec<double>& y,
@@ -209,22 +274,6 @@ class IslandStep {
     return change;
   }
 
-  void relax(const Island& island, const SubSteps& steps) const {
-    if (options_.relaxations == 0) return;
-    for (size_t k = island.block; k < island.block_end; ++k) {
-      Block& block = blocks_[k];
-      follow(patches_[size_t(block.patch)], moving_[size_t(block.a)], moving_[size_t(block.b)],
-             steps.length, block);
-    }
-    iterate_(island, steps.rounds * options_.relaxations, &Block::relaxed);
-  }
-
-  void count_impulses(const Island& island) const {
-    for (size_t k = island.block; k < island.block_end; ++k) {
-      Block& block = blocks_[k];
-      count(block, moving_[size_t(block.a)], moving_[size_t(block.b)]);
-    }
-  }
   // A sum is finite only if all its numbers are.
   bool ends_finite(const Moving& moving) const {
     double rate = 1.0 / step_.steps.dt, norm2 = squared_norm(moving.quaternion), sum = norm2;
@@ -281,9 +330,9 @@ class IslandStep {
   std::vector<Ended>& ended_;  // of the bodies
   std::vector<Patch>& patches_;
   std::vector<Load>& loads_;
+  Islands& islands_;
   std::vector<Moving>& moving_;
   std::vector<Block>& blocks_;
-  Iterations iterate_;
   std::vector<Fineness>& fineness_;  // of the bodies
   FinenessOf fineness_of_;
 };

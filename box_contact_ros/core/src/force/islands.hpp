@@ -7,20 +7,53 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
-#include "block.hpp"
+#include "../kernel.hpp"
+#include "iterations.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-struct Island {
-  size_t body, body_end;  // among those that move
+// Blocks that are solved side by side, about: so many fill the lanes of islands of one block each, and a
+// core's second cache has room for them. A thread takes as many at a time: some 100 µs of work.
+constexpr size_t blocks_per_chunk = 128;
+
+// Islands in turn.
+struct Chunk {
+  size_t island, island_end;
   size_t block, block_end;
+};
+
+// Memory for a time. A copy has none of it.
+class Scratch {
+ public:
+  Scratch() = default;
+  Scratch(const Scratch&) {}
+  Scratch& operator=(const Scratch&) { return *this; }
+
+  void make_room(size_t bytes) {
+    if (bytes <= lines_ * sizeof(Line)) return;
+    lines_ = bytes / sizeof(Line) + 1;
+    memory_.reset(new Line[lines_]);
+  }
+  char* at(size_t byte) { return reinterpret_cast<char*>(memory_.get()) + byte; }
+
+ private:
+  struct alignas(64) Line {
+    char bytes[64];
+  };
+  std::unique_ptr<Line[]> memory_;
+  size_t lines_ = 0;
 };
 
 class Islands {
  public:
+  // side: the instruction set's, or null.
+  explicit Islands(const detail::ForceKernel* side) : side_(side) {}
+
   std::vector<Island> all;
+  std::vector<Chunk> chunks;
   std::vector<Moving> moving;      // by island; a body that no force moves comes once for each
   std::vector<Block> blocks;       // by island, then by pair
   std::vector<int32_t> by_height;  // places of blocks, by island: room for an order of its own
@@ -33,6 +66,9 @@ class Islands {
     moving.reserve(bodies + patches);
     blocks.reserve(patches);
     by_height.reserve(patches);
+    chunks.reserve(bodies);
+    rooms_.reserve(patches + bodies);
+    if (side_) groups_.make_room(2 * patches / size_t(side_->lanes) * side_->group_size);
   }
 
   // awake: the bodies in islands, in turn.
@@ -47,25 +83,92 @@ class Islands {
     });
     place_.assign(bodies.size(), -1);
     moving.clear();
-    blocks.clear();
+    blocks.resize(patches.size());  // what else is in them, an advance writes
+    size_t count = 0;
     for (size_t island = 0; island < all.size(); ++island) {
       Island& here = all[island];
       here.body = moving.size();
-      here.block = blocks.size();
+      here.block = count;
       for (int32_t k : bodies_.of(island)) add(bodies, awake[size_t(k)]);
       for (int32_t patch : patches_.of(island)) {
-        Block block{};
+        Block& block = blocks[count++];
         block.patch = patch;
         block.a = place(bodies, patches[size_t(patch)].a, here);
         block.b = place(bodies, patches[size_t(patch)].b, here);
-        blocks.push_back(block);
       }
       here.body_end = moving.size();
-      here.block_end = blocks.size();
+      here.block_end = count;
     }
+    cut();
+    rooms_.resize(blocks.size() + chunks.size());
+  }
+
+  // The islands of a chunk.
+  struct Range {
+    Island *first, *last;
+    Island* begin() const { return first; }
+    Island* end() const { return last; }
+  };
+  Range of(const Chunk& chunk) {
+    return {all.data() + chunk.island, all.data() + chunk.island_end};
+  }
+
+  const detail::ForceKernel* side() const { return side_; }
+  // Memory for groups of a chunk.
+  void* groups_of(const Chunk& chunk) {
+    return groups_.at(2 * chunk.block / size_t(side_->lanes) * side_->group_size);
+  }
+
+  // Put the blocks of the islands of a chunk that are shared into groups, whose lanes are solved side by
+  // side. In turn, each goes into the first group with room behind the groups that its bodies are in: so
+  // bodies see their blocks in the order of pairs, and no group has a body twice. Returns the number of
+  // groups; 0: about half of the lanes would be empty, and each island is better solved alone.
+  size_t share(const Chunk& chunk) {
+    if (!side_) return 0;
+    Room* rooms = rooms_.data() + chunk.block + size_t(&chunk - chunks.data());
+    int32_t lanes = side_->lanes, count = 0, blocks_shared = 0;
+    for (int32_t k = 0; k <= int32_t(chunk.block_end - chunk.block); ++k) rooms[k] = {k, 0};
+    for (size_t island = chunk.island; island < chunk.island_end; ++island) {
+      const Island& here = all[island];
+      if (!here.is_shared) continue;
+      for (size_t k = here.body; k < here.body_end; ++k) moving[k].side = 0;
+      blocks_shared += int32_t(here.block_end - here.block);
+      for (size_t k = here.block; k < here.block_end; ++k) {
+        Moving &a = moving[size_t(blocks[k].a)], &b = moving[size_t(blocks[k].b)];
+        int32_t group = first_room(rooms, std::max(a.side, b.side));
+        Room& room = rooms[group];
+        blocks[k].side = group * lanes + room.filled;
+        if (++room.filled == lanes) room.next = group + 1;
+        if (a.inverse_mass > 0.0) a.side = group + 1;
+        if (b.inverse_mass > 0.0) b.side = group + 1;
+        count = std::max(count, group + 1);
+      }
+    }
+    return 2 * blocks_shared >= count * (lanes + 1) ? size_t(count) : 0;
   }
 
  private:
+  // Of a group: the first one from it on that may have room, and how many lanes are filled.
+  struct Room {
+    int32_t next, filled;
+  };
+  static int32_t first_room(Room* rooms, int32_t group) {
+    while (rooms[group].next != group) group = rooms[group].next = rooms[rooms[group].next].next;
+    return group;
+  }
+
+  void cut() {
+    chunks.clear();
+    for (size_t island = 0; island < all.size();) {
+      size_t first = island;
+      // A body alone is some work, too.
+      auto size = [&] { return all[island].block_end - all[first].block + (island - first); };
+      do ++island;
+      while (island < all.size() && size() <= blocks_per_chunk);
+      chunks.push_back({first, island, all[first].block, all[island - 1].block_end});
+    }
+  }
+
   int32_t root_of(int32_t body) {
     while (root_[size_t(body)] != body)
       body = root_[size_t(body)] = root_[size_t(root_[size_t(body)])];
@@ -138,6 +241,9 @@ class Islands {
   std::vector<int32_t> root_, island_;  // of each body that is awake
   std::vector<int32_t> place_;          // of each body among those that move, in the last island
   Sorted bodies_, patches_;
+  const detail::ForceKernel* side_;
+  std::vector<Room> rooms_;  // of the groups of each chunk, and one behind them
+  Scratch groups_;
 };
 
 }  // namespace box_contact::BOX_CONTACT_SET::force

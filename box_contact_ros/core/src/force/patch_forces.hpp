@@ -40,19 +40,19 @@ constexpr double gap_share = 2.0;
 // A patch that pressed stays while its pair is apart by no more than this [m]: flush sides of goods come
 // and go by nanometres, and with them the friction that bore weight.
 constexpr double pressed_gap = 1e-5;
-// Patches that a thread takes at a time: some 60 µs of work.
-constexpr size_t patches_per_chunk = 64;
 
 class PatchForces {
  public:
   enum class Held { all, pair_twice, no_patch };
 
-  PatchForces(std::vector<Body> bodies, const Options& options)
+  // side: the kernel's, or null.
+  PatchForces(std::vector<Body> bodies, const Options& options, const detail::ForceKernel* side)
       : bodies_(std::move(bodies)),
         options_(options),
         ended_(bodies_.size()),
         fineness_(bodies_.size()),
-        poses_(bodies_.size()) {
+        poses_(bodies_.size()),
+        islands_(side) {
     rest_.set_bodies(bodies_);
     make_room(0);
   }
@@ -204,7 +204,11 @@ class PatchForces {
     if (!is_grouped_) islands_.group(bodies_, rest_.awake(), patches_);
     is_grouped_ = true;
     IslandStep islands(options_, bodies_, step, ended_, fineness_, patches_, loads_, islands_);
-    in_chunks(in_threads, [&](const Island& island) { islands.advance(island); });
+    const std::vector<Chunk>& chunks = islands_.chunks;
+    long threads = std::min(long(options_.threads), long(chunks.size()));
+    if (threads > 0)  // no bit depends on their number
+      in_threads(threads, long(chunks.size()),
+                 [&](long, long chunk) { islands.advance(chunks[size_t(chunk)]); });
     int64_t lost = islands.first_lost();
     if (lost >= 0) {
       restore();
@@ -439,21 +443,6 @@ class PatchForces {
       ++kept;
     }
     next_.erase(kept, next_.end());
-  }
-
-  // Call `work` with each island, in as many threads as are worth it. No bit depends on them.
-  template <class InThreads, class Work>
-  void in_chunks(const InThreads& in_threads, const Work& work) const {
-    const std::vector<Island>& all = islands_.all;
-    auto chunks = 1 + patches_.size() / patches_per_chunk;
-    long threads = std::min(long(options_.threads), long(std::min(chunks, all.size())));
-    size_t islands = threads > 1 ? 1 + all.size() / chunks : all.size();
-    if (all.empty()) return;
-    in_threads(std::max(threads, 1L), long((all.size() + islands - 1) / islands),
-               [&](long, long chunk) {
-                 size_t end = std::min(size_t(chunk + 1) * islands, all.size());
-                 for (size_t k = size_t(chunk) * islands; k < end; ++k) work(all[k]);
-               });
   }
 
   std::vector<Body> bodies_;

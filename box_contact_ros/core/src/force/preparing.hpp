@@ -19,115 +19,140 @@ constexpr double push_out_limit = 0.1;
 // The same where answers are late, which bear nothing that is as hard.
 constexpr double late_push_out_limit = 1.0;
 
+// How a body turns by an angular impulse. One that no force moves does not.
+template <class T, class Body>
+BC_INLINE Vec<T> turned_by(const Body& body, const Vec<T>& impulse) {
+  Mask<T> is_free = body.inverse_mass > 0.0;
+  if (!any(is_free)) return {};
+  return select(is_free, body.inverse_inertia * impulse, Vec<T>{});
+}
+
 // How the velocities along three rows change by impulses along them. A row turns the bodies about an
 // axis through their centres of mass, and the first `linear` rows have a direction as well.
-template <int linear>
-Mat<double> compliance(const Moving& a, const Moving& b, const Vec<double> (&turn_a)[3],
-                       const Vec<double> (&turn_b)[3], const Vec<double> (&directions)[linear]) {
-  Mat<double> m;
-  bool a_moves = a.inverse_mass > 0.0, b_moves = b.inverse_mass > 0.0;
+template <int linear, class T, class Body>
+BC_INLINE Mat<T> compliance(const Body& a, const Body& b, const Vec<T> (&turn_a)[3],
+                            const Vec<T> (&turn_b)[3], const Vec<T> (&directions)[linear]) {
+  Mat<T> m;
   for (int j = 0; j < 3; ++j) {
-    Vec<double> spun_a = a_moves ? a.inverse_inertia * turn_a[j] : Vec<double>{0.0, 0.0, 0.0};
-    Vec<double> spun_b = b_moves ? b.inverse_inertia * turn_b[j] : Vec<double>{0.0, 0.0, 0.0};
+    Vec<T> spun_a = turned_by<T>(a, turn_a[j]), spun_b = turned_by<T>(b, turn_b[j]);
     for (int i = j; i < 3; ++i) {
-      double moved = i < linear ? (a.inverse_mass + b.inverse_mass) *
-                                      dot(directions[i % linear], directions[j % linear])
-                                : 0.0;
+      T moved{};
+      if (i < linear)
+        moved =
+            (a.inverse_mass + b.inverse_mass) * dot(directions[i % linear], directions[j % linear]);
       m[i][j] = m[j][i] = moved + dot(turn_a[i], spun_a) + dot(turn_b[i], spun_b);
     }
   }
   return m;
 }
 
-inline Mat<double> softened(Mat<double> compliance, const Vec<double>& softness) {
+template <class T>
+BC_INLINE Mat<T> softened(Mat<T> compliance, const Vec<T>& softness) {
   for (int i = 0; i < 3; ++i) compliance[i][i] += softness[i];
   return inverse(compliance);
 }
 
 // Catto's soft step: a spring and a damper, implicit in time. Relaxation is without them, but for a
 // stiffness of the patch's own. Rocking is soft where answers are late: the wedge of the overlap,
-// which levels a body, is late then.
-inline void soften(const Patch& patch, const SubSteps& step, const Moving& a, const Moving& b,
-                   Block& block) {
-  const Mat<double>& compliance = block.across;
-  double depth = block.depth;
-  bool is_apart = depth < 0.0;
+// which levels a body, is late then. `turned()`: by how much B has turned more than A since.
+template <class T, class Turned>
+BC_INLINE void soften(const SubSteps& step, const Turned& turned, Rows<T>& block) {
+  const Mat<T>& compliance = block.across;
+  T depth = block.depth, none{};
   double h = step.length;
-  block.relaxed = {{0.0, 0.0, 0.0}, {is_apart ? -depth / h : 0.0, 0.0, 0.0}, inverse(compliance)};
+  T apart = select<T>(depth < 0.0, -depth / h, none);
+  block.relaxed = {{none, none, none}, {apart, none, none}, inverse(compliance)};
   block.pushing = block.relaxed;
-  if (is_apart || patch.age > step.overdue) return;
-  double frequency = soft_frequency / step.window;
-  double bearable = frequency_of(patch.late, step.period);
-  bool is_late = bearable < frequency * step.share;
-  if (is_late) frequency = bearable;
-  double own = std::sqrt(patch.stiffness * compliance[0][0]);
-  bool is_spring = 0.0 < own && own < frequency;
-  if (is_spring) frequency = own;
-  double damping = is_late || is_spring ? slow_damping_ratio : soft_damping_ratio;
-  double rate = frequency / (2.0 * damping + h * frequency);
-  double softness = rate / (h * frequency * frequency);
-  NormalRows& rows = block.pushing;
-  if (is_late) {
-    Vec<double> turned = turn(patch.asked_b, b.placed) - turn(patch.asked_a, a.placed);
-    rows.softness = softness * Vec<double>{0.0, compliance[1][1], compliance[2][2]};
-    rows.bias =
-        rate * Vec<double>{0.0, dot(turned, block.shape.axis_1), dot(turned, block.shape.axis_2)};
-    rows.mass = softened(compliance, rows.softness);
-    block.relaxed = rows;
+  Mask<T> pushes = (depth >= 0.0) & (block.age <= step.overdue);
+  if (!any(pushes)) return;
+  T frequency = splat<T>(soft_frequency / step.window);
+  T bearable = frequency_of(block.late, step.period);
+  Mask<T> is_late = pushes & (bearable < frequency * step.share);
+  frequency = select<T>(is_late, bearable, frequency);
+  T own = sqrt(block.stiffness * compliance[0][0]);
+  Mask<T> is_spring = pushes & (own > 0.0) & (own < frequency);
+  frequency = select<T>(is_spring, own, frequency);
+  T damping =
+      select<T>(is_late | is_spring, splat<T>(slow_damping_ratio), splat<T>(soft_damping_ratio));
+  T rate = frequency / (2.0 * damping + h * frequency);
+  T softness = rate / (h * frequency * frequency);
+  NormalRows<T> rows = block.pushing;
+  if (any(is_late)) {
+    Vec<T> turn = turned(), soft = softness * Vec<T>{none, compliance[1][1], compliance[2][2]};
+    put<T>(
+        is_late,
+        NormalRows<T>{
+            soft, rate * Vec<T>{none, dot(turn, block.shape.axis_1), dot(turn, block.shape.axis_2)},
+            softened(compliance, soft)},
+        rows);
+    put<T>(is_late, rows, block.relaxed);
   }
-  double limit = is_late ? late_push_out_limit : push_out_limit;
-  double slowed = is_spring ? 1.0 : std::min(1.0, limit / (rate * depth));
+  T limit = select<T>(is_late, splat<T>(late_push_out_limit), splat<T>(push_out_limit));
+  T slowed = min(limit / (rate * depth), splat<T>(1.0));
+  slowed = select<T>(is_spring, splat<T>(1.0), slowed);
   rows.softness[0] = slowed * softness * compliance[0][0];
   rows.bias[0] = -slowed * rate * depth;
   rows.mass = softened(compliance, rows.softness);
-  if (is_spring) block.relaxed = rows;
+  put<T>(pushes, rows, block.pushing);
+  if (any(is_spring)) put<T>(is_spring, rows, block.relaxed);
 }
 
 // From a body's centre of mass to a point. On one that no force moves, a point goes around by the chord
 // of the step: by the tangent, what lies on a turntable would creep outward.
-inline Vec<double> arm_of(const Moving& body, const Vec<double>& point, double h) {
-  Vec<double> arm = point - body.placed.position;
-  return body.inverse_mass > 0.0 ? arm : arm + 0.5 * h * cross(body.angular, arm);
+template <class T, class Body>
+BC_INLINE Vec<T> arm_of(const Body& body, const PlacedOf<T>& at, const Vec<T>& point, double h) {
+  Vec<T> arm = point - at.position;
+  Mask<T> is_free = body.inverse_mass > 0.0;
+  if (!any(body.inverse_mass <= 0.0)) return arm;
+  return select(is_free, arm, arm + 0.5 * h * cross(body.angular, arm));
 }
 
-// Put the point of a patch where its bodies are now. Returns its depth there.
-inline double place(const Patch& patch, const Moving& a, const Moving& b, double h, Block& block) {
+template <class T>
+struct Place {
+  Arms<T> arms;
+  T depth;  // [m]
+};
+// Where the point of a patch is, and how deep the patch is there.
+template <class T, class Body>
+BC_INLINE Place<T> place(const Body& a, const Body& b, const Where<T>& at_a, const Where<T>& at_b,
+                         double h, const Rows<T>& block) {
   // The patch goes with the body that no force moves, or with the mean of two that are free.
-  Vec<double> way_a = carried(patch.asked_a, a.placed, patch.point) - patch.point;
-  Vec<double> way_b = carried(patch.asked_b, b.placed, patch.point) - patch.point;
-  double share = a.inverse_mass > 0.0 ? b.inverse_mass > 0.0 ? 0.5 : 1.0 : 0.0;
-  Vec<double> point = patch.point + (1.0 - share) * way_a + share * way_b;
-  block.arm_a = arm_of(a, point, h);
-  block.arm_b = arm_of(b, point, h);
-  return patch.depth + dot(way_a - way_b, patch.normal);
+  auto way = [&](const PlacedOf<T>& at, const Vec<T>& local) __attribute__((always_inline)) {
+    return (at.position + at.axes * local) - block.point;
+  };
+  Vec<T> way_a = way(at_a.placed, block.local_a), way_b = way(at_b.placed, block.local_b);
+  T share = select<T>(b.inverse_mass > 0.0, splat<T>(0.5), splat<T>(1.0));
+  share = select<T>(a.inverse_mass > 0.0, share, T{});
+  Vec<T> point = block.point + (1.0 - share) * way_a + share * way_b;
+  return {{arm_of<T>(a, at_a.placed, point, h), arm_of<T>(b, at_b.placed, point, h)},
+          block.asked_depth + dot(way_a - way_b, block.normal)};
 }
 
-// Make the masses of friction and torsion, and how pressing and rocking comply.
-inline void weigh(const Moving& a, const Moving& b, Block& block) {
-  const Rectangle& shape = block.shape;
-  const Vec<double>&arm_a = block.arm_a, &arm_b = block.arm_b, &normal = block.normal;
-  Vec<double> about = shape.radius * normal;
-  Mat<double> along =
-      compliance<2>(a, b, {cross(arm_a, shape.axis_1), cross(arm_a, shape.axis_2), about},
-                    {cross(arm_b, shape.axis_1), cross(arm_b, shape.axis_2), about},
-                    {shape.axis_1, shape.axis_2});
-  block.friction_mass = inverse(along);
-  block.least_friction_mass = 1.0 / std::max(std::max(along[0][0], along[1][1]), along[2][2]);
-  block.across = compliance<1>(a, b, {cross(arm_a, normal), shape.axis_1, shape.axis_2},
-                               {cross(arm_b, normal), shape.axis_1, shape.axis_2}, {normal});
+// The masses of friction and torsion, and how pressing and rocking comply.
+template <class T, class Body>
+BC_INLINE Masses<T> weigh(const Body& a, const Body& b, const Rows<T>& block) {
+  const RectangleOf<T>& shape = block.shape;
+  const Vec<T>&arm_a = block.arm_a, &arm_b = block.arm_b, &normal = block.normal;
+  Vec<T> about = shape.radius * normal;
+  Mat<T> along =
+      compliance<2, T>(a, b, {cross(arm_a, shape.axis_1), cross(arm_a, shape.axis_2), about},
+                       {cross(arm_b, shape.axis_1), cross(arm_b, shape.axis_2), about},
+                       {shape.axis_1, shape.axis_2});
+  return {compliance<1, T>(a, b, {cross(arm_a, normal), shape.axis_1, shape.axis_2},
+                           {cross(arm_b, normal), shape.axis_1, shape.axis_2}, {normal}),
+          inverse(along), 1.0 / max(along[2][2], max(along[1][1], along[0][0]))};
 }
 
 // Make the rows of a patch, where its bodies are now.
-inline void prepare(const Patch& patch, const Moving& a, const Moving& b, const SubSteps& step,
-                    Block& block) {
-  block.normal = patch.normal;
-  block.surface = patch.surface;
-  block.shape = patch.shape;
-  block.friction = patch.friction;
+template <class T, class Body, class Turned>
+BC_INLINE void prepare(const SubSteps& step, const Body& a, const Body& b, const Where<T>& at_a,
+                       const Where<T>& at_b, const Turned& turned, Rows<T>& block) {
   block.normal_counted = block.friction_counted = {};
-  block.depth = place(patch, a, b, step.length, block);
-  weigh(a, b, block);
-  soften(patch, step, a, b, block);
+  auto [arms, depth] = place(a, b, at_a, at_b, step.length, block);
+  static_cast<Arms<T>&>(block) = arms;
+  block.depth = depth;
+  static_cast<Masses<T>&>(block) = weigh(a, b, block);
+  soften(step, turned, block);
 }
 
 // `still`: rows stay where they are while their bodies turn by no more than this [rad], and slide by no
@@ -136,15 +161,19 @@ constexpr double still = 0x1p-30, alike = 0x1p-10;
 
 // Let the rows go with bodies that have moved: impulses by the arms of before would change the angular
 // momentum, and by the inertia of before the energy.
-inline void follow(const Patch& patch, const Moving& a, const Moving& b, double h, Block& block) {
-  double turned = std::max(length(a.angular), length(b.angular));
-  double way = length(b.linear - a.linear);
-  double moved = h * std::max(turned, way / block.shape.half_1);
-  if (moved <= still) return;
-  place(patch, a, b, h, block);
-  if (moved <= alike) return;
-  weigh(a, b, block);
-  block.relaxed.mass = softened(block.across, block.relaxed.softness);
+template <class T, class Body>
+BC_INLINE void follow(const Body& a, const Body& b, const Where<T>& at_a, const Where<T>& at_b,
+                      double h, Rows<T>& block) {
+  T turned = max(length(b.angular), length(a.angular));
+  T way = length(b.linear - a.linear);
+  T moved = h * max(way / block.shape.half_1, turned);
+  Mask<T> goes = moved > still;
+  if (!any(goes)) return;
+  put<T>(goes, place(a, b, at_a, at_b, h, block).arms, static_cast<Arms<T>&>(block));
+  Mask<T> weighs = moved > alike;
+  if (!any(weighs)) return;
+  put<T>(weighs, weigh(a, b, block), static_cast<Masses<T>&>(block));
+  put<T>(weighs, softened(block.across, block.relaxed.softness), block.relaxed.mass);
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET::force

@@ -14,54 +14,66 @@
 namespace box_contact::BOX_CONTACT_SET::force {
 
 // Rocking per pressing, from where to where: N·n at x·e1 + y·e2 has the moment N·(y·e1 − x·e2).
-inline Span rocking_1(const Rectangle& shape) { return shape.span_2; }
-inline Span rocking_2(const Rectangle& shape) { return {-shape.span_1.high, -shape.span_1.low}; }
+template <class T>
+BC_INLINE SpanOf<T> rocking_1(const RectangleOf<T>& shape) {
+  return shape.span_2;
+}
+template <class T>
+BC_INLINE SpanOf<T> rocking_2(const RectangleOf<T>& shape) {
+  return {-shape.span_1.high, -shape.span_1.low};
+}
 
 // The impulses of least energy on the rims.
+template <class T>
 class OnTheRim {
  public:
-  OnTheRim(const Rectangle& shape, const Mat<double>& a, const Vec<double>& b)
+  BC_INLINE OnTheRim(const RectangleOf<T>& shape, const Mat<T>& a, const Vec<T>& b)
       : a_(a), b_(b), spans_{rocking_1(shape), rocking_2(shape)} {
-    for (double first : {spans_[0].low, spans_[0].high}) {
-      for (double second : {spans_[1].low, spans_[1].high}) take_edge({1.0, first, second});
-      take_face({1.0, first, 0.0}, 2);
+    T one = splat<T>(1.0), none{};
+    const T firsts[] = {spans_[0].low, spans_[0].high}, seconds[] = {spans_[1].low, spans_[1].high};
+    for (const T& first : firsts) {
+      for (const T& second : seconds) take_edge({one, first, second});
+      take_face({one, first, none}, 2);
     }
-    for (double second : {spans_[1].low, spans_[1].high}) take_face({1.0, 0.0, second}, 1);
+    for (const T& second : seconds) take_face({one, none, second}, 1);
   }
-  const Vec<double>& impulses() const { return best_; }
+  BC_INLINE const Vec<T>& impulses() const { return best_; }
 
  private:
-  void take_edge(const Vec<double>& edge) {
-    double along = dot(edge, b_);
-    if (along < 0.0) take((-along / dot(edge, a_ * edge)) * edge);
+  BC_INLINE void take_edge(const Vec<T>& edge) {
+    T along = dot(edge, b_);
+    Mask<T> presses = along < 0.0;
+    if (any(presses)) take(presses, (-along / dot(edge, a_ * edge)) * edge);
   }
   // The face along an edge, whose rocking `row` is free.
-  void take_face(const Vec<double>& edge, int row) {
-    Vec<double> pushed = a_ * edge;
-    double ee = dot(edge, pushed), er = pushed[row], rr = a_[row][row];
-    double determinant = ee * rr - er * er, along = dot(edge, b_);
-    if (!(determinant > 0.0)) return;
-    double pressing = (er * b_[row] - rr * along) / determinant;
-    double rocking = (er * along - ee * b_[row]) / determinant;
-    const Span& span = spans_[row - 1];
-    if (!(pressing > 0.0) || rocking < pressing * span.low || rocking > pressing * span.high)
-      return;
-    Vec<double> impulses = pressing * edge;
+  BC_INLINE void take_face(const Vec<T>& edge, int row) {
+    Vec<T> pushed = a_ * edge;
+    T ee = dot(edge, pushed), er = pushed[row], rr = a_[row][row];
+    T determinant = ee * rr - er * er, along = dot(edge, b_);
+    Mask<T> is_face = determinant > 0.0;
+    if (!any(is_face)) return;
+    T pressing = (er * b_[row] - rr * along) / determinant;
+    T rocking = (er * along - ee * b_[row]) / determinant;
+    const SpanOf<T>& span = spans_[row - 1];
+    Mask<T> is_within = is_face & (pressing > 0.0) & (rocking >= pressing * span.low) &
+                        (rocking <= pressing * span.high);
+    if (!any(is_within)) return;
+    Vec<T> impulses = pressing * edge;
     impulses[row] = rocking;
-    take(impulses);
+    take(is_within, impulses);
   }
-  void take(const Vec<double>& impulses) {
-    double energy = dot(impulses, 0.5 * (a_ * impulses) + b_);
-    if (!(energy < energy_)) return;
-    energy_ = energy;
-    best_ = impulses;
+  BC_INLINE void take(Mask<T> allowed, const Vec<T>& impulses) {
+    T energy = dot(impulses, 0.5 * (a_ * impulses) + b_);
+    Mask<T> is_less = allowed & (energy < energy_);
+    energy_ = select<T>(is_less, energy, energy_);
+    for (int k = 0; k < 3; ++k) best_[k] = select<T>(is_less, impulses[k], best_[k]);
   }
 
-  const Mat<double>& a_;
-  const Vec<double>& b_;
-  Span spans_[2];
-  Vec<double> best_{0.0, 0.0, 0.0};
-  double energy_ = 0.0;
+  const Mat<T>& a_;
+  const Vec<T>& b_;
+  SpanOf<T> spans_[2];
+  Vec<T> best_{};
+  T energy_{};
 };
 
 }  // namespace box_contact::BOX_CONTACT_SET::force

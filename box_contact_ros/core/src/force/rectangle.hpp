@@ -50,24 +50,28 @@ inline bool is_covariance(const double* c) {
 }
 
 // From where to where along an axis, with 0 within [m].
-struct Span {
-  double low, high;
+template <class T>
+struct SpanOf {
+  T low, high;
 
-  Span within(const Span& other) const {
+  SpanOf within(const SpanOf& other) const {
     return {std::min(0.0, std::max(low, other.low)), std::max(0.0, std::min(high, other.high))};
   }
 };
+using Span = SpanOf<double>;
 
-struct Rectangle {
-  Vec<double> axis_1, axis_2;  // along its sides; with the normal a right-handed frame
-  double half_1, half_2;       // half lengths along them [m]
-  double radius;               // at which friction resists a spin [m]
-  Span span_1, span_2;         // where the centre of pressure may be along the axes [m]
+template <class T>
+struct RectangleOf {
+  Vec<T> axis_1, axis_2;     // along its sides; with the normal a right-handed frame
+  T half_1, half_2;          // half lengths along them [m]
+  T radius;                  // at which friction resists a spin [m]
+  SpanOf<T> span_1, span_2;  // where the centre of pressure may be along the axes [m]
 
   bool has_area() const {
     return half_1 > 0.0 && half_2 > 0.0 && half_1 <= place_max && half_2 <= place_max;
   }
 };
+using Rectangle = RectangleOf<double>;
 
 // The edge of a box with such axes that is most along its patch, as a direction in the plane of that.
 inline Vec<double> edge_in_plane(const Vec<double>& normal, const Mat<double>& axes) {

@@ -50,27 +50,34 @@ struct Body {
 };
 
 // Where a body is: its centre of mass, and its axes as columns; common frame.
-struct Placed {
-  Vec<double> position;
-  Mat<double> axes;
+template <class T>
+struct PlacedOf {
+  Vec<T> position;
+  Mat<T> axes;
 };
+using Placed = PlacedOf<double>;
 
 struct Motion {
   Vec<double> linear, angular;  // of the centre of mass [m/s], [rad/s]
 };
 
-inline Vec<double> cross(const Vec<double>& a, const Vec<double>& b) {
+template <class T>
+BC_INLINE Vec<T> cross(const Vec<T>& a, const Vec<T>& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
-inline double length(const Vec<double>& a) { return std::sqrt(dot(a, a)); }
+template <class T>
+BC_INLINE T length(const Vec<T>& a) {
+  return sqrt(dot(a, a));
+}
 inline Vec<double> vector_at(const double* numbers) { return {numbers[0], numbers[1], numbers[2]}; }
 inline Vec<double> vector(const double (&numbers)[3]) { return vector_at(numbers); }
 
 // The inverse of a matrix, by its cofactors. One whose determinant is not positive gives zero.
-inline Mat<double> inverse(const Mat<double>& m) {
-  Vec<double> r0 = row(m, 0), r1 = row(m, 1), r2 = row(m, 2), c0 = cross(r1, r2);
-  double determinant = dot(r0, c0), s = determinant > 0.0 ? 1.0 / determinant : 0.0;
-  Vec<double> x = s * c0, y = s * cross(r2, r0), z = s * cross(r0, r1);
+template <class T>
+BC_INLINE Mat<T> inverse(const Mat<T>& m) {
+  Vec<T> r0 = row(m, 0), r1 = row(m, 1), r2 = row(m, 2), c0 = cross(r1, r2);
+  T determinant = dot(r0, c0), s = select<T>(determinant > 0.0, 1.0 / determinant, T{});
+  Vec<T> x = s * c0, y = s * cross(r2, r0), z = s * cross(r0, r1);
   return {{{x[0], y[0], z[0]}, {x[1], y[1], z[1]}, {x[2], y[2], z[2]}}};
 }
 

@@ -35,7 +35,7 @@ inline void add_loads(const Island& island, Islands& islands) {
     block.normal_impulses = block.normal_sum;
     block.friction_impulses = block.friction_sum;
     block.normal_counted = block.friction_counted = {};
-    count(block, islands.moving[size_t(block.a)], islands.moving[size_t(block.b)]);
+    count<double>(block, islands.moving[size_t(block.a)], islands.moving[size_t(block.b)]);
   }
 }
 

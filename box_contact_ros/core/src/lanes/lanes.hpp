@@ -4,9 +4,10 @@
 // Lanes: the numbers of one pair of boxes, or of W pairs side by side.
 //
 // From poses to moments, the core's functions are templates over T: `double` for a pair alone, or
-// `Lanes<double, W>`, a vector of the compiler, with one pair in each of its W lanes. Forces and the
-// broad phase have no lanes. All functions here work on each lane alone, so a pair has the same bits
-// in every lane of every width. Where a pair alone takes another way (`packed`), tests compare bits.
+// `Lanes<double, W>`, a vector of the compiler, with one pair in each of its W lanes. The blocks of forces
+// are such templates, too, and the broad phase has no lanes. All functions here work on each lane alone,
+// so a pair has the same bits in every lane of every width. Where a pair alone takes another way
+// (`packed`), tests compare bits.
 #pragma once
 
 #include <cmath>

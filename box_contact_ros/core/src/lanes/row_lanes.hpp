@@ -45,7 +45,13 @@ BC_INLINE void load_rows(const Row& row_at, T (&x)[count]) {
   if constexpr (shuffles<T>) {
     auto row = [&](int i) {
       const double* at = row_at(i);
-      return FourNumbers{at[0], at[1], at[2], at[count - 1]};
+      FourNumbers four;
+      if constexpr (count == 4) {
+        std::memcpy(&four, at, sizeof four);
+      } else {
+        four = FourNumbers{at[0], at[1], at[2], at[count - 1]};
+      }
+      return four;
     };
     T all[4];
     for (int i = 0; i < 4; ++i) {
@@ -65,7 +71,8 @@ BC_INLINE void load_rows(const Row& row_at, T (&x)[count]) {
 
 // Write up to four numbers to the addresses of the lanes whose bit is set.
 template <int count, class T>
-BC_INLINE void store_rows(double* const (&addresses)[width<T>], unsigned chosen, const T (&x)[count]) {
+BC_INLINE void store_rows(double* const (&addresses)[width<T>], unsigned chosen,
+                          const T (&x)[count]) {
   if constexpr (shuffles<T> && count >= 3) {
     T all[4] = {x[0], x[1], x[2], x[count - 1]};
     transpose_fours(all);

@@ -257,9 +257,12 @@ bc_status bc_patch_forces_create(const bc_body* bodies, int64_t count,
     if (bc_status status = check_options(all)) return status;
     std::vector<Body> read;
     if (bc_status status = read_bodies(bodies, count, read)) return status;
-    *forces = handle(new PatchForces(
-        std::move(read), {all.substeps, all.iterations, all.relaxations, all.threads, all.friction,
-                          all.most_depth, all.rest ? all.rest_speed : 0.0}));
+    const Kernel* kernel = chosen_kernel();
+    *forces =
+        handle(new PatchForces(std::move(read),
+                               {all.substeps, all.iterations, all.relaxations, all.threads,
+                                all.friction, all.most_depth, all.rest ? all.rest_speed : 0.0},
+                               kernel ? &kernel->side : nullptr));
     return BC_OK;
   });
 }

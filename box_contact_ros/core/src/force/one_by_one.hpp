@@ -1,0 +1,58 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// What an advance does with a block.
+#pragma once
+
+#include "iterations.hpp"
+#include "preparing.hpp"
+
+namespace box_contact::BOX_CONTACT_SET::force {
+
+// Islands that are advanced together, and the groups of their blocks: a block alone, or side by side.
+// Kernels of all instruction sets have it alike.
+struct Work {
+  Island *first, *last;
+  Moving* moving;
+  Block* blocks;
+  const Patch* patches;
+  void* groups;
+  size_t group_count;
+  const SubSteps& steps;
+  int iterations, relaxations;
+  bool counts;           // whether impulses are added up
+  bool is_last = false;  // whether it is the last sub-step
+};
+
+// By how much B has turned more than A since the answer.
+inline Vec<double> turned_since(const Patch& patch, const Moving& a, const Moving& b) {
+  return turn(patch.asked_b, b.placed) - turn(patch.asked_a, a.placed);
+}
+
+inline void prepare(const Work& work, Block& block) {
+  Moving &a = work.moving[block.a], &b = work.moving[block.b];
+  auto turned = [&] { return turned_since(work.patches[block.patch], a, b); };
+  prepare<double>(work.steps, a, b, a, b, turned, block);
+  warm_start<double>(work.steps, block, a, b);
+}
+inline void follow(const Work& work, Block& block) {
+  const Moving &a = work.moving[block.a], &b = work.moving[block.b];
+  follow<double>(a, b, a, b, work.steps.length, block);
+}
+// Solve it if its bodies have changed since its last turn. Returns whether a speed changed.
+inline bool solve(const Work& work, bool is_pushing, int iteration, Block& block) {
+  Moving &a = work.moving[block.a], &b = work.moving[block.b];
+  if (std::max(a.changed, b.changed) < iteration - 1) return false;
+  double closing = solve_normal<double>(block, rows_of(block, is_pushing), true, a, b);
+  double slipping = solve_friction<double>(block, true, a, b);  // bounded by what presses now
+  if (closing > impact_change) work.first->is_struck = true;
+  if (std::max(closing, slipping) <= least_change) return false;
+  if (a.inverse_mass > 0.0) a.changed = iteration;
+  if (b.inverse_mass > 0.0) b.changed = iteration;
+  return true;
+}
+inline void count(const Work& work, Block& block) {
+  count<double>(block, work.moving[block.a], work.moving[block.b]);
+}
+
+}  // namespace box_contact::BOX_CONTACT_SET::force
