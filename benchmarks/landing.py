@@ -4,10 +4,10 @@
 """Landings by the way of contact: whether the container comes to rest, and how flat.
 
 It runs a grid of 36 landings by every way (some by a sample), rate and latency. It also lands other
-loads and stacks, with an expected outcome (`landing_ways`). It writes landing.csv
-(a row per landing), landing.md (tables) and landing.png (one landing, two ways). The exit status
-is 1 if patches of `exact`, the default, do not do all that is expected. Misses of `mlp` are printed
-and counted on the page.
+loads and stacks, with an expected outcome (`landing_ways`). It writes landing.csv (a row per
+landing), landing.md (tables) and landing.png (one landing, several ways). The exit status is 1
+if patches of `exact`, the default, do not do all that is expected. Misses of `mlp` are printed and
+counted on the page.
 """
 from __future__ import annotations
 
@@ -18,20 +18,17 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from itertools import groupby, product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from tqdm import tqdm
 
 from box_contact_ros.demo.crane import CraneScenario
-from box_contact_ros.demo.landing import CORNER_SPEED_LIMIT, LandingRecord
-from box_contact_ros.solver.pose import rotation_matrix
+from box_contact_ros.demo.landing import CORNER_SPEED_LIMIT
 
 from . import output
-from .engines import mujoco_engines
 from .landing_ways import (
     ADDED,
-    WATCHED,
     WAYS,
     HeldLimits,
     Landed,
@@ -39,7 +36,6 @@ from .landing_ways import (
     PlannedLanding,
     aimed,
     grid,
-    solvers,
 )
 
 TIMINGS = [LoopTiming(*timing) for timing in product((50.0, 200.0, 1000.0), (0.0, 0.002, 0.005))]
@@ -178,65 +174,43 @@ def added_table(outcomes: Sequence[Outcome]) -> str:
 
 # --- picture --------------------------------------------------------------------------------------
 
-SHOWN_WAYS = {'exact': 'one patch', 'manifold': "MuJoCo's manifold"}
-SHOWN_TIMING = LoopTiming(200.0, 0.002)
-EXAGGERATION = 15.0  # of the tilt: a third of a degree would not be seen
-LATEST = 1.0  # so long are contacts shown [s]
-COLOURS = {'load': '#9aa7b5', 'stack': '#d9dde2', 'contact': '#d1495b', 'speed': '#00798c'}
+DRAWN = {
+    ('exact', 50.0): ('one patch, at 50 Hz', '#9ecae1', '-'),
+    ('exact', 200.0): ('one patch, at 200 Hz', '#4292c6', '-'),
+    ('exact', 1000.0): ('one patch, at 1000 Hz', '#084594', '-'),
+    ('manifold', 1000.0): ("MuJoCo's manifold, at each step", output.COLOURS['MuJoCo'], '--')}
+"""Ways and rates [Hz] of the picture: names, colours and styles of their curves."""
+QUICK_TIMING = LoopTiming(200.0, 0.002)
+LATENCY = 0.002  # of the answers in the picture [s]
+TIMES, SPEEDS = (-1.0, 6.0), (1e-7, 3e3)
+"""Times after the touch [s] and speeds [mm/s] that are drawn; slower ones are at the edge."""
 
 
 def draw(path: Path, scenario: CraneScenario) -> None:
-    """Draw one landing by two ways: the load from its end, and the speed of its fastest corner."""
-    figure, axes = output.subplots(2, len(SHOWN_WAYS), (6.4, 4.6), sharey='row')
-    for (side, speed), (way, title) in zip(axes.T, SHOWN_WAYS.items()):
-        record = WAYS[way].run(scenario, SHOWN_TIMING)
+    """Draw the speed of the load's fastest corner in one landing, by ways and rates."""
+    figure, axes = output.subplots(1, 1, (6.4, 3.6))
+    axis, limit = axes[0, 0], 1e3 * CORNER_SPEED_LIMIT
+    axis.axhspan(SPEEDS[0], limit, color='0.93', zorder=0)
+    axis.text(TIMES[1] - 0.1, 0.6 * limit, f'at rest: below {limit:g} mm/s', ha='right', va='top',
+              fontsize=9, color='0.35')
+    settled = []
+    for (way, rate_hz), (name, colour, style) in DRAWN.items():
+        record = WAYS[way].run(scenario, LoopTiming(rate_hz, LATENCY))
         result = record.judge()
-        settled = ('never settles' if math.isnan(result.settled) else
-                   f'settles in {result.settled:.1f} s')
-        side.set_title(f'{title}\n{settled}\ntilt {math.degrees(result.static_tilt):.2g}°',
-                       fontsize=10)
-        _draw_from_the_end(side, way, record)
         time = np.arange(len(record.poses)) / record.rate_hz - result.touched
-        shown = (time > -1.0) & (time < WATCHED)
-        speed.semilogy(time[shown], 1e3 * record.corner_speeds()[shown], linewidth=0.8,
-                       color=COLOURS['speed'])
-        speed.axhline(1e3 * CORNER_SPEED_LIMIT, color='black', linewidth=0.8, linestyle=':')
-        speed.set_xlabel('s after the touch', fontsize=9)
-        speed.set_ylim(1e-7, 3e3)
-    axes[1, 0].set_ylabel('fastest corner [mm/s]', fontsize=9)
-    axes[1, 0].text(WATCHED, 1.4e3 * CORNER_SPEED_LIMIT, 'limit', fontsize=8, ha='right')
-    figure.suptitle(f'One landing, one contact each {1e3 / SHOWN_TIMING.rate_hz:g} ms, '
-                    f'{1e3 * SHOWN_TIMING.latency:g} ms late (tilt drawn × {EXAGGERATION:g}; '
-                    'red: where it pushes)', fontsize=10)
-    figure.savefig(path)
-
-
-def _draw_from_the_end(axis: Any, way: str, record: LandingRecord) -> None:
-    """Draw stack and load as seen along the stack's length, and the contacts of the end."""
-    scenario, pose = record.scenario, record.poses[-1]
-    width, top = scenario.stack_size[1], scenario.stack_size[2]
-    stack = np.array([[-0.5, -1.0], [0.5, -1.0], [0.5, 0.0], [-0.5, 0.0]]) * [width, top]
-    roll = -math.asin(float(rotation_matrix(pose[3:])[1, 2])) * EXAGGERATION
-    turn = np.array([[math.cos(roll), -math.sin(roll)], [math.sin(roll), math.cos(roll)]])
-    load = np.array([[-0.5, 0.0], [0.5, 0.0], [0.5, 1.0], [-0.5, 1.0]]) * scenario.size[1:]
-    load = load @ turn.T + [pose[1], 0.0]
-    for corners, colour in ((stack, 'stack'), (load, 'load')):
-        axis.fill(*corners.T, facecolor=COLOURS[colour], edgecolor='black', linewidth=0.8)
-    if way == 'manifold':
-        mujoco = mujoco_engines.collision('', mujoco_engines.box_geoms, '')
-        ask = mujoco.boxes(np.array(scenario.size), np.array(scenario.stack_size))
-        points = mujoco.read(ask(*mujoco.at(pose, scenario.stack_pose))).points
-    else:
-        first = len(record.poses) - round(LATEST * record.rate_hz)
-        points = np.array([point for tick, point in record.points.items() if tick >= first])
-    axis.plot(points[:, 1], points[:, 2] - top, 'o', markersize=6, color=COLOURS['contact'],
-              zorder=3, clip_on=False)
-    if way == 'exact':
-        contact = solvers(scenario, 'exact')[0](pose, scenario.stack_pose)
-        half = math.sqrt(3.0 * contact.covariance[1, 1])
-        axis.plot(contact.point[1] + np.array([-half, half]), [0.0, 0.0], linewidth=4,
-                  color=COLOURS['contact'], solid_capstyle='butt')
-    axis.set(xlim=(-2.2, 2.2), ylim=(-0.9, 1.6), aspect='equal', xticks=[], yticks=[])
+        shown = (time > TIMES[0]) & (time < TIMES[1])
+        axis.semilogy(time[shown], np.maximum(1e3 * record.corner_speeds()[shown], SPEEDS[0]),
+                      style, color=colour, linewidth=1.2, label=name)
+        settled.append(result.settled)
+    slowest = max(settled, key=lambda time: math.inf if math.isnan(time) else time)
+    axis.set(xlim=TIMES, ylim=SPEEDS, xlabel='time after the first touch [s]',
+             ylabel='fastest corner of the load [mm/s]', title='A container lands: ' + (
+                 'not every way settles' if math.isnan(slowest) else
+                 f'all ways settle within {slowest:.1f} s'))
+    axis.grid(color='0.9', linewidth=0.5)
+    axis.set_axisbelow(True)
+    axis.legend(fontsize=9, loc='upper right')
+    figure.savefig(path, metadata={'Software': None})
 
 
 # --- program --------------------------------------------------------------------------------------
@@ -250,7 +224,7 @@ def main(args: Sequence[str] | None = None) -> int:
                         metavar='WAY', help=f'ways to land, of {", ".join(WAYS)} (default: all)')
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
-    step, timings = (QUICK, [SHOWN_TIMING]) if options.quick else (1, TIMINGS)
+    step, timings = (QUICK, [QUICK_TIMING]) if options.quick else (1, TIMINGS)
     planned = [*grid()[SHOWN % step::step], *(ADDED[::3] if options.quick else ADDED)]
     with ProcessPoolExecutor() as pool:
         planned = list(tqdm(pool.map(aimed, planned), 'aiming', len(planned), unit=''))
