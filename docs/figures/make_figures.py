@@ -8,6 +8,7 @@ import argparse
 import contextlib
 import math
 import runpy
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -22,10 +23,16 @@ matplotlib.use('Agg')  # before pyplot: no display is needed
 
 from matplotlib import pyplot as plt
 
+sys.path.append(str(Path(__file__).resolve().parents[2]))  # where benchmarks/ is, not installed
+from benchmarks.contestant import CHOICES
+from benchmarks.engines import mujoco_engines
+from benchmarks.output import COLOURS
+
 STACK, LOAD, OVERLAP, POINT, CORNER = '#8c8c8c', '#4477aa', '#ccbb44', '#222222', '#ee6677'
 CONTAINER = (12.192, 2.438, 2.591)
 DEPTHS = {0.05: '#222222', 0.5e-3: '#777777', 0.03e-3: '#aaaaaa'}
 """Depths of the lowest corner in the graph [m], from a hard landing to rest, and their colours."""
+RIVAL_DEPTH = 0.5e-3  # at which MuJoCo's point is drawn [m]
 LEAST_TILT = 1e-4  # up to which the axis is linear [°]
 
 
@@ -75,6 +82,14 @@ def sketch(axes: plt.Axes, tilt: float) -> None:
     axes.axis('off')
 
 
+def mujoco_points(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the means (n, 3) by depth of MuJoCo's points, for containers at poses (n, 7)."""
+    mujoco = mujoco_engines.collision('', mujoco_engines.box_geoms, '')
+    ask = mujoco.boxes(np.array(CONTAINER), np.array(CONTAINER))
+    answers = [mujoco.read(ask(*mujoco.at(*poses))) for poses in zip(a, b)]
+    return np.array([CHOICES['mean by depth'](*answer) for answer in answers])
+
+
 def slide(axes: plt.Axes) -> None:
     """Where a container on another has its contact point, over the tilt, at some depths."""
     length, _, height = CONTAINER
@@ -91,6 +106,10 @@ def slide(axes: plt.Axes) -> None:
         found = ContactSolver(CONTAINER, CONTAINER).batch(a, b)
         axes.plot(degrees, found.point[:, 0], color=colour, linewidth=2,
                   label=f'{1e3 * depth:g} mm deep')
+        if depth == RIVAL_DEPTH:
+            rival = mujoco_points(a, b)[:, 0]
+    axes.plot(degrees, rival, '--', color=COLOURS['MuJoCo'],
+              label=f'MuJoCo, {1e3 * RIVAL_DEPTH:g} mm')
     ends = np.sign(tilts) * 0.5 * length * np.cos(tilts) - 0.5 * height * np.sin(tilts)
     ends[tilts == 0.0] = np.nan
     axes.plot(degrees, ends, color=CORNER, linewidth=2)

@@ -371,6 +371,7 @@ def test_files_named_in_backticks_exist():
 def test_figures_are_made(tmp_path):
     """The scripts draw all the figures there are; a browser takes the view's."""
     pytest.importorskip('matplotlib')
+    pytest.importorskip('mujoco')
     folder = ROOT / 'docs' / 'figures'
     for script in ('make_figures.py', 'make_architecture.py'):
         run(sys.executable, str(folder / script), '--out', str(tmp_path), MPLBACKEND='Agg')
