@@ -65,13 +65,11 @@ def typed(page: str, verb: str) -> Iterator[list[str]]:
 
 
 def test_the_lines_of_the_pages(ros2: Start) -> None:
-    """The terminals of README, the tutorial's question, a parameter, and the lifecycle."""
+    """The terminals of README, a parameter, and the lifecycle."""
     ros2('run', PACKAGE, 'contact_node', '--ros-args', '-p', 'pairing:=latest').wait_for_output(
         'ready')
     *_, echo = [ros2(*words) for words in typed('README.md', 'topic')]
     assert 'depth: 0.0100' in echo.wait_for_output('covariance')
-    question, = typed('docs/tutorials/from_your_simulator.md', 'service')
-    assert "success=True, message='', contacts=" in run(*question).stdout
     assert 'success=True' in run('service', 'call', '/contact_node/reset',
                                  'std_srvs/srv/Trigger').stdout
     setting, = typed('docs/reference/parameters.md', 'param')
@@ -80,6 +78,15 @@ def test_the_lines_of_the_pages(ros2: Start) -> None:
     for transition in ('deactivate', 'cleanup', 'configure', 'activate'):
         done = run('lifecycle', 'set', '/contact_node', transition)
         assert 'Transitioning successful' in done.stdout
+
+
+def test_the_questions_about_the_yard(ros2: Start) -> None:
+    ros2('run', PACKAGE, 'contact_node', '--ros-args', '-p',
+         f'scene:={ROOT}/config/scenes/yard_bay.yaml').wait_for_output('ready')
+    questions = list(typed('docs/tutorials/yard.md', 'service'))
+    assert len(questions) == 2
+    for question in questions:
+        assert "success=True, message='', contacts=" in run(*question).stdout
 
 
 @pytest.mark.parametrize('file', LAUNCH_FILES)
