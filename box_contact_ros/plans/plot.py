@@ -51,17 +51,21 @@ def plot(found: Inspection) -> Figure:
     axes.add_collection3d(Poly3DCollection(
         corners[drawn][:, _FACES].reshape(-1, 4, 3), edgecolors='0.25', linewidths=0.3,
         facecolors=np.repeat([colours[word] for word in words[drawn]], len(_FACES))))
-    loaded = np.flatnonzero(drawn & (found.load > 0.0))
-    for box in loaded if len(plan) <= MOST_LABELS else ():
+    loaded = np.flatnonzero(drawn & (found.load > 0.0)) if len(plan) <= MOST_LABELS else ()
+    for box in loaded:
         axes.text(*corners[box].mean(axis=0), f'{found.load[box] / 1e3:.3g}', fontsize=7,
                   ha='center', zorder=len(plan))
     if drawn.any():
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]),
                  xlabel='x [m]', ylabel='y [m]', zlabel='z [m]')
+        axes.xaxis.labelpad = 12.0
         axes.set_aspect('equal')
-        axes.locator_params(nbins=4)
+        axes.set_box_aspect(high - low, zoom=1.2)
+        for axis, length in zip('xyz', high - low):  # labels of a short axis would overlap
+            axes.locator_params(axis, nbins=max(1, round(4 * length / (high - low).max())))
     shown = [word for word in colours if word in words[drawn]]
     axes.legend(handles=[Patch(color=colours[word], label=word) for word in shown],
                 loc='upper left', fontsize=8)
-    axes.set_title(str(found).splitlines()[-1] + '\nnumbers: load on top [kN]', fontsize=9)
+    numbers = '\nnumbers: load on top [kN]' if len(loaded) else ''
+    axes.set_title(str(found).splitlines()[-1] + numbers, fontsize=9)
     return figure
