@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from box_contact_ros import ContactSolver
+from box_contact_ros import ContactSolver, inspect_plan, read_plan
 from box_contact_ros.extras import expect_extras
 
 expect_extras()
@@ -141,6 +141,14 @@ def plan_descent(folder: Path) -> None:
     example['draw'](ways, beside, str(folder / 'plan_descent.png'))
 
 
+def pallets(folder: Path) -> None:
+    """Draw pallets.png: five real orders, coloured by cause."""
+    orders = Path(__file__).parents[1] / 'examples' / 'pallets' / 'packing_plans.json'
+    figure = inspect_plan(read_plan(orders)).plot()
+    figure.set_size_inches(9, 5)
+    figure.savefig(folder / 'pallets.png', dpi=80, metadata={'Software': None})
+
+
 def main() -> None:
     """Draw all figures."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -154,6 +162,7 @@ def main() -> None:
     slide(axes['graph'])
     first_contact(folder)
     plan_descent(folder)
+    pallets(folder)
     # No version and no date in the file: the same figure is the same bytes.
     figure.savefig(folder / 'centroid.png', metadata={'Software': None})
 
