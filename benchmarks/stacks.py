@@ -5,7 +5,7 @@
 
 `python -m benchmarks.stacks` runs every scene by `PatchForces`, at several steps, rates and
 latencies, and by MuJoCo with contacts of its own. Both begin with the same boxes, and get the same
-outside forces. The program prints and writes stacks.md and stacks.csv. The exit status is 1 if a
+outside forces. The program prints and writes stacks.md, .csv and .png. The exit status is 1 if a
 scene of ours does not come to rest with answers at each step of 1 ms. `--record FILE` writes the
 pairs of all scenes to a file instead, as they were placed and after they have settled.
 
@@ -26,17 +26,17 @@ import numpy as np
 from box_contact_ros import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix
 
-from . import output, settled
+from . import output, settled, stacks_picture
 from .loops import MUJOCO, TIMINGS, Boxes, Scene, Timing, corner_speeds, near_pairs, steps
 from .pose_sets import Pairs, quaternion_multiply
 from .stack_scenes import ORDERS, SCENES, sideways
+from .stacks_picture import FALLEN_DEG
 
 LOST_SPEED = 100.0  # a run with a faster corner is over [m/s]
 REST_SPEED = 1e-3  # of the fastest corner of a scene at rest [m/s]
 JUDGED = 10  # steps from one judgement to the next
 PUSHES = (0.15, 0.3)  # on every box of a real pallet [weight]
 NEAR_MM, NEAR_DEG = 5.0, 0.5  # a box stays that moves and turns less
-FALLEN_DEG = 45.0  # a box that turned more fell
 
 # --- judgement ------------------------------------------------------------------------------------
 
@@ -180,7 +180,7 @@ def pushed(orders: Sequence[str]) -> str:
 def main(args: Sequence[str] | None = None) -> int:
     """Run all scenes, print and write; 1 if one of ours moves with answers at each step."""
     parser = output.report_parser(
-        'stacks', __doc__, out='stacks.md and stacks.csv', quick=f'every {QUICK}th scene')
+        'stacks', __doc__, out='stacks.md, .csv and .png', quick=f'every {QUICK}th scene')
     parser.add_argument('--record', type=Path, metavar='FILE', help='write pairs, and no report')
     options = parser.parse_args(args)
     chosen = SCENES[::QUICK if options.quick else 1]
@@ -208,6 +208,7 @@ def main(args: Sequence[str] | None = None) -> int:
     output.write_csv(folder / 'stacks.csv', (
         {'scene': name, 'way': way, **asdict(each)}
         for name, ways in found.items() for way, each in ways.items()), digits=3, about=about)
+    stacks_picture.draw(folder / 'stacks.png', folder / 'stacks.csv')
     output.write_page(folder, 'stacks', args, machine=about, rest=rest, both=both,
                       pushed=pushed(ORDERS[:1] if options.quick else ORDERS))
     missed = [name for name, ways in found.items() if math.isnan(ways[ours].rest)]

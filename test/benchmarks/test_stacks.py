@@ -14,7 +14,7 @@ import pytest
 
 pytest.importorskip('mujoco')
 
-from benchmarks import settled, stacks
+from benchmarks import output, settled, stacks, stacks_picture
 from benchmarks.loops import MUJOCO, TIMINGS, Boxes, Scene, Timing, corner_speeds, steps
 from benchmarks.stack_scenes import ORDERS, off_centre, ratio, sideways, slope, tower, turntable
 from benchmarks.stacks import run, stays
@@ -96,3 +96,20 @@ def test_pairs_are_recorded(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> 
     for name in (settled.PLACED, f'settled by {settled.OURS}'):
         assert len(sets[name].size) == 2
     assert len(settled.by_scene(found)['tower of 2'].size) == 2
+
+
+def test_the_map_tells_rest_from_creep_and_fall(tmp_path: Path) -> None:
+    """A box that falls with the best answers, too, is no fault; the picture has every run."""
+    still = {'rest': '0.3', 'end_speed': '1e-9', 'turned': '0'}
+    moves = {'rest': '', 'end_speed': '0.57', 'turned': '60'}
+    assert stacks_picture.cell(still, still)[0] == '0.3 s'
+    assert stacks_picture.cell(moves, still)[0] == 'fell'
+    text, colour = stacks_picture.cell(moves, moves)
+    assert text == '570 mm/s' and colour != stacks_picture.cell({**moves, 'end_speed': '0.002'},
+                                                                moves)[1]
+    rows = [{'scene': scene, 'way': way, **run} for scene, way, run in (
+        ('tower', 'each step', still), ('tower', MUJOCO, moves),
+        ('heap', 'each step', moves), ('heap', MUJOCO, still))]
+    output.write_csv(tmp_path / 'stacks.csv', rows)
+    stacks_picture.draw(tmp_path / 'stacks.png', tmp_path / 'stacks.csv')
+    assert (tmp_path / 'stacks.png').stat().st_size > 10_000

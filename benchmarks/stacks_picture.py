@@ -1,0 +1,63 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The picture of the report `stacks`: a map of scenes and timings, and when each comes to rest."""
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from . import output
+
+FALLEN_DEG = 45.0  # a box that turned more fell
+REST = ((0.1, '#1a9850'), (0.5, '#66bd63'), (2.0, '#a6d96a'), (math.inf, '#d9ef8b'))
+"""Times by which a scene is at rest [s], and their colours."""
+CREEPS, MOVES, FELL = '#fee08b', '#f46d43', '#a50026'
+CREEP = 10.0  # the fastest corner of a scene that creeps [mm/s]
+
+
+def cell(row: dict[str, str], best: dict[str, str]) -> tuple[str, str]:
+    """Return text and colour of a run; best: the same scene with answers at each step of 1 ms."""
+    if float(row['turned']) > FALLEN_DEG > float(best['turned']):
+        return 'fell', FELL
+    if row['rest']:
+        rest = float(row['rest'])
+        return f'{rest:.2g} s', next(colour for most, colour in REST if rest <= most)
+    speed = 1e3 * float(row['end_speed'])
+    return f'{output.number(speed, 2)} mm/s', CREEPS if speed <= CREEP else MOVES
+
+
+def draw(path: Path, table: Path) -> None:
+    """Draw the map from the CSV: a row per scene, a column per timing, MuJoCo in the last."""
+    from matplotlib.patches import Patch
+
+    runs: dict[str, dict[str, dict[str, str]]] = {}
+    for row in output.read_csv(table):
+        runs.setdefault(row['scene'], {})[row['way']] = row
+    ways = list(next(iter(runs.values())))
+    cells = [[cell(of_scene[way], of_scene[ways[0]]) for way in ways]
+             for of_scene in runs.values()]
+    figure, axes = output.subplots(1, 1, (8.0, 1.7 + 0.23 * len(runs)))
+    axis = axes[0, 0]
+    for place, line in enumerate(cells):
+        for column, (text, colour) in enumerate(line):
+            axis.barh(place, 1.0, left=column - 0.5, height=1.0, color=colour, edgecolor='white')
+            axis.text(column, place, text, ha='center', va='center', fontsize=8,
+                      color='white' if colour in (FELL, REST[0][1]) else 'black')
+    axis.set_xticks(range(len(ways)), [way.replace(', ', ',\n') for way in ways], fontsize=8)
+    axis.xaxis.tick_top()
+    axis.set_yticks(range(len(runs)), runs, fontsize=8)
+    axis.set(xlim=(-0.5, len(ways) - 0.5), ylim=(len(runs) - 0.5, -0.5))
+    axis.tick_params(length=0)
+    axis.spines[:].set_visible(False)
+    at_rest = [sum(bool(of_scene[way]['rest']) for of_scene in runs.values()) for way in
+               (ways[0], ways[-1])]
+    axis.set_title(f'Of {len(runs)} scenes, {at_rest[0]} come to rest with answers at each step of '
+                   f'1 ms, and {at_rest[1]} in MuJoCo', fontsize=10)
+    bounds = [f'at rest by {most:g} s' for most, _ in REST[:-1]] + ['later']
+    figure.legend(
+        handles=[Patch(color=colour, label=label) for label, colour in (
+            *zip(bounds, (colour for _, colour in REST)), (f'up to {CREEP:g} mm/s', CREEPS),
+            ('faster', MOVES), ('fell', FELL))],
+        loc='outside lower center', ncols=7, fontsize=8, frameon=False)
+    figure.savefig(path, metadata={'Software': None})
