@@ -361,12 +361,12 @@ def test_between_two_landings_the_heading_tells_what_comes(view_node, monkeypatc
 
 def test_the_legend_names_the_boxes():
     """Each in its colour, three at most; a name is text."""
-    assert [f'rgb{colour}">■</span> {name} ' in legend(ROWS)
+    assert [f'rgb{colour}">■</span>&nbsp;{name} ' in legend(ROWS)
             for colour, name in ((BOX_A, 'box_a'), (BOX_B, 'box_b'))] == [True, True]
     boxes = {name: Box(CUBE, pose_topic='p') for name in ('<b>', 'l1', 'l2', 'l3', 'l4', 'stack')}
     pairs = tuple(Pair.between(name, 'stack') for name in boxes if name != 'stack')
     text = legend(SceneRows(Scene(boxes, pairs)))
-    assert '&lt;b&gt;, l1, l2 and 2 more' in text and '> stack ' in text
+    assert '&lt;b&gt;, l1, l2 and 2 more' in text and '&nbsp;stack ' in text
 
 
 @pytest.mark.parametrize(('volume', 'words'), [

@@ -225,7 +225,7 @@ def legend(rows: SceneRows) -> str:
     names = np.array(list(rows.scene.boxes), dtype=object)
     parts = [(style.BOX_A, names[rows.is_a]), (style.BOX_B, names[~rows.is_a]),
              (style.CONTACT, ['contact: point, normal, patch']), (style.NEAR, ['near: distance'])]
-    return ''.join(f'<span style="white-space:nowrap;color:rgb{colour}">■</span> '
+    return ''.join(f'<span style="color:rgb{colour}">■</span>&nbsp;'  # no square ends a line
                    f'{html.escape(_first(words))} &ensp;' for colour, words in parts if len(words))
 
 
