@@ -20,6 +20,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -32,6 +33,7 @@ from ..output import (
     machine,
     markdown_table,
     page,
+    read_csv,
     report_parser,
     results_folder,
     subplots,
@@ -41,6 +43,9 @@ from ..pose_sets import log_uniform
 from . import dataset
 from .fit import PaperSettings, fit
 from .jobs import JOBS, MIXTURE, PaperJob
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 PACKAGES = ('numpy', 'torch')  # whose versions are named
 NAME = 'search_paper'  # of the files
@@ -211,25 +216,28 @@ def write_table(path: Path, results: Sequence[Search]) -> None:
     write_csv(path, rows, about=machine(PACKAGES))
 
 
-def plot(path: Path, results: Sequence[Search]) -> None:
-    """Draw the error of each network after its last rung against its size, where it converged."""
-    figure, panels = subplots(1, len(results), (3.3 * len(results), 3.3), sharey=True)
-    for panel, search in zip(panels[0], results):
-        done = search.done
-        for number, rung in enumerate(done, start=1):
-            left = [one for one in search.candidates
-                    if one.number in rung and rung[one.number]['error'] < SHOWN
-                    and not (number < len(done) and one.number in done[number])]
-            panel.scatter([search.cost(one) for one in left],
-                          [rung[one.number]['error'] for one in left], s=5, linewidths=0,
-                          color=f'C{number}', label=f'left in round {number}')
-        panel.plot(search.cost(search.candidates[0]), done[-1][0]['error'], 'k*', markersize=11,
-                   label='in use')
-        panel.set(title=search.name.replace('signs +++', 'roll, pitch, yaw > 0'),
+def plot(path: Path, table: Path) -> None:
+    """Draw, from the CSV, the error of each network that converged over its size."""
+    rows = [row for row in read_csv(table) if row['error'] and float(row['error']) < SHOWN]
+    names = list(dict.fromkeys(row['search'] for row in rows))
+    figure, panels = subplots(1, len(names), (3.3 * len(names), 3.3), sharey=True)
+    for panel, name in zip(panels[0], names):
+        of_search = [row for row in rows if row['search'] == name]
+        for rungs in sorted({row['rungs'] for row in of_search}):
+            _scatter(panel, [row for row in of_search if row['rungs'] == rungs], s=5, linewidths=0,
+                     color=f'C{rungs}', label=f'left in round {rungs}')
+        _scatter(panel, [row for row in of_search if row['shipped'] == 'True'], s=110, marker='*',
+                 color='black', label='in use')
+        panel.set(title=name.replace('signs +++', 'roll, pitch, yaw > 0'),
                   xlabel='multiply-adds of the network')
     panels[0, 0].set_ylabel('RMSE over the angles [rad]')
     panels[0, 0].legend(fontsize=8, loc='upper right')
-    figure.savefig(path)
+    figure.savefig(path, metadata={'Software': None})
+
+
+def _scatter(panel: Axes, rows: Sequence[Mapping[str, str]], **style: Any) -> None:
+    panel.scatter([float(row['multiply_adds']) for row in rows],
+                  [float(row['error']) for row in rows], **style)
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -256,7 +264,7 @@ def main(args: Sequence[str] | None = None) -> int:
     text += f'\nAll candidates: [{NAME}.csv]({NAME}.csv).\n'
     (folder / f'{NAME}.md').write_text(text, 'utf-8')
     write_table(folder / f'{NAME}.csv', results)
-    plot(folder / f'{NAME}.png', results)
+    plot(folder / f'{NAME}.png', folder / f'{NAME}.csv')
     print(text)
     return 0
 
