@@ -143,16 +143,15 @@ struct ImpactByNetwork {
                             vector([](const auto& pair) { return pair.half; }));
     Triple<F> point = triple(impact.point), normal = triple(impact.normal);
     for (int n = 0; n < blocks_together<T>; ++n)
-      write(network, *queries[n], pairs[n], triple_of_doubles<T>(point, n),
-            triple_of_doubles<T>(normal, n), *found[n]);
+      write(*queries[n], pairs[n], triple_of_doubles<T>(point, n), triple_of_doubles<T>(normal, n),
+            *found[n]);
   }
 
  private:
   // To the common frame.
   template <class T>
-  BC_INLINE static void write(const Network& network, const Query<T>& q,
-                              const paper::Touching<T>& touching, const Triple<T>& point,
-                              const Triple<T>& answered, Found<T>& found) {
+  BC_INLINE static void write(const Query<T>& q, const paper::Touching<T>& touching,
+                              const Triple<T>& point, const Triple<T>& answered, Found<T>& found) {
     const Pair<T>& pair = q.pair;
     Columns<T> axes = select<T>(touching.first_is_b, pair.axes_b, pair.axes_a);
     Triple<T> origin = select(touching.first_is_b, pair.origin_b, pair.origin_a);
