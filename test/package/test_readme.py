@@ -397,7 +397,7 @@ HARD = [len(cases.pairs.pose_a) for cases in hard_poses.load().values()]
 LAYERS = [weights.shape for weights, _ in load_weights(
     ROOT / 'weights' / 'mlp.safetensors').networks['patch'].layers]
 STEPS = inspect.signature(PatchForces).parameters
-FORCES, CLOCK, AXIS = 'force/block.hpp', 'force/clock.hpp', 'separating_axis.hpp'
+FORCES, CLOCK, AXIS = 'force/preparing.hpp', 'force/clock.hpp', 'separating_axis.hpp'
 SOFT, LATE, PARALLEL = (constant(file, name) for file, name in (
     (CLOCK, 'soft_frequency'), (CLOCK, 'late_frequency'), (AXIS, 'parallel')))
 LENGTHS, QUATERNIONS = (

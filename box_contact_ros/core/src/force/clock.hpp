@@ -82,7 +82,7 @@ struct SubSteps {
   }
   template <class T>
   T kept(T before) const {
-    return select<T>(before > 0.0, std::max(0.0, window - length) / before, T{});
+    return select<T>(before > 0.0, max(window - length, 0.0) / before, T{});
   }
 };
 

@@ -56,7 +56,7 @@ inline void scale(const Island& island, bool is_pushing, int iteration, Moving* 
   each([&](Block& block, Normal& rows, Moving& a, Moving& b) {
     without += dot(block.normal_impulses, pressing_speeds(block, rows, a, b));
   });
-  double factor = with > without ? std::max(0.0, without / (without - with)) : 1.0;
+  double factor = with > without ? max(without / (without - with), 0.0) : 1.0;
   if (factor < least_factor && factor * least_factor > 1.0) factor = 1.0;
   each([&](Block& block, Normal&, Moving& a, Moving& b) {
     block.normal_impulses = factor * block.normal_impulses;

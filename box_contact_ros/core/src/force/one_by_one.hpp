@@ -42,11 +42,11 @@ inline void follow(const Work& work, Block& block) {
 // Solve it if its bodies have changed since its last turn. Returns whether a speed changed.
 inline bool solve(const Work& work, bool is_pushing, int iteration, Block& block) {
   Moving &a = work.moving[block.a], &b = work.moving[block.b];
-  if (std::max(a.changed, b.changed) < iteration - 1) return false;
+  if (max(a.changed, b.changed) < iteration - 1) return false;
   double closing = solve_normal<double>(block, rows_of(block, is_pushing), true, a, b);
   double slipping = solve_friction<double>(block, true, a, b);  // bounded by what presses now
   if (closing > impact_change) work.first->is_struck = true;
-  if (std::max(closing, slipping) <= least_change) return false;
+  if (max(closing, slipping) <= least_change) return false;
   if (a.inverse_mass > 0.0) a.changed = iteration;
   if (b.inverse_mass > 0.0) b.changed = iteration;
   return true;

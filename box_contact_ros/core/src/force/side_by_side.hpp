@@ -139,8 +139,8 @@ template <class T>
   if (iteration > 1) {  // most groups of islands at rest end here
     double changed = 0.0;
     for (int i = 0; i < width<T>; ++i)
-      changed = std::max(
-          changed, std::max(work.moving[group.a[i]].changed, work.moving[group.b[i]].changed));
+      changed = max<double>(changed,
+                            max(work.moving[group.a[i]].changed, work.moving[group.b[i]].changed));
     if (changed < iteration - 1) return false;
   }
   Side<T> a{speeds_of<T>(work.moving, group.a), group.inverse_inertia_a};
