@@ -8,6 +8,7 @@ import contextlib
 import gzip
 import io
 import logging
+import math
 import socket
 from collections.abc import Iterator
 from http import HTTPStatus
@@ -21,6 +22,12 @@ from websockets import Headers
 
 MESSAGE_LIMIT, CONNECTION_LIMIT = 8 << 10, 32
 """Longest message [bytes] of a browser, which sends a few hundred; most pages open at a time."""
+PHONE = """<style>@media (max-width: 600px) {
+  .mantine-Paper-root:has(#verdict) { width: 100% !important; max-height: 46% !important; }
+  .mantine-Paper-root:has(#verdict) div[style*="width: 20em"] { width: 100% !important; }
+  div:not(.mantine-Paper-root *):has(> canvas) { height: 54vh !important; }
+}</style>"""
+"""On a narrow screen, viser's panel would hide the drawing: it goes below it."""
 TITLE = b'<title>Contacts of boxes: box_contact_ros</title>'
 
 
@@ -39,6 +46,7 @@ class Server(viser.ViserServer):
         logging.getLogger('websockets').setLevel(logging.CRITICAL)
         with contextlib.redirect_stdout(io.StringIO()), closed_to_other_sites(host):
             super().__init__(host, port, 'box_contact_ros', verbose=False)  # viser greets
+        self.gui.add_html(PHONE, order=math.inf)
 
     def request_share_url(self, verbose: bool = True) -> None:
         """Do nothing."""

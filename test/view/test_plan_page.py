@@ -115,3 +115,17 @@ def test_the_page_in_a_browser(found, is_busy, tmp_path):
                         clickCount=1)
         tab.wait_for(f'document.getElementById("clicked").innerText != {CLICK_HINT!r}')
         assert tab.text('clicked').startswith('unsupported')
+
+
+@pytest.mark.skipif(chromium() is None, reason='no browser is installed')
+def test_on_a_phone_the_panel_is_below_the_drawing(found):
+    """390 pixels: both as wide as the screen, and neither hides the other."""
+    with closing(PlanPage('127.0.0.1', 8470, 'ship.edi', found)) as page, open_page(
+            page.url, 390, 844) as tab:
+        tab.wait_for('document.getElementById("verdict") !== null')
+        panel = 'document.querySelector(".mantine-Paper-root:has(#verdict)")'
+        box, drawing = (f'{element}.getBoundingClientRect()' for element in (
+            panel, 'document.querySelector("canvas")'))
+        tab.wait_for(f'Math.abs({drawing}.height - 0.54 * 844) < 2')
+        assert tab.evaluate(f'{box}.width') == tab.evaluate(f'{drawing}.width') == 390
+        assert tab.evaluate(f'{box}.top') >= tab.evaluate(f'{drawing}.bottom') - 1
