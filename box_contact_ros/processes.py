@@ -51,7 +51,7 @@ def running(arguments: Sequence[str]) -> Iterator[subprocess.Popen[bytes]]:
     """
     process = subprocess.Popen(
         [sys.executable, *arguments], stdin=subprocess.DEVNULL, start_new_session=True,
-        preexec_fn=_end_with_parent if sys.platform == 'linux' else None)
+        preexec_fn=end_with_parent)
     try:
         yield process
     finally:
@@ -66,8 +66,10 @@ def running(arguments: Sequence[str]) -> Iterator[subprocess.Popen[bytes]]:
 _LIBC = ctypes.CDLL(None)  # loaded before a fork, after which little is safe
 
 
-def _end_with_parent() -> None:
-    _LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+def end_with_parent() -> None:
+    """End this process, just forked, with the thread that forked it; on Linux alone."""
+    if sys.platform == 'linux':
+        _LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def _signal_group(process: subprocess.Popen[bytes], number: signal.Signals) -> None:

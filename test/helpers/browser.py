@@ -24,6 +24,8 @@ from typing import Any
 from patience import PATIENCE
 from websockets.sync.client import ClientConnection, connect
 
+from box_contact_ros.processes import end_with_parent
+
 NAMES = ('chromium', 'chromium-browser', 'google-chrome')
 FLAGS = ('--headless=new', '--no-sandbox', '--disable-dev-shm-usage', '--hide-scrollbars',
          '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
@@ -88,7 +90,7 @@ def open_page(url: str, width: int = 1280, height: int = 720, *, flags: Sequence
             [chromium(), *FLAGS, *flags, f'--user-data-dir={profile}',
              f'--window-size={width},{height}', 'about:blank'],
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-            start_new_session=True)
+            start_new_session=True, preexec_fn=end_with_parent)
         try:
             with connect(_tab_address(browser, Path(profile)), max_size=None, proxy=None) as socket:
                 tab = Tab(socket)
