@@ -120,9 +120,9 @@ class Islands {
   }
 
   // Put the blocks of the islands of a chunk that are shared into groups, whose lanes are solved side by
-  // side. In turn, each goes into the first group with room behind the groups that its bodies are in: so
-  // bodies see their blocks in the order of pairs, and no group has a body twice. Returns the number of
-  // groups; 0: about half of the lanes would be empty, and each island is better solved alone.
+  // side. In turn, each goes into the first group with room behind those of its bodies. So bodies see
+  // their blocks in the order of pairs, and no group has a body twice. Returns the number of groups; 0:
+  // about half of the lanes would be empty, and each island is better solved alone.
   size_t share(const Chunk& chunk) {
     if (!side_) return 0;
     Room* rooms = rooms_.data() + chunk.block + size_t(&chunk - chunks.data());

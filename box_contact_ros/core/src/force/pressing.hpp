@@ -9,6 +9,7 @@
 // falls on its edge had four times its energy.
 #pragma once
 
+#include "../lanes/triples.hpp"
 #include "rectangle.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
@@ -66,7 +67,7 @@ class OnTheRim {
     T energy = dot(impulses, 0.5 * (a_ * impulses) + b_);
     Mask<T> is_less = allowed & (energy < energy_);
     energy_ = select<T>(is_less, energy, energy_);
-    for (int k = 0; k < 3; ++k) best_[k] = select<T>(is_less, impulses[k], best_[k]);
+    best_ = select(is_less, impulses, best_);
   }
 
   const Mat<T>& a_;

@@ -89,6 +89,22 @@ BC_INLINE Sums<T> sums_of(const Moving* moving, Lane<T> bodies) {
   return sums;
 }
 
+// The bodies of a group, where they are now.
+template <class T>
+struct Bodies {
+  Where<T> at_a, at_b;
+  Side<T> a, b;
+
+  BC_INLINE Bodies(const Moving* moving, Group<T>& group)
+      : at_a(where<T>(moving, group.a)),
+        at_b(where<T>(moving, group.b)),
+        a{speeds_of<T>(moving, group.a), group.inverse_inertia_a},
+        b{speeds_of<T>(moving, group.b), group.inverse_inertia_b} {
+    group.inverse_inertia_a = at_a.inverse_inertia;
+    group.inverse_inertia_b = at_b.inverse_inertia;
+  }
+};
+
 // The same as for a block alone, each.
 template <class T>
 [[gnu::noinline]] inline void load(const Work& work, Group<T>& group) {
@@ -103,11 +119,7 @@ template <class T>
 
 template <class T>
 [[gnu::noinline]] inline void prepare(const Work& work, Group<T>& group) {
-  Where<T> at_a = where<T>(work.moving, group.a), at_b = where<T>(work.moving, group.b);
-  group.inverse_inertia_a = at_a.inverse_inertia;
-  group.inverse_inertia_b = at_b.inverse_inertia;
-  Side<T> a{speeds_of<T>(work.moving, group.a), group.inverse_inertia_a};
-  Side<T> b{speeds_of<T>(work.moving, group.b), group.inverse_inertia_b};
+  auto [at_a, at_b, a, b] = Bodies<T>(work.moving, group);
   auto turned = [&] {
     Vec<T> all{};
     for (int i = 0; i < width<T>; ++i) {
@@ -125,11 +137,7 @@ template <class T>
 
 template <class T>
 [[gnu::noinline]] inline void follow(const Work& work, Group<T>& group) {
-  Where<T> at_a = where<T>(work.moving, group.a), at_b = where<T>(work.moving, group.b);
-  group.inverse_inertia_a = at_a.inverse_inertia;
-  group.inverse_inertia_b = at_b.inverse_inertia;
-  Side<T> a{speeds_of<T>(work.moving, group.a), group.inverse_inertia_a};
-  Side<T> b{speeds_of<T>(work.moving, group.b), group.inverse_inertia_b};
+  auto [at_a, at_b, a, b] = Bodies<T>(work.moving, group);
   follow<T>(a, b, at_a, at_b, work.steps.length, group);
 }
 
