@@ -84,8 +84,7 @@ def train(folder: Path, scene: str, *, seed: int, commit: str,
         raise ValueError(f'scene {scene!r} has cubes, but {path} is for the poses of the paper: '
                          'name another folder by --out')
     sets = dict(zip(SETS, (scene_patterns(pairs) for pairs in streams)))
-    fitted = fit(sets['training'], sets['cross-validation'], settings,
-                 progress=scene)
+    fitted = fit(sets['training'], sets['cross-validation'], settings, progress=scene)
     card: dict[str, Any] = {
         'name': path.stem, 'model': 'paper', 'architecture': {'contact': list(settings.widths)},
         'sizes': [sizes[0].tolist()] * 2, 'seed': seed, 'commit': commit, 'metrics': {},

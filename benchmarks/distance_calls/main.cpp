@@ -13,7 +13,8 @@
 #include "../native_calls/contestants.hpp"
 
 #ifdef WITH_FCL
-// FCL and Coal bring other versions of Eigen and OctoMap: with one linker, Coal frees what FCL has made.
+// FCL and Coal bring other versions of Eigen and OctoMap. Linked into one program they end it by a double
+// free.
 void add_fcl(const Poses& poses, size_t calls, Contestants& all) {
   void* library = dlopen("libfcl_calls.so", RTLD_NOW | RTLD_LOCAL | RTLD_DEEPBIND);
   void* add = library ? dlsym(library, "add_fcl") : nullptr;
