@@ -15,8 +15,10 @@ namespace box_contact::BOX_CONTACT_SET::force {
 constexpr double least_change = 1e-8;
 
 // An impact goes on being solved, at most so often, while an iteration changes a closing speed by more
-// than this [m/s]. What is left of a closing speed comes back as an overlap that is pushed out.
+// than this [m/s], and by more than this share of the largest one that it stopped at first [1]. What is
+// left of a closing speed comes back as an overlap that is pushed out.
 constexpr double impact_change = 0.01;
+constexpr double impact_share = 0.1;
 constexpr int impact_iterations = 100;
 // After every so many of them, all that presses in the island is scaled, where the factor is far from 1:
 // by this or more, or by its inverse or less.
@@ -28,6 +30,7 @@ struct Island {
   size_t block, block_end;
   int factor;      // by which its sub-steps are finer; 0: its advance is over
   bool is_shared;  // whether it is advanced with others
+  double impact;   // a larger change of a closing speed is an impact [m/s]
   bool is_struck;  // whether the last iteration changed a closing speed as in an impact
 };
 
@@ -61,13 +64,15 @@ inline void scale(const Island& island, bool is_pushing, int iteration, Moving* 
   each([&](Block& block, Normal&, Moving& a, Moving& b) {
     block.normal_impulses = factor * block.normal_impulses;
     apply_normal(block, block.normal_impulses, a, b);
+    if (factor == 1.0) return;
     if (a.inverse_mass > 0.0) a.changed = iteration;
     if (b.inverse_mass > 0.0) b.changed = iteration;
   });
 }
 
-// Solve the blocks of islands in turn, so many times, each island as if alone. `solve(iteration)`: a
-// turn of all; returns whether a speed changed. `scale(island, iteration)`: see above.
+// Solve the blocks of islands in turn, so many times, each island as if alone. Beyond them only impacts
+// go on. `solve(iteration, is_beyond)`: a turn of all; returns whether a speed changed, and beyond, whether
+// one did as in an impact. `scale(island, iteration)`: see above.
 template <class Solve, class Scale>
 void iterate(Island* first, Island* last, int iterations, Moving* moving, const Solve& solve,
              const Scale& scale) {
@@ -77,7 +82,7 @@ void iterate(Island* first, Island* last, int iterations, Moving* moving, const 
   for (Island* island = first; island < last; ++island) forget_changes(*island);
   for (int iteration = 1;; ++iteration) {
     for (Island* island = first; island < last; ++island) island->is_struck = false;
-    if (!solve(iteration)) return;
+    if (!solve(iteration, iteration > 1 && iteration >= iterations)) return;
     bool goes_on = iteration < iterations;
     for (Island* island = first; island < last; ++island) {
       if (!island->is_struck) {

@@ -29,6 +29,20 @@ inline Vec<double> turned_since(const Patch& patch, const Moving& a, const Movin
   return turn(patch.asked_b, b.placed) - turn(patch.asked_a, a.placed);
 }
 
+// A turn of all blocks.
+struct Turn {
+  bool is_pushing;
+  int iteration;
+  bool is_beyond;  // whether only impacts go on
+};
+
+// Note a change of a closing speed [m/s].
+inline void note(const Turn& turn, double closing, Island& island) {
+  if (turn.is_pushing && turn.iteration == 1)
+    island.impact = max(island.impact, impact_share * closing);
+  if (closing > island.impact) island.is_struck = true;
+}
+
 inline void prepare(const Work& work, Block& block) {
   Moving &a = work.moving[block.a], &b = work.moving[block.b];
   auto turned = [&] { return turned_since(work.patches[block.patch], a, b); };
@@ -40,15 +54,16 @@ inline void follow(const Work& work, Block& block) {
   follow<double>(a, b, a, b, work.steps.length, block);
 }
 // Solve it if its bodies have changed since its last turn. Returns whether a speed changed.
-inline bool solve(const Work& work, bool is_pushing, int iteration, Block& block) {
+inline bool solve(const Work& work, const Turn& turn, Block& block) {
   Moving &a = work.moving[block.a], &b = work.moving[block.b];
-  if (max(a.changed, b.changed) < iteration - 1) return false;
-  double closing = solve_normal<double>(block, rows_of(block, is_pushing), true, a, b);
+  Island& island = *work.first;
+  if (max(a.changed, b.changed) < turn.iteration - 1) return false;
+  double closing = solve_normal<double>(block, rows_of(block, turn.is_pushing), true, a, b);
   double slipping = solve_friction<double>(block, true, a, b);  // bounded by what presses now
-  if (closing > impact_change) work.first->is_struck = true;
-  if (max(closing, slipping) <= least_change) return false;
-  if (a.inverse_mass > 0.0) a.changed = iteration;
-  if (b.inverse_mass > 0.0) b.changed = iteration;
+  note(turn, closing, island);
+  if (max(closing, slipping) <= (turn.is_beyond ? island.impact : least_change)) return false;
+  if (a.inverse_mass > 0.0) a.changed = turn.iteration;
+  if (b.inverse_mass > 0.0) b.changed = turn.iteration;
   return true;
 }
 inline void count(const Work& work, Block& block) {

@@ -142,8 +142,8 @@ template <class T>
 }
 
 template <class T>
-[[gnu::noinline]] inline bool solve(const Work& work, bool is_pushing, int iteration,
-                                    Group<T>& group) {
+[[gnu::noinline]] inline bool solve(const Work& work, const Turn& turn, Group<T>& group) {
+  int iteration = turn.iteration;
   if (iteration > 1) {  // most groups of islands at rest end here
     double changed = 0.0;
     for (int i = 0; i < width<T>; ++i)
@@ -154,12 +154,17 @@ template <class T>
   Side<T> a{speeds_of<T>(work.moving, group.a), group.inverse_inertia_a};
   Side<T> b{speeds_of<T>(work.moving, group.b), group.inverse_inertia_b};
   Mask<T> due = max(a.changed, b.changed) >= double(iteration - 1);
-  T closing = solve_normal<T>(group, rows_of<T>(group, is_pushing), due, a, b);
+  T closing = solve_normal<T>(group, rows_of<T>(group, turn.is_pushing), due, a, b);
   T slipping = solve_friction<T>(group, due, a, b);
-  unsigned solved = bits(due) & group.filled, struck = bits(closing > impact_change) & solved;
-  for (int i = 0; struck >> i; ++i)
-    if (struck >> i & 1) group.island[i]->is_struck = true;
-  Mask<T> calm = max(slipping, closing) <= least_change;
+  unsigned solved = bits(due) & group.filled;
+  T impact{};
+  if (turn.is_beyond || any(closing > impact_change))
+    for (int i = 0; i < width<T>; ++i) {
+      Island& island = *group.island[i];
+      if (solved >> i & 1) note(turn, lane(closing, i), island);
+      set_lane(impact, i, island.impact);
+    }
+  Mask<T> calm = max(slipping, closing) <= (turn.is_beyond ? impact : splat<T>(least_change));
   T now = splat<T>(iteration);
   a.changed = select<T>(calm, a.changed, now);
   b.changed = select<T>(calm, b.changed, now);

@@ -23,6 +23,7 @@ struct Stages {
             group.a[i] = group.a[0];
             group.b[i] = group.b[0];
             group.block[i] = group.block[0];
+            group.island[i] = group.island[0];
           }
         force::load(work, group);
       });
@@ -83,11 +84,15 @@ struct Stages {
   }
 
   static void iterate_all(const Work& work, int iterations, bool is_pushing) {
-    auto solve_all = [&](int iteration) {
+    auto solve_all = [&](int iteration, bool is_beyond) {
       bool is_changed = false;
-      each(work, [&](G& group) { is_changed |= solve(work, is_pushing, iteration, group); });
+      each(work,
+           [&](G& group) { is_changed |= solve(work, {is_pushing, iteration, is_beyond}, group); });
       return is_changed;
     };
+    if (is_pushing)
+      for (Island* island = work.first; island < work.last; ++island)
+        island->impact = impact_change;
     iterate(work.first, work.last, work.steps.rounds * iterations, work.moving, solve_all,
             [&](const Island& island, int iteration) {
               scale_one(work, island, is_pushing, iteration);
