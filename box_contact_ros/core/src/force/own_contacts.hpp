@@ -106,7 +106,8 @@ class OwnContacts {
     placed_.clear();
     std::fill(is_placed_.begin(), is_placed_.end(), uint8_t(0));
     live_.resize(0);
-    for (size_t k = 0; k < count(); ++k) {
+    for (const Key& key : keys_) {
+      size_t k = key.row;
       auto a = size_t(asked_.pairs[2 * k]), b = size_t(asked_.pairs[2 * k + 1]);
       if (!is_new_[k] && is_quiet(a) && is_quiet(b)) continue;
       rows_.push_back(k);
@@ -166,6 +167,8 @@ class OwnContacts {
     if (placed.has_area()) patch = placed;
   }
 
+  // The row of an answer that comes in turn by pair.
+  size_t row(size_t turn) const { return is_all_ ? keys_[turn].row : turn; }
   // What was solved last.
   bc_patches answer() const {
     const Pairs& live = chosen();
@@ -320,7 +323,7 @@ class OwnContacts {
   Pairs asked_;
   std::vector<uint8_t> is_new_;  // of them
   bool is_any_new_ = false;
-  // Those that are solved, unless all are.
+  // Those that are solved, by pair, unless all are.
   bool is_all_ = true;
   Pairs live_;
   std::vector<size_t> rows_;    // theirs among those that are asked for

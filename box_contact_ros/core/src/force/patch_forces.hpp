@@ -369,7 +369,8 @@ class PatchForces {
     next_.clear();
     bodies_at_.forget(bodies_.size());
     boxes_at_.forget(size_t(box_count()));
-    for (int64_t k = 0; k < answer.count; ++k) {
+    for (int64_t turn = 0; turn < answer.count; ++turn) {
+      int64_t k = is_own ? int64_t(own_.row(size_t(turn))) : turn;
       bool is_stale = answer.separation[k] != answer.separation[k];
       if (!is_stale && !(answer.volume[k] > 0.0)) continue;
       const int64_t* boxes = answer.pairs + 2 * k;

@@ -157,14 +157,15 @@ template <class T>
   T closing = solve_normal<T>(group, rows_of<T>(group, turn.is_pushing), due, a, b);
   T slipping = solve_friction<T>(group, due, a, b);
   unsigned solved = bits(due) & group.filled;
-  T impact{};
-  if (turn.is_beyond || any(closing > impact_change))
+  T change = max(slipping, closing),
+    least = splat<T>(turn.is_beyond ? impact_change : least_change);
+  if (any(change > impact_change))
     for (int i = 0; i < width<T>; ++i) {
       Island& island = *group.island[i];
       if (solved >> i & 1) note(turn, lane(closing, i), island);
-      set_lane(impact, i, island.impact);
+      if (turn.is_beyond) set_lane(least, i, island.impact);
     }
-  Mask<T> calm = max(slipping, closing) <= (turn.is_beyond ? impact : splat<T>(least_change));
+  Mask<T> calm = change <= least;
   T now = splat<T>(iteration);
   a.changed = select<T>(calm, a.changed, now);
   b.changed = select<T>(calm, b.changed, now);
