@@ -13,7 +13,7 @@ import pytest
 from box_contact_ros import Body, PatchForces, Plan, contacts_of, inspect_plan
 
 pytest.importorskip('clarabel')
-from upright_statics import Upright
+upright_statics = pytest.importorskip('benchmarks.upright_statics')
 
 ROOT = Path(__file__).parents[2]
 PALLETS = json.loads((ROOT / 'docs/examples/pallets/packing_plans.json').read_bytes())
@@ -38,7 +38,8 @@ def pallet(order):
 
 
 def statics(plan):
-    return Upright(plan.sizes, plan.poses, plan.masses, np.isin(np.arange(len(plan)), plan.ground))
+    return upright_statics.Upright(plan.sizes, plan.poses, plan.masses,
+                                   np.isin(np.arange(len(plan)), plan.ground))
 
 
 def assert_agrees(plan):
