@@ -14,6 +14,7 @@ from scipy.optimize import linprog
 
 SAME = 1e-6  # [m] heights that are one
 LEAST = 1e-4  # [m] what two boxes must share at least
+HOLDS = 1e-6  # of the weight, what loads may lack: rounding
 
 
 @dataclass
@@ -24,6 +25,8 @@ class Upright:
     poses: np.ndarray
     masses: np.ndarray
     fixed: np.ndarray
+    sooner: float = 0.0
+    """By how much rectangles end within what two boxes share, on each side [m]."""
 
     def __post_init__(self) -> None:
         low, high = (self.poses[:, :3] + sign * self.sizes / 2 for sign in (-1, 1))
@@ -32,8 +35,8 @@ class Upright:
         a, b = a[rows], b[rows]
         self.low, self.high = np.maximum(low[a], low[b]), np.minimum(high[a], high[b])
         rows = (self.high - self.low)[:, :2].min(axis=1) > LEAST
-        self.low, self.high, self.pairs = self.low[rows], self.high[rows], np.stack(
-            (a[rows], b[rows]), axis=1)
+        self.low, self.high = self.low[rows] + self.sooner, self.high[rows] - self.sooner
+        self.pairs = np.stack((a[rows], b[rows]), axis=1)
 
     def groups(self) -> list[list[int]]:
         """Return free boxes that are joined by others than fixed ones."""
@@ -70,6 +73,10 @@ class Upright:
         found = linprog(np.repeat((0.0, 1.0), (forces, 2 * len(eye))),
                         A_eq=np.hstack((matrix, eye, -eye)), b_eq=wanted, method='highs')
         return float(found.fun / self.masses[boxes].sum())
+
+    def holds(self, boxes: list[int]) -> bool:
+        """Return whether there are loads that a group is at rest with."""
+        return self.missing(boxes) < HOLDS
 
     def ranges(self, boxes: list[int]) -> dict[tuple[int, int], tuple[float, float]]:
         """Return the least and the greatest load of each pair of a group that can hold [kg]."""
