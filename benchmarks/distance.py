@@ -4,7 +4,7 @@
 """Program `distance`: distances of boxes apart, beside other engines, and a fuzzer of them.
 
 `python -m benchmarks.distance` compiles distance_calls/, which calls all in turn, and writes
-distance.md and distance.csv: times relative to `mj_geomDistance`, and errors against a judge that
+distance.md, .csv and .png: times relative to `mj_geomDistance`, and errors against a judge that
 proves the distance. Coal, FCL and Bullet are compiled in where pkg-config finds them. `--fuzz N`
 proves N drawn pairs of all families instead; the status is 1 if one is beyond the bounds of
 docs/reference/conventions.md.
@@ -31,7 +31,7 @@ from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.nearest import Nearests
 from box_contact_ros.solver.pose import rotation_matrix
 
-from . import native, output
+from . import distance_picture, native, output
 from .apart import FAMILIES, Proof, draw, prove
 from .engines import add_leave_out, may_miss
 from .native import Ratio, Times
@@ -276,7 +276,7 @@ def main(args: Sequence[str] | None = None) -> int:
     from tqdm import tqdm
 
     parser = output.report_parser('distance', __doc__, quick='few pairs and rounds, to try it out',
-                                  seed=1, out='distance.md, distance.csv')
+                                  seed=1, out='distance.md, .csv and .png')
     parser.add_argument('--fuzz', type=within(1), metavar='N', help='prove N pairs, and no report')
     add_leave_out(parser)
     options = parser.parse_args(args)
@@ -320,6 +320,7 @@ def main(args: Sequence[str] | None = None) -> int:
         missing=''.join(f'\n\nLeft out: {name.capitalize()} is not installed with its headers '
                         f'(`{OPTIONAL[name]}`).' for name in missing))
     output.write_csv(folder / 'distance.csv', csv_rows(found), about=output.machine())
+    distance_picture.draw(folder / 'distance.png', folder / 'distance.csv', names[-1])
     print(times)
     for name in missing:
         print(f'distance: {name.capitalize()} is left out: {OPTIONAL[name]}', file=sys.stderr)

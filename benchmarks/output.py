@@ -31,7 +31,7 @@ RESULTS, QUICK_RESULTS = Path('docs/results'), Path('quick-results')
 DPI = 110  # of pictures
 COLOURS = {'exact': '#1f77b4', 'mlp': '#2ca02c', 'paper': '#9467bd', 'soup': '#8c564b',
            'MuJoCo': '#ff7f0e', 'Bullet': '#e377c2', 'Coal': '#bcbd22', 'Drake': '#17becf',
-           'echo': '#7f7f7f', 'other': '#7f7f7f', 'new': '#000000'}
+           'FCL': '#d62728', 'echo': '#7f7f7f', 'other': '#7f7f7f', 'new': '#000000'}
 """The colour of each contestant, in every picture."""
 BEGIN = time.monotonic()  # of the program [s]
 
