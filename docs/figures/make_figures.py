@@ -15,6 +15,7 @@ import numpy as np
 
 from box_contact_ros import ContactSolver, inspect_plan, read_plan
 from box_contact_ros.extras import expect_extras
+from box_contact_ros.solver.pose import rotation_matrix
 
 expect_extras()
 import matplotlib
@@ -22,11 +23,15 @@ import matplotlib
 matplotlib.use('Agg')  # before pyplot: no display is needed
 
 from matplotlib import pyplot as plt
+from matplotlib.colors import to_rgba
+from mpl_toolkits.mplot3d import Axes3D
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 sys.path.append(str(Path(__file__).resolve().parents[2]))  # where benchmarks/ is, not installed
 from benchmarks.contestant import CHOICES
 from benchmarks.engines import mujoco_engines
 from benchmarks.output import COLOURS
+from benchmarks.paper.dataset import quaternion_from_euler
 
 STACK, LOAD, OVERLAP, POINT, CORNER = '#8c8c8c', '#4477aa', '#ccbb44', '#222222', '#ee6677'
 CONTAINER = (12.192, 2.438, 2.591)
@@ -141,6 +146,65 @@ def plan_descent(folder: Path) -> None:
     example['draw'](ways, beside, str(folder / 'plan_descent.png'))
 
 
+def faces(axes: Axes3D, turn: np.ndarray, centre: np.ndarray, sign: float, colour: str) -> None:
+    """Draw a cube of edge 2, with its three faces on the side of a sign filled: its trihedron."""
+    square = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            face = np.insert(square, axis, side, axis=1) @ turn.T + centre
+            axes.add_collection3d(Poly3DCollection(
+                [face], facecolors=to_rgba(colour, 0.35 if side == sign else 0.0),
+                edgecolors=to_rgba(colour, 0.9), linewidths=0.9))
+
+
+def inputs(axes: Axes3D, point: np.ndarray) -> None:
+    """Draw the second cube with a vertex of its trihedron at a point of the first one's."""
+    turn = rotation_matrix(quaternion_from_euler(np.radians([(20.0, 25.0, 30.0)])))[0]
+    offset = point + turn @ np.ones(3)
+    faces(axes, np.eye(3), np.zeros(3), 1.0, STACK)
+    faces(axes, turn, offset, -1.0, LOAD)
+    axes.plot(*point, 'o', color=CORNER, markersize=6, zorder=10)
+    axes.quiver(0, 0, 0, *offset, color=POINT, arrow_length_ratio=0.07, linewidth=1.2)
+    axes.text(*(0.62 * offset + (0.0, 0.0, 0.25)), 't', fontsize=11)
+    axes.text(-1.0, -1.0, -1.95, 'first cube; its trihedron is filled', color='0.4')
+    axes.text(*(offset + (0.5, 0.9, 1.3)), 'second cube, turned\nby roll, pitch, yaw', color=LOAD)
+
+
+def outputs(axes: Axes3D, point: np.ndarray) -> None:
+    """Draw the directions of the point and of the normal, and the angles of the first."""
+    faces(axes, np.eye(3), np.zeros(3), 1.0, STACK)
+    for start, arrow, colour, name in ((np.zeros(3), point, CORNER, 'point'),
+                                       (point, np.array((1.0, 0, 0)), POINT, 'normal')):
+        axes.quiver(*start, *arrow, color=colour, arrow_length_ratio=0.1, linewidth=1.6)
+        axes.text(*(start + arrow + 0.08), name, color=colour)
+    shadow = point * (1, 1, 0)
+    axes.plot(*np.array([np.zeros(3), shadow, point]).T, ':', color=CORNER)
+    axes.plot([0, 1], [0, 0], [0, 0], ':', color='0.4')
+    axes.text(0.85, -0.05, -0.22, 'x', color='0.4')
+    for radius, ends, name, side in ((0.8, (np.array((1.0, 0, 0)), shadow), 'azimuth', 'top'),
+                                     (0.95, (shadow, point), 'elevation', 'center')):
+        arc = np.linspace(*ends, 30)
+        arc *= radius / np.linalg.norm(arc, axis=1, keepdims=True)
+        axes.plot(*arc.T, color=CORNER, linewidth=1.5)
+        axes.text(*(1.06 * arc[15]), name, color=CORNER, fontsize=9, va=side)
+
+
+def trihedron(folder: Path) -> None:
+    """Draw trihedron.png: what the paper's network takes, and what it gives."""
+    figure = plt.figure(figsize=(9.0, 4.0), dpi=110, layout='constrained')
+    for place, (draw, length, title) in enumerate((
+            (inputs, 5.0, 'In: t, roll, pitch, yaw'),
+            (outputs, 3.0, 'Out: azimuth and elevation of the point, and of the normal')), 1):
+        axes = figure.add_subplot(1, 2, place, projection='3d', proj_type='ortho')
+        draw(axes, np.array((1.0, 0.7, 0.6)))
+        axes.set(xlim=(-1, length - 1), ylim=(-1, length - 1), zlim=(-1.15, length - 1.15))
+        axes.set_box_aspect((1, 1, 1), zoom=1.2)
+        axes.view_init(22, -56)
+        axes.axis('off')
+        axes.set_title(title, fontsize=11)
+    figure.savefig(folder / 'trihedron.png', metadata={'Software': None})
+
+
 def pallets(folder: Path) -> None:
     """Draw pallets.png: five real orders, coloured by cause."""
     orders = Path(__file__).parents[1] / 'examples' / 'pallets' / 'packing_plans.json'
@@ -163,6 +227,7 @@ def main() -> None:
     first_contact(folder)
     plan_descent(folder)
     pallets(folder)
+    trihedron(folder)
     # No version and no date in the file: the same figure is the same bytes.
     figure.savefig(folder / 'centroid.png', metadata={'Software': None})
 
