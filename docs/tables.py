@@ -44,7 +44,7 @@ class Choice(NamedTuple):
 CHOICES = (
     Choice('`exact`', 'exact', 'exact volume'),
     Choice('MuJoCo', 'MuJoCo mj_collision', 'mjc_BoxBox'),
-    Choice('Bullet', 'PyBullet getContactPoints'),
+    Choice('PyBullet', 'PyBullet getContactPoints'),
     Choice('Drake, hydroelastic', 'Drake hydroelastic'),
     Choice("the paper's network", 'paper', 'paper', rest='settled cubes'),
     Choice('polygon soup', 'soup-8'),
@@ -102,6 +102,15 @@ def from_c(choice: Choice, way: str, of_set: str) -> str:
     return cell(row, 'p50_ns', digits=3) if row else '–'
 
 
+def with_version(name: str, row: Row) -> str:
+    """Return the name of an engine with the version of its package; other names as they are."""
+    package = row['versions'].split(', ')[2:]  # after those of Python and NumPy
+    if not package or not name[0].isupper():
+        return name
+    engine, comma, way = name.partition(',')
+    return f'{engine} {package[0].split()[1]}{comma}{way}'
+
+
 def models() -> str:
     """Return what each way to find the contact point costs, and how far it is off."""
     body = []
@@ -109,7 +118,7 @@ def models() -> str:
         call = fastest(rows('frontier.csv', contestant=choice.contestant, set=choice.rest,
                             **{'class': 'all'}))
         assert call
-        body.append([choice.name, cell(call, 'call_p50', 1e3),
+        body.append([with_version(choice.name, call), cell(call, 'call_p50', 1e3),
                      *(from_c(choice, 'single', of_set) for of_set in (AT_REST, SWAY)),
                      *(point_error(choice, of_set) for of_set in (choice.rest, 'landings'))])
     table = markdown_table(
