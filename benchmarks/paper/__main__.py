@@ -27,7 +27,7 @@ def report(numbers: Collection[int], drawn: Collection[int], folder: Path, *, qu
     sections = []
     if {1, 2} & set(numbers):
         _begin('tables 1 and 2')
-        sections += tables.sections_1_and_2(numbers, QUICK if quick else 1)
+        sections += tables.sections_1_and_2(numbers, QUICK if quick else 1, folder)
     if 9 in drawn:
         _begin('figure 9')
         tables.draw_figure_9(folder / 'paper_figure_9.png')

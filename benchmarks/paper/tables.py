@@ -37,6 +37,8 @@ TABLE_1 = {'as written': 'table-1-as-written', 'mixture': 'table-1-mixture',
 """Files of Table 1's networks, one network a seed, by what the table calls them."""
 TABLE_2 = 'table-2-by-signs'
 """File of Table 2's networks, one network a subset."""
+SHADES = ('0.65', 'black', '0.4')
+"""Of Table 1's variants, in its picture."""
 SHOWN = 150  # patterns in Figure 9
 COUNT = 20_000  # placements of each kind that the committee is asked for
 SEED = 37  # other placements than any training's
@@ -96,6 +98,28 @@ def table_1(found: Trainings) -> str:
     return output.markdown_table(['set', '', 'paper', *found], rows, words=2)
 
 
+def draw_table_1(path: Path, found: Trainings) -> None:
+    """Draw MAE and RMSE of all sets: the paper's, and ours with their deviations over the seeds."""
+    picture, axes = output.subplots(1, 2, (9.0, 2.9), sharey=True)
+    for axis, figure in zip(axes[0], ('MAE', 'RMSE')):
+        axis.plot(PAPER[1][figure], range(len(SETS)), 'D', color=output.COLOURS['paper'],
+                  markersize=8, label='the paper')
+        for place, (name, seeds) in enumerate(found.items()):
+            values = np.array([[figures(errors[one])[figure] for one in SETS] for errors in seeds])
+            axis.errorbar(values.mean(axis=0), np.arange(len(SETS)) + 0.14 * (place + 1),
+                          xerr=values.std(axis=0, ddof=1), fmt='o', markersize=5,
+                          color=SHADES[place], label=name)
+        axis.set(xlabel=f'{figure} [rad]', xlim=(0.0, None), ylim=(len(SETS) - 0.4, -0.4))
+        axis.grid(color='0.9', linewidth=0.5)
+        axis.set_axisbelow(True)
+    axes[0, 0].set_yticks(range(len(SETS)), SETS)
+    picture.suptitle("The mixture gives the paper's errors; the pairs that model paper solves are "
+                     'easier', fontsize=12)
+    picture.legend(*axes[0, 0].get_legend_handles_labels(), loc='outside lower center', ncols=4,
+                   fontsize=9, frameon=False)
+    picture.savefig(path, metadata={'Software': None})
+
+
 def by_output(seeds: Sequence[Errors]) -> str:
     """Return MAE and RMSE of each output on the external set."""
     rows = [[figure, *[over_seeds([
@@ -148,13 +172,14 @@ def section_7(step: int) -> str:
                  wrong=100 * card['metrics']['classifier']['external']['wrong'])
 
 
-def sections_1_and_2(tables: Collection[int], step: int) -> list[str]:
-    """Return Tables 1 and 2, those of them that were chosen, and their notes."""
+def sections_1_and_2(tables: Collection[int], step: int, folder: Path) -> list[str]:
+    """Return Tables 1 and 2, those of them that were chosen, and their notes; draw the first."""
     sections = []
     if 1 in tables:
         found = {title: list(evaluate(name, step).values()) for title, name in TABLE_1.items()}
         card = with_sets(TABLE_1['mixture'])[0].card
         shares = card['data']['kept']
+        draw_table_1(folder / 'paper_table_1.png', found)
         sections.append(_page('table_1', table=table_1(found), seeds=len(card['data']['seeds']),
                               by_output=by_output(found['mixture']),
                               inside=100 * shares[0], beyond=100 * shares[2],

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import csv
 import json
+from pathlib import Path
 
 import numpy as np
 import poses
@@ -95,7 +96,7 @@ def test_planted_errors_show(small, monkeypatch):
     assert turned.normal.mean() == pytest.approx(180 - right.normal.mean())
 
 
-def test_table_1_is_of_the_seeds() -> None:
+def test_table_1_is_of_the_seeds(tmp_path: Path) -> None:
     """Mean and standard deviation over the trainings, by set and by output."""
     def seed(size: float) -> dict[str, np.ndarray]:
         return {name: np.tile([size, -size, 3 * size, 0.0], (5, 1)) for name in tables.SETS}
@@ -106,6 +107,8 @@ def test_table_1_is_of_the_seeds() -> None:
     assert '| training | ME | 0.0332 | 0.150 ± 0.075 |' in table
     assert '| RMSE | 0.200 ± 0.100 | 0.200 ± 0.100 | 0.600 ± 0.300 | 0.000 ± 0.000 |' in (
         tables.by_output(found['ours']))
+    tables.draw_table_1(tmp_path / 'picture.png', found)
+    assert (tmp_path / 'picture.png').stat().st_size > 10_000
 
 
 def test_the_mixture_reproduces_table_1() -> None:
@@ -211,7 +214,8 @@ def test_a_part_leaves_the_whole_page_alone(tmp_path, monkeypatch, capsys):
     page.parent.mkdir(parents=True)
     page.write_text('all tables')
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(program.tables, 'sections_1_and_2', lambda numbers, step: [str(numbers)])
+    monkeypatch.setattr(program.tables, 'sections_1_and_2', lambda numbers, step, folder: [
+        str(numbers)])
     assert program.main(['--table', '1']) == 0
     assert page.read_text() == 'all tables'
     assert '[1]' in (tmp_path / 'quick-results' / 'paper_tables.md').read_text()
