@@ -1,59 +1,50 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Draw which folder of the package imports which: `python docs/figures/make_architecture.py`.
+"""Draw how data go through the package: `python docs/figures/make_architecture.py`.
 
-Reads the imports of every module with `ast`, and writes `architecture.svg` next to this file, or
-into the folder of `--out`. An arrow runs from the folder that imports to the folder that is
-imported. Arrows that follow from others by a detour are left out.
+It writes `architecture.svg` next to this file, or into the folder of `--out`. An arrow carries what
+stands beside it, from what comes in above to what goes out below.
 """
 from __future__ import annotations
 
 import argparse
-import ast
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[2] / 'box_contact_ros'
-PLACES = {  # column and row of a folder's box, and what it is for
-    'bench': (0, 0, 'A/B latency'), 'demo': (1, 0, 'the crane, the demo'),
-    'view': (2, 0, 'live page, markers'), 'node': (1, 1, 'all rclpy of the product'),
-    'stream': (1, 2, 'poses → ticks, bytes'), 'plans': (2, 2, 'is this plan sound?'),
-    'models': (0, 3, 'networks, polygon soup'), 'scene': (1, 3, 'boxes, pairs, one tick'),
-    'forces': (2, 3, 'what contacts carry'), 'solver': (1, 4, 'boxes without a scene'),
-    'core': (1, 5, 'poses → contact, C++17')}
-WIDTH, HEIGHT, COLUMN, ROW = 190, 50, 240, 90
-
-
-def imports(folder: str) -> set[str]:
-    """Return the other folders of the package whose modules a folder imports."""
-    found = set()
-    for path in (PACKAGE / folder).rglob('*.py'):
-        for node in ast.walk(ast.parse(path.read_text('utf-8'))):
-            if isinstance(node, ast.ImportFrom) and node.level:
-                above = path.relative_to(PACKAGE).parts[:-node.level]
-                names = [node.module] if node.module else [name.name for name in node.names]
-                found |= {(*above, *name.split('.'))[0] for name in names}
-            elif isinstance(node, ast.ImportFrom) and node.module.startswith(PACKAGE.name + '.'):
-                found.add(node.module.split('.')[1])
-    return (found & PLACES.keys()) - {folder}
-
-
-def arrows() -> list[tuple[str, str]]:
-    """Return the pairs (imports, is imported), without those that follow from others."""
-    graph = {folder: imports(folder) for folder in PLACES}
-
-    def reachable(folder: str) -> set[str]:
-        return graph[folder].union(*map(reachable, graph[folder]))
-
-    return [(folder, other) for folder in PLACES for other in PLACES
-            if other in graph[folder]
-            and not any(other in reachable(between) for between in graph[folder] - {other})]
+PLACES = {  # column and row of a box, its name, and what it does or has; a folder ends in '/'
+    'messages in': (0, 0, 'ROS messages', 'poses, questions'),
+    'program in': (1, 0, 'your program', 'Python, C or C++'),
+    'file in': (2, 0, 'a file', 'ship, pallet, world'),
+    'read messages': (0, 1, 'node/, stream/', 'bytes → a tick'),
+    'read files': (2, 1, 'plans/', 'rows → boxes, faults'),
+    'scene': (1, 2, 'scene/', 'which boxes are near'),
+    'solver': (1, 3, 'solver/, models/, core/', 'where do they touch?'),
+    'write messages': (0, 4, 'node/, view/', 'arrays → bytes'),
+    'forces': (1, 4, 'forces/', 'what contacts carry'),
+    'inspect': (2, 4, 'plans/', 'statics: what falls'),
+    'messages out': (0, 5, 'ROS messages', 'Contacts, Near, markers'),
+    'program out': (1, 5, 'your program', 'or a simulator'),
+    'verdict': (2, 5, 'you', 'lines, JSON, a page'),
+}
+FLOWS = [  # from, to, and what goes there
+    ('messages in', 'read messages', 'bytes'),
+    ('read messages', 'scene', 'poses of all boxes'), ('program in', 'scene', 'poses'),
+    ('scene', 'solver', 'pairs'), ('file in', 'read files', 'text'),
+    ('read files', 'solver', 'sizes, poses'),
+    ('solver', 'write messages', 'contacts, distances'), ('solver', 'forces', 'contacts'),
+    ('solver', 'inspect', 'contacts, patches of faces'),
+    ('write messages', 'messages out', 'bytes'),
+    ('forces', 'program out', 'wrenches or poses, loads'),
+    ('inspect', 'verdict', 'causes, loads'),
+]
+WIDTH, HEIGHT, COLUMN, ROW = 190, 50, 290, 100
 
 
 def drawing() -> str:
     """Return the SVG."""
-    middle = {name: (20 + WIDTH / 2 + COLUMN * column, 20 + HEIGHT / 2 + ROW * row)
-              for name, (column, row, _) in PLACES.items()}
+    middle = {key: (20 + WIDTH / 2 + COLUMN * column, 20 + HEIGHT / 2 + ROW * row)
+              for key, (column, row, *_) in PLACES.items()}
     width = max(x for x, _ in middle.values()) + WIDTH / 2 + 20
     height = max(y for _, y in middle.values()) + HEIGHT / 2 + 20
     lines = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" '
@@ -61,33 +52,37 @@ def drawing() -> str:
              '<defs><marker id="head" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="8" '
              'markerHeight="8" orient="auto"><path d="M0,0 L10,5 L0,10 z" fill="#555"/></marker>'
              '</defs>', f'<rect width="{width:g}" height="{height:g}" fill="white"/>']
-    for name, other in arrows():
-        (x1, y1), (x2, y2) = middle[name], middle[other]
-        aside = WIDTH / 2 if x2 > x1 else -WIDTH / 2
-        if y1 == y2:
-            x1, x2 = x1 + aside, x2 - aside
-        elif PLACES[name][0] == 1 and x1 != x2:  # from the middle column to the side
-            x1, y2 = x1 + aside, y2 - HEIGHT / 2
-        elif x1 != x2:
-            x2, y1 = x2 - aside, y1 + HEIGHT / 2
-        else:
-            y1, y2 = y1 + HEIGHT / 2, y2 - HEIGHT / 2
-        lines.append(f'<line x1="{x1:g}" y1="{y1:g}" x2="{x2:g}" y2="{y2:g}" stroke="#555" '
-                     'marker-end="url(#head)"/>')
-    for name, (x, y) in middle.items():
+    for start, end, what in FLOWS:
+        (x1, y1), (x2, y2) = middle[start], middle[end]
+        aside = (x2 > x1) - (x2 < x1)
+        x1, x2, y1, y2 = (x1 + 0.3 * aside * WIDTH, x2 - 0.3 * aside * WIDTH,
+                          y1 + HEIGHT / 2, y2 - HEIGHT / 2)
+        x, y = (x1 + x2) / 2, (y1 + y2) / 2 + 4
+        lines += [f'<line x1="{x1:g}" y1="{y1:g}" x2="{x2:g}" y2="{y2:g}" stroke="#555" '
+                  'marker-end="url(#head)"/>',
+                  f'<text x="{x:g}" y="{y:g}" font-size="12" fill="#333" stroke="white" '
+                  f'stroke-width="5" paint-order="stroke">{what}</text>']
+    for key, (x, y) in middle.items():
+        name, what = PLACES[key][2:]
+        fill, line = ('#e8eef5', '#4477aa') if '/' in name else ('white', '#999')
         lines += [f'<rect x="{x - WIDTH / 2:g}" y="{y - HEIGHT / 2:g}" width="{WIDTH}" '
-                  f'height="{HEIGHT}" rx="6" fill="#e8eef5" stroke="#4477aa"/>',
-                  f'<text x="{x:g}" y="{y - 4:g}" font-weight="bold">{name}/</text>',
-                  f'<text x="{x:g}" y="{y + 15:g}" font-size="13">{PLACES[name][2]}</text>']
+                  f'height="{HEIGHT}" rx="6" fill="{fill}" stroke="{line}"/>',
+                  f'<text x="{x:g}" y="{y - 4:g}" font-weight="bold">{name}</text>',
+                  f'<text x="{x:g}" y="{y + 15:g}" font-size="13">{what}</text>']
     return '\n'.join([*lines, '</svg>', ''])
 
 
 def main() -> None:
-    """Write the drawing."""
+    """Write the drawing; a folder that it names must be there."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--out', type=Path, default=Path(__file__).parent,
                         help='folder for architecture.svg (default: that of this program)')
-    (parser.parse_args().out / 'architecture.svg').write_text(drawing(), 'utf-8')
+    folder = parser.parse_args().out
+    for _, _, name, _ in PLACES.values():
+        for part in name.split(', '):
+            if part.endswith('/') and not (PACKAGE / part).is_dir():
+                raise FileNotFoundError(f'the package has no folder {part}')
+    (folder / 'architecture.svg').write_text(drawing(), 'utf-8')
 
 
 if __name__ == '__main__':

@@ -379,7 +379,7 @@ def test_figures_are_made(tmp_path):
         path.name for path in folder.iterdir() if path.suffix in ('.png', '.svg')} - {'view.png'}
     name = 'architecture.svg'
     assert (tmp_path / name).read_text() == (folder / name).read_text(), (
-        'imports have changed: python docs/figures/make_architecture.py')
+        'python docs/figures/make_architecture.py draws another')
 
 
 def test_tables_have_the_figures_of_the_reports():
