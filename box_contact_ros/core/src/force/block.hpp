@@ -256,6 +256,11 @@ BC_INLINE T solve_friction(Rows<T>& block, Mask<T> due, Body& a, Body& b) {
   return largest(abs(change)) / block.least_friction_mass;
 }
 
+template <class T, class Body>
+BC_INLINE T closing_speed(const Rows<T>& block, const Body& a, const Body& b) {
+  return -dot(speed(block, a, b), block.normal);
+}
+
 // Velocities along the rows of pressing and rocking, beyond the bias.
 template <class T, class Body>
 BC_INLINE Vec<T> pressing_speeds(const Rows<T>& block, const NormalRows<T>& rows, const Body& a,

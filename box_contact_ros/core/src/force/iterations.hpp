@@ -15,10 +15,10 @@ namespace box_contact::BOX_CONTACT_SET::force {
 constexpr double least_change = 1e-8;
 
 // An impact goes on being solved, at most so often, while an iteration changes a closing speed by more
-// than this [m/s], and by more than this share of the largest one that it stopped at first [1]. What is
+// than this [m/s], and by more than this share of the largest closing speed of its island [1]. What is
 // left of a closing speed comes back as an overlap that is pushed out.
 constexpr double impact_change = 0.01;
-constexpr double impact_share = 0.1;
+constexpr double impact_share = 0.2;
 constexpr int impact_iterations = 100;
 // After every so many of them, all that presses in the island is scaled, where the factor is far from 1:
 // by this or more, or by its inverse or less.

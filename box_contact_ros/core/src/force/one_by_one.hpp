@@ -36,18 +36,15 @@ struct Turn {
   bool is_beyond;  // whether only impacts go on
 };
 
-// Note a change of a closing speed [m/s].
-inline void note(const Turn& turn, double closing, Island& island) {
-  if (turn.is_pushing && turn.iteration == 1)
-    island.impact = max(island.impact, impact_share * closing);
-  if (closing > island.impact) island.is_struck = true;
-}
-
 inline void prepare(const Work& work, Block& block) {
   Moving &a = work.moving[block.a], &b = work.moving[block.b];
   auto turned = [&] { return turned_since(work.patches[block.patch], a, b); };
   prepare<double>(work.steps, a, b, a, b, turned, block);
-  warm_start<double>(work.steps, block, a, b);
+  Island& island = *work.first;
+  island.impact = max(island.impact, impact_share * closing_speed<double>(block, a, b));
+}
+inline void warm_start(const Work& work, Block& block) {
+  warm_start<double>(work.steps, block, work.moving[block.a], work.moving[block.b]);
 }
 inline void follow(const Work& work, Block& block) {
   const Moving &a = work.moving[block.a], &b = work.moving[block.b];
@@ -60,7 +57,7 @@ inline bool solve(const Work& work, const Turn& turn, Block& block) {
   if (max(a.changed, b.changed) < turn.iteration - 1) return false;
   double closing = solve_normal<double>(block, rows_of(block, turn.is_pushing), true, a, b);
   double slipping = solve_friction<double>(block, true, a, b);  // bounded by what presses now
-  note(turn, closing, island);
+  if (closing > island.impact) island.is_struck = true;
   if (max(closing, slipping) <= (turn.is_beyond ? island.impact : least_change)) return false;
   if (a.inverse_mass > 0.0) a.changed = turn.iteration;
   if (b.inverse_mass > 0.0) b.changed = turn.iteration;

@@ -130,6 +130,16 @@ template <class T>
     return all;
   };
   prepare<T>(work.steps, a, b, at_a, at_b, turned, group);
+  T impact = impact_share * closing_speed<T>(group, a, b);
+  if (!any(impact > impact_change)) return;
+  for (int i = 0; i < width<T>; ++i)
+    group.island[i]->impact = max(group.island[i]->impact, lane(impact, i));
+}
+
+template <class T>
+[[gnu::noinline]] inline void warm_start(const Work& work, Group<T>& group) {
+  Side<T> a{speeds_of<T>(work.moving, group.a), group.inverse_inertia_a};
+  Side<T> b{speeds_of<T>(work.moving, group.b), group.inverse_inertia_b};
   warm_start<T>(work.steps, group, a, b);
   write_speeds<T>(work.moving, group.a, group.is_free_a, a);
   write_speeds<T>(work.moving, group.b, group.is_free_b, b);
@@ -162,7 +172,7 @@ template <class T>
   if (any(change > impact_change))
     for (int i = 0; i < width<T>; ++i) {
       Island& island = *group.island[i];
-      if (solved >> i & 1) note(turn, lane(closing, i), island);
+      if ((solved >> i & 1) && lane(closing, i) > island.impact) island.is_struck = true;
       if (turn.is_beyond) set_lane(least, i, island.impact);
     }
   Mask<T> calm = change <= least;

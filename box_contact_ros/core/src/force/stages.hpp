@@ -32,7 +32,9 @@ struct Stages {
   // Prepare a sub-step, and push.
   static void push(void* all) {
     const Work& work = work_of(all);
+    for (Island* island = work.first; island < work.last; ++island) island->impact = impact_change;
     each(work, [&](G& group) { prepare(work, group); });
+    each(work, [&](G& group) { warm_start(work, group); });
     iterate_all(work, work.iterations, true);
     if (work.counts) each(work, [&](G& group) { count(work, group); });
   }
@@ -90,9 +92,6 @@ struct Stages {
            [&](G& group) { is_changed |= solve(work, {is_pushing, iteration, is_beyond}, group); });
       return is_changed;
     };
-    if (is_pushing)
-      for (Island* island = work.first; island < work.last; ++island)
-        island->impact = impact_change;
     iterate(work.first, work.last, work.steps.rounds * iterations, work.moving, solve_all,
             [&](const Island& island, int iteration) {
               scale_one(work, island, is_pushing, iteration);
