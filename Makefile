@@ -9,7 +9,7 @@ SHELL := bash
 .ONESHELL:
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
-.PHONY: help demo view test check reports docs docs-links tables dist coverage clean
+.PHONY: help demo view test check reports rivals docs docs-links tables dist coverage clean
 .PHONY: test-arm test-colcon test-debian13 test-schemas test-training
 
 # Arguments for the program behind the target: make test ARGS='-k sat -x'
@@ -48,6 +48,7 @@ help:
 	echo 'make coverage lines of solver, scenes and nodes that their tests run'
 	echo 'make reports  every table and picture of docs, in an hour; ARGS=--quick tries them out,'
 	echo '              LEAVE_OUT=drake does without a rival that is not installed'
+	echo 'make rivals   fetch Box3D and Jolt, and compile what the reports run'
 	echo 'make docs     the documentation as HTML: build/docs/index.html'
 	echo 'make docs-links asks every link to another site'
 	echo 'make tables   write the figures of docs/results/ into README and docs'
@@ -78,7 +79,8 @@ check:
 # The reports run one after the other, as most of them measure time; each runs though one before it
 # failed. With ARGS=--quick results go to quick-results/, and docs/ stays as it is.
 RESULTS := $(if $(filter --quick,$(ARGS)),quick-results,docs/results)
-# Rivals that may be missing, of mujoco fcl coal bullet drake: make reports LEAVE_OUT=drake
+# Rivals that may be missing, of mujoco fcl coal bullet drake box3d jolt rapier:
+# make reports LEAVE_OUT='drake jolt'
 LEAVE_OUT ?=
 LEFT_OUT := $(if $(LEAVE_OUT),--leave-out $(LEAVE_OUT))
 BENCH := box_contact_ros.bench.bench --duration $(if $(filter --quick,$(ARGS)),6,90)
@@ -91,7 +93,7 @@ reports:
 	run benchmarks.named_failures $(ARGS)
 	run benchmarks.fuzz $(ARGS)
 	run benchmarks.landing $(ARGS)
-	run benchmarks.stacks $(ARGS)
+	run benchmarks.stacks $(ARGS) $(LEFT_OUT)
 	run benchmarks.force_lines $(ARGS)
 	run benchmarks.frontier $(ARGS) $(LEFT_OUT)
 	run benchmarks.native $(ARGS) $(LEFT_OUT)
@@ -106,6 +108,12 @@ reports:
 	    $(PY) docs/tables.py || failed+=' docs/tables.py'
 	fi
 	if [ -n "$$failed" ]; then echo "failed:$$failed" >&2; exit 1; fi
+
+# From sources that are here: make rivals ARGS=-DFETCHCONTENT_SOURCE_DIR_JOLT=/path/to/JoltPhysics
+rivals:
+	@.ci/setup test
+	.venv/bin/cmake -S benchmarks/stack_calls -B build/rivals -DLEAVE_OUT='$(LEAVE_OUT)' $(ARGS)
+	exec .venv/bin/cmake --build build/rivals --parallel $$(getconf _NPROCESSORS_ONLN)
 
 test-training:
 	@.ci/setup training

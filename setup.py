@@ -173,7 +173,7 @@ setup(
         # Engines that only reports compare with. Drake is measured where it is installed: with what
         # it needs it is 0.2 GB.
         # Bullet has no wheel elsewhere, and compiles for ten minutes.
-        'peers': ['cmeel-eigen', 'coal', 'mujoco', 'python-fcl',
+        'peers': ['cmeel-eigen', 'coal', 'mujoco', 'python-fcl', 'rapier3d',
                   'pybullet; python_version < "3.12" and platform_machine == "x86_64"'],
         # `make docs`.
         'docs': DOCS,

@@ -5,9 +5,11 @@
 
 `python -m benchmarks.stacks` runs every scene by `PatchForces`, at several steps, rates and
 latencies, and by MuJoCo with contacts of its own. Both begin with the same boxes, and get the same
-outside forces. The program prints and writes stacks.md, .csv and .png. The exit status is 1 if a
-scene of ours does not come to rest with answers at each step of 1 ms. `--record FILE` writes the
-pairs of all scenes to a file instead, as they were placed and after they have settled.
+outside forces. Four scenes run by Box3D, Jolt and Rapier, too (`rivals`). The program prints and
+writes stacks.md, .csv and .png, and stacks_rivals.csv and .png. The exit status is 1 if a scene of
+ours does not come to rest with answers at each step of 1 ms, and 2 where a rival is missing.
+`--record FILE` writes the pairs of all scenes to a file instead, as they were placed and after they
+have settled.
 
 Lengths in m, masses in kg, times in s.
 """
@@ -15,6 +17,7 @@ from __future__ import annotations
 
 import math
 import sys
+import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -26,7 +29,8 @@ import numpy as np
 from box_contact_ros import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix
 
-from . import output, settled, stacks_picture
+from . import output, rivals, settled, stacks_picture
+from .engines import add_leave_out, may_miss
 from .loops import MUJOCO, TIMINGS, Boxes, Scene, Timing, corner_speeds, near_pairs, steps
 from .pose_sets import Pairs, quaternion_multiply
 from .stack_scenes import ORDERS, SCENES, sideways
@@ -180,7 +184,9 @@ def pushed(orders: Sequence[str]) -> str:
 def main(args: Sequence[str] | None = None) -> int:
     """Run all scenes, print and write; 1 if one of ours moves with answers at each step."""
     parser = output.report_parser(
-        'stacks', __doc__, out='stacks.md, .csv and .png', quick=f'every {QUICK}th scene')
+        'stacks', __doc__, out='stacks.md, .csv and .png, stacks_rivals.csv and .png',
+        quick=f'every {QUICK}th scene, two beside rivals')
+    add_leave_out(parser)
     parser.add_argument('--record', type=Path, metavar='FILE', help='write pairs, and no report')
     options = parser.parse_args(args)
     chosen = SCENES[::QUICK if options.quick else 1]
@@ -188,6 +194,15 @@ def main(args: Sequence[str] | None = None) -> int:
         record(options.record, chosen)
         return 0
     folder, ours = output.results_folder(parser, options), str(TIMINGS[0])
+    with tempfile.TemporaryDirectory() as made:
+        try:
+            engines, missing = rivals.engines(Path(made))
+        except RuntimeError as error:
+            print(f'stacks: {error}', file=sys.stderr)
+            return 2
+        if not (options.quick or may_miss('stacks', missing, options.leave_out)):
+            return 2
+        beside = rivals.report(engines, missing, Path(made), folder, quick=options.quick)
     scenes = {scene().name: scene for scene in chosen}
     found: dict[str, dict[str, Outcome]] = {}
     for name, make in scenes.items():
@@ -209,7 +224,7 @@ def main(args: Sequence[str] | None = None) -> int:
         {'scene': name, 'way': way, **asdict(each)}
         for name, ways in found.items() for way, each in ways.items()), digits=3, about=about)
     stacks_picture.draw(folder / 'stacks.png', folder / 'stacks.csv')
-    output.write_page(folder, 'stacks', args, machine=about, rest=rest, both=both,
+    output.write_page(folder, 'stacks', args, machine=about, rest=rest, both=both, **beside,
                       pushed=pushed(ORDERS[:1] if options.quick else ORDERS))
     missed = [name for name, ways in found.items() if math.isnan(ways[ours].rest)]
     for name in missed:

@@ -17,12 +17,16 @@ from ..contestant import Contestant
 RIVALS = {'mujoco': "extra 'sim'", 'fcl': "extra 'soup'", 'coal': "extra 'peers'",
           'bullet': "extra 'peers'", 'drake': 'pip install drake'}
 """The engines' modules, each with what brings its library."""
+DYNAMICS = {'box3d': 'make rivals', 'jolt': 'make rivals', 'rapier': "extra 'peers'",
+            'mujoco': RIVALS['mujoco']}
+"""Engines that move bodies, which `stacks` compares with, each with what brings it."""
 
 
 def add_leave_out(parser: argparse.ArgumentParser) -> None:
     """Add the argument that names rivals which a full run may miss."""
-    parser.add_argument('--leave-out', nargs='+', choices=tuple(RIVALS), default=[],
-                        metavar='RIVAL', help=f'of {", ".join(RIVALS)}: rivals that a full run may '
+    names = tuple(RIVALS | DYNAMICS)
+    parser.add_argument('--leave-out', nargs='+', choices=names, default=[], metavar='RIVAL',
+                        help=f'of {", ".join(names)}: rivals that a full run may '
                         'miss; any other that is missing ends it at once')
 
 

@@ -14,7 +14,7 @@ import pytest
 
 pytest.importorskip('mujoco')
 
-from benchmarks import output, settled, stacks, stacks_picture
+from benchmarks import output, rivals, settled, stacks, stacks_picture
 from benchmarks.loops import MUJOCO, TIMINGS, Boxes, Scene, Timing, corner_speeds, steps
 from benchmarks.stack_scenes import ORDERS, off_centre, ratio, sideways, slope, tower, turntable
 from benchmarks.stacks import run, stays
@@ -78,6 +78,9 @@ def test_the_program(monkeypatch: pytest.MonkeyPatch, tmp_path: Path,
     falls = partial(Scene, 'falls', Boxes.of([((1.0, 1.0, 1.0), 1.0, (0, 0, 0))]), 0.2)
     monkeypatch.setattr(stacks, 'SCENES', (falls,))
     monkeypatch.setattr(stacks, 'ORDERS', ())
+    monkeypatch.setattr(rivals, 'engines', lambda made: ({}, []))
+    monkeypatch.setattr(rivals, 'report', lambda *_, quick: dict.fromkeys(
+        ('engines', 'times', 'ways', 'missing'), ''))
     assert stacks.main(['--out', str(tmp_path)]) == 1
     assert 'stacks: falls does not come to rest' in capsys.readouterr().err
     assert '| falls | **' in (tmp_path / 'stacks.md').read_text()
