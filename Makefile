@@ -87,6 +87,7 @@ BENCH := box_contact_ros.bench.bench --duration $(if $(filter --quick,$(ARGS)),6
 reports:
 	@.ci/setup reports
 	failed=
+	if [ $(RESULTS) = docs/results ]; then $(MAKE) rivals ARGS= || failed=' rivals'; fi
 	run() { echo "== $$*"; $(PY) -m "$$@" || failed+=" $$1"; }
 	run benchmarks.accuracy $(ARGS)
 	run benchmarks.stability $(ARGS)

@@ -26,22 +26,16 @@ def cell(time: str, ours: str) -> tuple[str, str]:
             next(colour for most, colour in RATIOS if ratio <= most))
 
 
-def title(by_scene: dict[str, dict[str, dict[str, str]]], rival: str = 'Box3D') -> str:
-    """Return what the map says: how ours compares with all where it matters, and with a rival."""
-    at_rest = [float(ours[state]) / float(engines[rival][state])
-               for engines in by_scene.values() if rival in engines
-               for ours in [next(iter(engines.values()))] for state in ('moving', 'awake')
-               if ours[state] and engines[rival][state]]
-    cells = [(float(ours[state]), [float(engines[name][state]) for name in list(engines)[1:]
-                                   if engines[name][state] and not name.startswith(ours['engine'])])
-             for engines in by_scene.values() for ours in [next(iter(engines.values()))]
-             for state in STATES if ours[state]]
-    first = sum(all(mine <= other for other in others) for mine, others in cells)
-    text = f'PatchForces, in float64, is the fastest in {first} of {len(cells)} cases'
-    if at_rest:
-        text += (f'; awake it takes {output.number(min(at_rest), 2)} to '
-                 f'{output.number(max(at_rest), 2)} times as long as {rival}')
-    return text
+def title(by_scene: dict[str, dict[str, dict[str, str]]]) -> str:
+    """Return what the map says: how long ours takes awake, beside the first rival."""
+    ours, *others = next(iter(by_scene.values())).values()
+    rival = next(row for row in others if not row['engine'].startswith(ours['engine']))
+    pairs = [(engines[ours['engine']][state], engines[rival['engine']][state])
+             for engines in by_scene.values() for state in ('moving', 'awake')]
+    ratios = [float(mine) / float(theirs) for mine, theirs in pairs if mine and theirs]
+    least, most = (output.number(ratio, 2) for ratio in (min(ratios), max(ratios)))
+    mine, theirs = (f'{row["engine"]} ({row["numbers"]})' for row in (ours, rival))
+    return f'Awake, a step of {mine} takes {least} to {most} times as long as one of {theirs}'
 
 
 def draw(path: Path, table: Path) -> None:

@@ -116,10 +116,11 @@ def test_the_map_says_where_ours_is_faster() -> None:
     """Times are relative to ours; another run of ours is no rival."""
     times = {rivals.OURS: ('100', '50', '2'), rivals.ANY_DEPTH: ('10', '10', '1'),
              'Box3D': ('80', '100', ''), 'Jolt': ('200', '40', '1')}
-    found = {'wall': {name: {'engine': name, **dict(zip(rivals_picture.STATES, each))}
-                      for name, each in times.items()}}
-    said = rivals_picture.title(found)
-    assert 'fastest in 0 of 3' in said and '0.50 to 1.2 times as long as Box3D' in said
+    found = {name: {'engine': name, 'numbers': 'float', **dict(zip(rivals_picture.STATES, each))}
+             for name, each in times.items()}
+    assert rivals_picture.title({'wall': found}) == (
+        'Awake, a step of PatchForces (float) takes 0.50 to 1.2 times as long as one of '
+        'Box3D (float)')
     assert rivals_picture.cell('', '100')[0] == '–'
     assert rivals_picture.cell('20', '100') == ('20.0\n× 0.20', rivals_picture.RATIOS[0][1])
     assert rivals_picture.cell('2000', '100')[1] == rivals_picture.RATIOS[-1][1]
