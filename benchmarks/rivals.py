@@ -45,7 +45,8 @@ RESTED, LONG = 10 * SECOND, 70 * SECOND
 LAST = 2 * SECOND  # so many steps are timed at rest
 ASLEEP = 20 * SECOND
 ROUNDS = 3
-LIMIT, QUICK_LIMIT = 180.0, 15.0  # of a run [s]; what it has not reached by then is not known
+LIMIT, QUICK_LIMIT = 180, 15
+"""Of a run, by the processor's time [s]; what it has not reached by then is not known."""
 
 # --- scenes ---------------------------------------------------------------------------------------
 
@@ -161,21 +162,15 @@ class Stop(NamedTuple):
 
 def run(engine: Engine, file: Path, sleep: bool, stops: Sequence[int],
         limit: float = LIMIT) -> list[Stop]:
-    """Return what an engine prints at each stop that it reaches within a time [s].
+    """Return what an engine prints at each stop that it reaches within a processor's time [s].
 
     Raises `RuntimeError` with what it says where it fails.
     """
-    words = [*map(str, engine.command), str(file), str(int(sleep)), *map(str, stops)]
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                               cwd=ROOT)
-    try:
-        text, said = process.communicate(timeout=limit)
-        if process.returncode:
-            raise RuntimeError(f'{words[0]} ended with status {process.returncode}: {said}')
-    except subprocess.TimeoutExpired:
-        process.kill()
-        text, _ = process.communicate()
-    lines, count = text.split('\n')[:-1], len(file.read_text('utf-8').splitlines())
+    words = [*map(str, engine.command), str(file), str(int(sleep)), str(limit), *map(str, stops)]
+    done = subprocess.run(words, capture_output=True, text=True, cwd=ROOT)
+    if done.returncode:
+        raise RuntimeError(f'{words[0]} ended with status {done.returncode}: {done.stderr}')
+    lines, count = done.stdout.split('\n')[:-1], len(file.read_text('utf-8').splitlines())
     found = []
     for k in range(len(lines) // count):
         seconds, awake = lines[k * count].split()

@@ -197,12 +197,12 @@ def main(args: Sequence[str] | None = None) -> int:
     with tempfile.TemporaryDirectory() as made:
         try:
             engines, missing = rivals.engines(Path(made))
+            if not (options.quick or may_miss('stacks', missing, options.leave_out)):
+                return 2
+            beside = rivals.report(engines, missing, Path(made), folder, quick=options.quick)
         except RuntimeError as error:
             print(f'stacks: {error}', file=sys.stderr)
             return 2
-        if not (options.quick or may_miss('stacks', missing, options.leave_out)):
-            return 2
-        beside = rivals.report(engines, missing, Path(made), folder, quick=options.quick)
     scenes = {scene().name: scene for scene in chosen}
     found: dict[str, dict[str, Outcome]] = {}
     for name, make in scenes.items():

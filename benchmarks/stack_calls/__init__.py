@@ -38,19 +38,21 @@ class World(Protocol):
 
 
 def run(make: Callable[[Asked], World]) -> None:
-    """Do what the arguments say: SCENE SLEEP STOP..."""
+    """Do what the arguments say: SCENE SLEEP LIMIT STOP..."""
     with open(sys.argv[1], encoding='utf-8') as file:
         step, substeps, friction, gravity = file.readline().split()
         size, mass, pose = np.split(np.loadtxt(file, ndmin=2), [3, 4], axis=1)
     world = make(Asked(float(step), int(substeps), float(friction), float(gravity),
                        sys.argv[2] == '1', size, mass[:, 0], pose))
-    tick = 0
-    for stop in map(int, sys.argv[3:]):
+    done, limit = 0, float(sys.argv[3])
+    for stop in map(int, sys.argv[4:]):
         step_once, begin = world.step, time.process_time()
-        for _ in range(stop - tick):
+        for tick in range(done, stop):
+            if tick % 64 == 0 and time.process_time() > limit:
+                return
             step_once()
         print(time.process_time() - begin, world.awake())
         for row in world.poses():
             print(*map(float, row))
         sys.stdout.flush()
-        tick = stop
+        done = stop

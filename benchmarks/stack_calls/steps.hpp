@@ -1,12 +1,13 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// What every program of this folder does: PROGRAM SCENE SLEEP STOP...
+// What every program of this folder does: PROGRAM SCENE SLEEP LIMIT STOP...
 //
 // SCENE is a file: step [s], sub-steps, friction and gravity [m/s²], then a line for each box: extents
 // [m], mass [kg] (0: fixed), position [m], quaternion x y z w. SLEEP is 0 or 1. After each number of
 // steps, STOP, it prints the time that the processor took since the last one [s], how many bodies are
-// awake, and a line for each box: position, quaternion. rapier_steps.py and mujoco_steps.py do the same.
+// awake, and a line for each box: position, quaternion. It ends once the processor took LIMIT [s].
+// rapier_steps.py and mujoco_steps.py do the same.
 #ifndef BENCHMARKS_STACK_CALLS_STEPS_HPP
 #define BENCHMARKS_STACK_CALLS_STEPS_HPP
 
@@ -52,16 +53,20 @@ inline Scene read_scene(const char* name, bool sleep) {
 // World has `step()`, `awake()`, which counts bodies, and `pose(k)`. It is made from a Scene.
 template <class World>
 int run(const char* source, int count, char** arguments) {
-  if (count < 4) {
+  if (count < 5) {
     std::puts(source);
     return 0;
   }
   Scene scene = read_scene(arguments[1], std::atoi(arguments[2]));
   World world(scene);
+  const double limit = std::atof(arguments[3]) * CLOCKS_PER_SEC;
   int tick = 0;
-  for (int i = 3; i < count; ++i) {
+  for (int i = 4; i < count; ++i) {
     std::clock_t begin = std::clock();
-    for (int stop = std::atoi(arguments[i]); tick < stop; ++tick) world.step();
+    for (int stop = std::atoi(arguments[i]); tick < stop; ++tick) {
+      if (tick % 64 == 0 && double(std::clock()) > limit) return 0;
+      world.step();
+    }
     std::printf("%.9g %d\n", double(std::clock() - begin) / CLOCKS_PER_SEC, world.awake());
     for (size_t k = 0; k < scene.boxes.size(); ++k) {
       auto [p, q] = world.pose(k);

@@ -77,12 +77,21 @@ def test_what_rests_sleeps_where_it_may(engines: dict[str, Engine], name: str, t
         assert (end.awake == 0) == sleep
 
 
+@needs_compiler
+@pytest.mark.parametrize('name', NAMES)
+def test_a_run_ends_at_its_limit(engines: dict[str, Engine], name: str, tmp_path: Path) -> None:
+    """A year of steps, of which none begins."""
+    rivals.write_scene(tmp_path / 'scene', rivals.containers().boxes)
+    stops = [1, 365 * 24 * 3600 * rivals.SECOND]
+    engine = engine_of(engines, name)
+    assert rivals.run(engine, tmp_path / 'scene', False, stops, limit=0.0) == []
+
+
 def test_what_a_run_does_not_reach_in_time_is_not_known(tmp_path: Path) -> None:
     """Nor is a time asleep, where something is awake."""
     scene = Scene('one', Boxes.of([((1.0, 1.0, 1.0), 5.0, (0, 0, 9.0))]))
     stops = ['0.06 1\n0 0 8 0 0 0 1', '0.7 1\n0 0 7 0 0 0 1', '0.012 1\n0 0 6 0 0 0 1']
-    slow = said(*stops, '0.5 1', more='import sys, time\nif len(sys.argv) > 5: time.sleep(60)')
-    found = rivals.measure(lambda: scene, {'slow': slow}, tmp_path, 1, limit=3.0)['slow']
+    found = rivals.measure(lambda: scene, {'slow': said(*stops, '0.5 1')}, tmp_path, 1)['slow']
     assert (found.moving, found.awake) == pytest.approx((1000.0, 100.0))
     assert found.sank == pytest.approx(3000.0)
     assert math.isnan(found.asleep) and math.isnan(found.creep)
