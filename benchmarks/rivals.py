@@ -45,7 +45,7 @@ RESTED, LONG = 10 * SECOND, 70 * SECOND
 LAST = 2 * SECOND  # so many steps are timed at rest
 ASLEEP = 20 * SECOND
 ROUNDS = 3
-LIMIT, QUICK_LIMIT = 180, 15
+LIMIT, QUICK_LIMIT = 120, 15
 """Of a run, by the processor's time [s]; what it has not reached by then is not known."""
 
 # --- scenes ---------------------------------------------------------------------------------------
