@@ -29,6 +29,7 @@ unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH ROS_DISTRO
 endif
 
 PY := .venv/bin/python
+CMAKE := .venv/bin/cmake
 # One worker more than cores: tests of nodes mostly wait. conftest.py says which files come first.
 WORKERS := $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
 PYTEST := $(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder -rs --durations 10
@@ -113,8 +114,8 @@ reports:
 # From sources that are here: make rivals ARGS=-DFETCHCONTENT_SOURCE_DIR_JOLT=/path/to/JoltPhysics
 rivals:
 	@.ci/setup test
-	.venv/bin/cmake -S benchmarks/stack_calls -B build/rivals -DLEAVE_OUT='$(LEAVE_OUT)' $(ARGS)
-	exec .venv/bin/cmake --build build/rivals --parallel $$(getconf _NPROCESSORS_ONLN)
+	$(CMAKE) -S benchmarks/stack_calls -B build/rivals -DLEAVE_OUT='$(LEAVE_OUT)' $(ARGS)
+	exec $(CMAKE) --build build/rivals --parallel $$(getconf _NPROCESSORS_ONLN)
 
 test-training:
 	@.ci/setup training

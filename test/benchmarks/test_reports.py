@@ -32,7 +32,7 @@ def listed() -> list[str]:
 
 
 def make_reports(folder: Path, *arguments: str) -> tuple[subprocess.CompletedProcess, list[str]]:
-    """Run `make reports` with stand-ins for set-up and Python; return how Python was called."""
+    """Run `make reports` with stand-ins for all that it calls; return how Python was called."""
     (folder / '.ci').mkdir()
     shutil.copy(ROOT / 'Makefile', folder)
     for path, text in ((folder / '.ci' / 'setup', '#!/bin/sh\n'), (folder / 'python', STAND_IN)):
@@ -40,8 +40,8 @@ def make_reports(folder: Path, *arguments: str) -> tuple[subprocess.CompletedPro
         path.chmod(0o755)
     env = {name: value for name, value in os.environ.items()
            if not name.startswith(('MAKE', 'MFLAGS'))}  # `make test` may be what runs this
-    done = subprocess.run(['make', 'reports', 'PY=./python', *arguments], cwd=folder, env=env,
-                          capture_output=True, text=True, timeout=PATIENCE)
+    done = subprocess.run(['make', 'reports', 'PY=./python', 'CMAKE=true', *arguments], cwd=folder,
+                          env=env, capture_output=True, text=True, timeout=PATIENCE)
     return done, (folder / 'called').read_text().splitlines()
 
 
