@@ -3,6 +3,20 @@
 
 // A patch as a block of six velocity constraints, and the bodies that its impulses move.
 //
+// The blocks are solved by sequential impulses (projected Gauss-Seidel) with warm start (Catto,
+// "Iterative dynamics with temporal coherence", 2005). A patch has the normal n from A to B, the
+// centroid c, and the rectangle of its covariance, with the half lengths l1 and l2. Its rows
+// constrain the velocity of B relative to A:
+//
+//     pressing  N  along n at c            N ≥ 0
+//     rocking   τ  about the axes 1 and 2  the centre of N in the rectangle and on both faces
+//     friction  f  in the plane at c       |f|² + (m/r)² ≤ (μ·N)²
+//     torsion   m  about n                 r: the radius at which friction resists a spin
+//
+// Pressing and rocking are solved as one block, friction and torsion as another. Overlaps are pushed
+// out by soft constraints; relaxation removes the speed of pushing out again (Catto, "Solver2D",
+// 2024). Between answers, depth, centroid and tilt follow the bodies.
+//
 // Functions are templates over T: `double` for a block alone, or lanes for blocks side by side, and over
 // what the bodies are then: `Moving`, or `Side<T>`. Each lane has the bits of a block alone.
 #pragma once

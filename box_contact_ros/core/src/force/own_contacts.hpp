@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "../kernel.hpp"
-#include "patch.hpp"
+#include "gaps.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
@@ -127,11 +127,10 @@ class OwnContacts {
   }
 
   // Solve the chosen pairs with the bodies at `poses`. `solve(rows, count, results)` answers rows, and returns
-  // the first that is refused, or −1; so does this. A pair apart by no more than `farthest` [m] for which
-  // `is_near(a, b, normal, apart)` gets the patch that it has once it touches, and keeps its separation
-  // above zero.
-  template <class Solve, class IsNear>
-  long solve(const bc_pose* poses, double farthest, const Solve& solve, const IsNear& is_near) {
+  // the first that is refused, or −1; so does this. A pair that is apart, but near by `gaps`,
+  // gets the patch that it has once it touches, and keeps its separation above zero.
+  template <class Solve>
+  long solve(const bc_pose* poses, const Gaps& gaps, const Solve& solve) {
     auto place = [&](size_t box) {
       poses_[box] = in_common_frame(poses[boxes_[box].body], boxes_[box].box.pose);
     };
@@ -144,8 +143,8 @@ class OwnContacts {
     auto* numbers = reinterpret_cast<const double*>(poses_.data());
     auto* sizes = reinterpret_cast<const double*>(sizes_.data());
     detail::Rows rows{numbers, numbers, sizes, sizes, 3, 3, live.pairs.data(), long(boxes_.size())};
-    long refused = solve(rows, long(live.count()), found_.results(farthest));
-    if (refused < 0) refused = solve_near(solve, is_near);
+    long refused = solve(rows, long(live.count()), found_.results(gaps.farthest()));
+    if (refused < 0) refused = solve_near(gaps, solve);
     return refused < 0 || is_all_ ? refused : long(rows_[size_t(refused)]);
   }
   // Solve the pair of a patch anew, with its bodies at other places. A pair that is apart now keeps its
@@ -287,8 +286,8 @@ class OwnContacts {
       is_any_new_ = is_any_new_ || is_new;
     }
   }
-  template <class Solve, class IsNear>
-  long solve_near(const Solve& solve, const IsNear& is_near) {
+  template <class Solve>
+  long solve_near(const Gaps& gaps, const Solve& solve) {
     near_.clear();
     const Pairs& live = chosen();
     for (size_t k = 0; k < live.count(); ++k) {
@@ -296,7 +295,7 @@ class OwnContacts {
       Vec<double> normal = vector_at(&found_.normal[3 * k]);
       if (!(apart > 0.0) || normal[0] != normal[0]) continue;  // in contact, or beyond the farthest
       auto a = size_t(live.pairs[2 * k]), b = size_t(live.pairs[2 * k + 1]);
-      if (is_near(int32_t(a), int32_t(b), normal, apart))
+      if (gaps.is_near(int32_t(a), int32_t(b), normal, apart))
         near_.add(k, poses_[a], poses_[b], sizes_[a], sizes_[b], -apart * normal);
     }
     if (near_.row.empty()) return -1;

@@ -1,21 +1,7 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// From contacts to forces: each patch is a block of six velocity constraints.
-//
-// The blocks are solved by sequential impulses (projected Gauss-Seidel) with warm start (Catto,
-// "Iterative dynamics with temporal coherence", 2005). A patch has the normal n from A to B, the
-// centroid c, and the rectangle of its covariance, with the half lengths l1 and l2. Its rows
-// constrain the velocity of B relative to A:
-//
-//     pressing  N  along n at c            N ≥ 0
-//     rocking   τ  about the axes 1 and 2  the centre of N in the rectangle and on both faces
-//     friction  f  in the plane at c       |f|² + (m/r)² ≤ (μ·N)²
-//     torsion   m  about n                 r: the radius at which friction resists a spin
-//
-// Pressing and rocking are solved as one block, friction and torsion as another. Overlaps are pushed
-// out by soft constraints; relaxation removes the speed of pushing out again (Catto, "Solver2D",
-// 2024). Between answers, depth, centroid and tilt follow the bodies.
+// From contacts to forces, in steps of the caller's: bodies, boxes, answers, advances, loads.
 //
 // Nothing but + − · / √ is computed, so all instruction sets give the same bits.
 #pragma once
@@ -26,20 +12,13 @@
 #include <vector>
 
 #include "../../include/box_contact/force.h"
-#include "faces.hpp"
+#include "answers.hpp"
 #include "island_step.hpp"
 #include "loads.hpp"
 #include "own_contacts.hpp"
 #include "rest.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
-
-// A pair apart is a constraint of a step within so many times g·dt² [1]: what it falls in the first step,
-// and as much again in the next.
-constexpr double gap_share = 2.0;
-// A patch that pressed stays while its pair is apart by no more than this [m]: flush sides of goods come
-// and go by nanometres, and with them the friction that bore weight.
-constexpr double pressed_gap = 1e-5;
 
 class PatchForces {
  public:
@@ -175,10 +154,7 @@ class PatchForces {
       own_.choose(rest_.is_any(),
                   [this](size_t box) { return rest_.is_quiet(size_t(body_of(int64_t(box)))); });
     is_chosen_ = true;
-    long refused = own_.solve(poses, farthest(dt, outside), solve,
-                              [&](int32_t a, int32_t b, const Vec<double>& normal, double apart) {
-                                return is_near(a, b, normal, apart, dt, outside);
-                              });
+    long refused = own_.solve(poses, Gaps(bodies_, boxes(), patches_, dt, outside), solve);
     if (refused < 0) held = take(own_.answer(), poses, true);
     return refused;
   }
@@ -266,30 +242,6 @@ class PatchForces {
   bool is_awake(size_t body) const { return !rest_.is_quiet(body); }
 
  private:
-  // Whether the boxes of a pair are a constraint in a step, though apart at its start: by no more than
-  // what the outside wrenches would fall. A gap would else cost each box of a stack a step of free fall.
-  bool is_near(int32_t box_a, int32_t box_b, const Vec<double>& normal, double apart, double dt,
-               const bc_wrench* outside) const {
-    auto pull = [&](int64_t box) {
-      auto body = size_t(body_of(box));
-      return outside
-                 ? std::fabs(dot(vector(outside[body].force), normal)) * bodies_[body].inverse_mass
-                 : 0.0;
-    };
-    return apart <= gap_share * dt * dt * std::max(pull(box_a), pull(box_b)) ||
-           (apart <= pressed_gap && has_pressed(box_a, box_b));
-  }
-  double farthest(double dt, const bc_wrench* outside) const {
-    double pull = 0.0;
-    for (size_t k = 0; outside && k < bodies_.size(); ++k)
-      pull = std::max(pull, length(vector(outside[k].force)) * bodies_[k].inverse_mass);
-    return std::min(std::max(gap_share * dt * dt * pull, pressed_gap), length_max);
-  }
-  bool has_pressed(int32_t box_a, int32_t box_b) const {
-    const Patch* found = find(patches_, std::minmax(box_a, box_b));
-    return found && found->normal_impulse > 0.0;
-  }
-
   void keep_rest() {
     if (is_rest_kept_) return;
     kept_rest_ = rest_;
@@ -350,8 +302,7 @@ class PatchForces {
     kept_loads_.reserve(room_);
     for (Rest* rest : {&rest_, &kept_rest_}) rest->make_room(bodies_.size(), room_);
     islands_.make_room(bodies_.size(), room_);
-    bodies_at_.make_room(bodies_.size());
-    boxes_at_.make_room(size_t(box_count()));
+    reader_.make_room(bodies_.size(), size_t(box_count()));
   }
   bool moves(int32_t a, int32_t b) const {
     return bodies_[size_t(a)].is_free() || bodies_[size_t(b)].is_free();
@@ -367,17 +318,14 @@ class PatchForces {
 
   Held take(const bc_patches& answer, const bc_pose* poses, bool is_own) {
     next_.clear();
-    bodies_at_.forget(bodies_.size());
-    boxes_at_.forget(size_t(box_count()));
+    reader_.begin(bodies_.size(), size_t(box_count()));
+    Answered all{answer, poses, bodies_, boxes(), options_.friction};
     for (int64_t turn = 0; turn < answer.count; ++turn) {
       int64_t k = is_own ? int64_t(own_.row(size_t(turn))) : turn;
-      bool is_stale = answer.separation[k] != answer.separation[k];
-      if (!is_stale && !(answer.volume[k] > 0.0)) continue;
       const int64_t* boxes = answer.pairs + 2 * k;
-      if (!moves(int32_t(body_of(boxes[0])), int32_t(body_of(boxes[1])))) continue;
-      next_.push_back({});
-      read(answer, k, is_stale, poses, next_.back());
-      if (!is_stale && !next_.back().has_area()) return Held::no_patch;
+      if (!all.is_patch(k) || !moves(all.body_of(boxes[0]), all.body_of(boxes[1]))) continue;
+      next_.push_back(reader_.read(all, k));
+      if (!all.is_stale(k) && !next_.back().has_area()) return Held::no_patch;
     }
     if (is_own) wake_touched();
     auto same = [](const Patch& p, const Patch& q) { return p.pair() == q.pair(); };
@@ -386,64 +334,11 @@ class PatchForces {
     if (std::adjacent_find(next_.begin(), next_.end(), same) != next_.end())
       return Held::pair_twice;
     if (!is_own && rest_.is_any()) take_at_rest(answer.age, poses);
-    keep_impulses();
+    keep_impulses(patches_, next_);
     patches_.swap(next_);
     is_grouped_ = false;
     make_room(patches_.size());
     return Held::all;
-  }
-
-  void read(const bc_patches& answer, int64_t k, bool is_stale, const bc_pose* poses,
-            Patch& patch) {
-    auto a = int32_t(answer.pairs[2 * k]), b = int32_t(answer.pairs[2 * k + 1]);
-    double sign = a < b ? 1.0 : -1.0;
-    patch.box_a = std::min(a, b);
-    patch.box_b = std::max(a, b);
-    patch.a = int32_t(body_of(patch.box_a));
-    patch.b = int32_t(body_of(patch.box_b));
-    patch.age = is_stale ? -1.0 : 0.0;
-    if (is_stale) return;
-    const Placed &box_at_a = box_placed(patch.box_a, poses[patch.a]),
-                 &box_at_b = box_placed(patch.box_b, poses[patch.b]);
-    patch.place(body_placed(patch.a, poses), body_placed(patch.b, poses),
-                sign * vector_at(answer.normal + 3 * k), answer.point + 3 * k,
-                answer.covariance + 9 * k, answer.volume[k], answer.separation[k],
-                (is_lighter_b(bodies_, patch) ? box_at_b : box_at_a).axes);
-    if (!boxes().empty())
-      patch.end_at_rim(box_at_a, boxes()[size_t(patch.box_a)].box.size, box_at_b,
-                       boxes()[size_t(patch.box_b)].box.size);
-    patch.friction = answer.friction ? answer.friction[k] : options_.friction;
-    patch.stiffness = answer.stiffness ? answer.stiffness[k] : 0.0;
-    if (answer.surface) patch.surface = sign * vector_at(answer.surface + 3 * k);
-    patch.late = answer.age;
-  }
-  const Placed& body_placed(int32_t body, const bc_pose* poses) {
-    return bodies_at_.of(size_t(body),
-                         [&] { return placed_at(poses[body], bodies_[size_t(body)].centre); });
-  }
-  const Placed& box_placed(int32_t box, const bc_pose& body) {
-    return boxes_at_.of(size_t(box), [&] {
-      return box_at(boxes().empty() ? body : in_common_frame(body, boxes()[size_t(box)].box.pose));
-    });
-  }
-
-  // Hand on the impulses of the patches before, and keep the patches of stale pairs.
-  void keep_impulses() {
-    auto old = patches_.begin();
-    auto kept = next_.begin();
-    for (const Patch& patch : next_) {
-      while (old != patches_.end() && old->pair() < patch.pair()) ++old;
-      bool is_known = old != patches_.end() && old->pair() == patch.pair();
-      bool is_stale = patch.age < 0.0;
-      if (is_stale && !is_known) continue;
-      if (is_stale)
-        *kept = *old;
-      else if (&*kept != &patch)
-        *kept = patch;
-      if (is_known) kept->keep(*old);
-      ++kept;
-    }
-    next_.erase(kept, next_.end());
   }
 
   std::vector<Body> bodies_;
@@ -460,7 +355,7 @@ class PatchForces {
   Rest rest_;            // patches and loads of what rests are there
   double window_ = 0.0;  // of the last advance [s]
   // Memory that calls use again.
-  PlacedOnce bodies_at_, boxes_at_;  // in the answer that is taken
+  PatchReader reader_;
   Islands islands_;
   std::vector<Patch> kept_patches_;  // for an advance that fails
   Clock kept_clock_;

@@ -1,0 +1,104 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// From answers to patches.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "patch.hpp"
+#include "rigid_body.hpp"
+
+namespace box_contact::BOX_CONTACT_SET::force {
+
+// An answer, and what was asked.
+struct Answered {
+  const bc_patches& answer;
+  const bc_pose* poses;
+  const std::vector<Body>& bodies;
+  const std::vector<bc_body_box>& boxes;  // none: box k is body k, and nobody knows its size
+  double friction;                        // where the answer has none
+
+  bool is_stale(int64_t k) const { return answer.separation[k] != answer.separation[k]; }
+  bool is_patch(int64_t k) const { return is_stale(k) || answer.volume[k] > 0.0; }
+  int32_t body_of(int64_t box) const {
+    return int32_t(boxes.empty() ? box : boxes[size_t(box)].body);
+  }
+};
+
+// Reads patches, and places each body and box once.
+class PatchReader {
+ public:
+  void make_room(size_t bodies, size_t boxes) {
+    bodies_at_.make_room(bodies);
+    boxes_at_.make_room(boxes);
+  }
+  void begin(size_t bodies, size_t boxes) {
+    bodies_at_.forget(bodies);
+    boxes_at_.forget(boxes);
+  }
+  // Read row k. The age of a stale patch is below zero, and it knows nothing but its pair.
+  Patch read(const Answered& all, int64_t k) {
+    const bc_patches& answer = all.answer;
+    auto a = int32_t(answer.pairs[2 * k]), b = int32_t(answer.pairs[2 * k + 1]);
+    double sign = a < b ? 1.0 : -1.0;
+    Patch patch{};
+    patch.box_a = std::min(a, b);
+    patch.box_b = std::max(a, b);
+    patch.a = all.body_of(patch.box_a);
+    patch.b = all.body_of(patch.box_b);
+    patch.age = all.is_stale(k) ? -1.0 : 0.0;
+    if (all.is_stale(k)) return patch;
+    const Placed &box_at_a = box_placed(all, patch.box_a, patch.a),
+                 &box_at_b = box_placed(all, patch.box_b, patch.b);
+    patch.place(body_placed(all, patch.a), body_placed(all, patch.b),
+                sign * vector_at(answer.normal + 3 * k), answer.point + 3 * k,
+                answer.covariance + 9 * k, answer.volume[k], answer.separation[k],
+                (is_lighter_b(all.bodies, patch) ? box_at_b : box_at_a).axes);
+    if (!all.boxes.empty())
+      patch.end_at_rim(box_at_a, all.boxes[size_t(patch.box_a)].box.size, box_at_b,
+                       all.boxes[size_t(patch.box_b)].box.size);
+    patch.friction = answer.friction ? answer.friction[k] : all.friction;
+    patch.stiffness = answer.stiffness ? answer.stiffness[k] : 0.0;
+    if (answer.surface) patch.surface = sign * vector_at(answer.surface + 3 * k);
+    patch.late = answer.age;
+    return patch;
+  }
+
+ private:
+  const Placed& body_placed(const Answered& all, int32_t body) {
+    return bodies_at_.of(
+        size_t(body), [&] { return placed_at(all.poses[body], all.bodies[size_t(body)].centre); });
+  }
+  const Placed& box_placed(const Answered& all, int32_t box, int32_t body) {
+    return boxes_at_.of(size_t(box), [&] {
+      const bc_pose& at = all.poses[body];
+      return box_at(all.boxes.empty() ? at : in_common_frame(at, all.boxes[size_t(box)].box.pose));
+    });
+  }
+
+  PlacedOnce bodies_at_, boxes_at_;
+};
+
+// Hand on the impulses of the patches before, and keep the patches of stale pairs. Both are by pair.
+inline void keep_impulses(const std::vector<Patch>& before, std::vector<Patch>& patches) {
+  auto old = before.begin();
+  auto kept = patches.begin();
+  for (const Patch& patch : patches) {
+    while (old != before.end() && old->pair() < patch.pair()) ++old;
+    bool is_known = old != before.end() && old->pair() == patch.pair();
+    bool is_stale = patch.age < 0.0;
+    if (is_stale && !is_known) continue;
+    if (is_stale)
+      *kept = *old;
+    else if (&*kept != &patch)
+      *kept = patch;
+    if (is_known) kept->keep(*old);
+    ++kept;
+  }
+  patches.erase(kept, patches.end());
+}
+
+}  // namespace box_contact::BOX_CONTACT_SET::force

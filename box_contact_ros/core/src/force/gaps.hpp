@@ -1,0 +1,63 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// Which pairs that are apart are constraints of a step all the same.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "patch.hpp"
+
+namespace box_contact::BOX_CONTACT_SET::force {
+
+// A pair apart is a constraint of a step within so many times g·dt² [1]: what it falls in the first step,
+// and as much again in the next.
+constexpr double gap_share = 2.0;
+// A patch that pressed stays while its pair is apart by no more than this [m]: flush sides of goods come
+// and go by nanometres, and with them the friction that bore weight.
+constexpr double pressed_gap = 1e-5;
+
+// The gaps of a step `dt`.
+class Gaps {
+ public:
+  Gaps(const std::vector<Body>& bodies, const std::vector<bc_body_box>& boxes,
+       const std::vector<Patch>& patches, double dt, const bc_wrench* outside)
+      : bodies_(bodies), boxes_(boxes), patches_(patches), dt_(dt), outside_(outside) {}
+
+  // No pair that is farther apart is one [m].
+  double farthest() const {
+    double pull = 0.0;
+    for (size_t k = 0; outside_ && k < bodies_.size(); ++k)
+      pull = std::max(pull, length(vector(outside_[k].force)) * bodies_[k].inverse_mass);
+    return std::min(std::max(gap_share * dt_ * dt_ * pull, pressed_gap), length_max);
+  }
+  // Whether the boxes of a pair are a constraint in the step, though apart at its start: by no more than
+  // what the outside wrenches would fall. A gap would else cost each box of a stack a step of free fall.
+  bool is_near(int32_t box_a, int32_t box_b, const Vec<double>& normal, double apart) const {
+    auto pull = [&](int32_t box) {
+      auto body = size_t(boxes_[size_t(box)].body);
+      return outside_
+                 ? std::fabs(dot(vector(outside_[body].force), normal)) * bodies_[body].inverse_mass
+                 : 0.0;
+    };
+    return apart <= gap_share * dt_ * dt_ * std::max(pull(box_a), pull(box_b)) ||
+           (apart <= pressed_gap && has_pressed(box_a, box_b));
+  }
+
+ private:
+  bool has_pressed(int32_t box_a, int32_t box_b) const {
+    const Patch* found = find(patches_, std::minmax(box_a, box_b));
+    return found && found->normal_impulse > 0.0;
+  }
+
+  const std::vector<Body>& bodies_;
+  const std::vector<bc_body_box>& boxes_;
+  const std::vector<Patch>& patches_;
+  double dt_;
+  const bc_wrench* outside_;
+};
+
+}  // namespace box_contact::BOX_CONTACT_SET::force
