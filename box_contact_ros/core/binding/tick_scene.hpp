@@ -22,12 +22,9 @@ inline std::string_view utf8_of(PyObject* text) {
   return begin ? std::string_view(begin, size_t(length)) : throw PythonError{};
 }
 
-// A tuple of texts or, where any object will do, of anything.
-inline Owned tuple_of(PyObject* given, const char* name, npy_intp length, bool is_text) {
-  bool fits = PyTuple_Check(given) && PyTuple_GET_SIZE(given) == length;
-  for (npy_intp k = 0; fits && is_text && k < length; ++k)
-    fits = PyUnicode_Check(PyTuple_GET_ITEM(given, k));
-  if (fits) return Owned(Py_NewRef(given));
+// A tuple of any objects: what is no text is refused where it is written.
+inline Owned tuple_of(PyObject* given, const char* name, npy_intp length) {
+  if (PyTuple_Check(given) && PyTuple_GET_SIZE(given) == length) return Owned(Py_NewRef(given));
   PyErr_Format(PyExc_ValueError, "%s must be a tuple of %zd", name, length);
   throw PythonError{};
 }
@@ -100,9 +97,9 @@ inline TickScene read_scene(PyObject* args) {
   check_places(moving, "moving", 0, rows);
   check_places(bodies, "bodies", -1, rows);
   check_places(listed, "listed", 0, count);
-  scene.names = tuple_of(names, "names", count, true);
-  scene.labels = tuple_of(labels, "labels", listed.length(0), true);
-  scene.topics = tuple_of(topics, "topics", watched.length(0), false);
+  scene.names = tuple_of(names, "names", count);
+  scene.labels = tuple_of(labels, "labels", listed.length(0));
+  scene.topics = tuple_of(topics, "topics", watched.length(0));
   for (npy_intp k = 0; k < listed.length(0); ++k)
     scene.pairs[TickScene::key_of(listed.numbers + 2 * k)].label = PyTuple_GET_ITEM(labels, k);
   for (npy_intp k = 0; k < watched.length(0); ++k) {

@@ -14,6 +14,7 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -61,7 +62,7 @@ class BroadPhase {
         meets_(half_.size(), 0),
         bounds_(half_.size(), nowhere),
         fat_(half_.size(), nowhere),
-        last_(half_.size()),
+        last_(new std::array<double, 7>[half_.size()]),
         is_settled_(half_.size(), 0),
         is_changed_(half_.size(), 0) {
     for (size_t k = 0; k + 1 < asked_.listed.size(); k += 2)
@@ -71,6 +72,7 @@ class BroadPhase {
     for (size_t k = 0; k < asked_.allowed.size(); ++k)
       if (asked_.allowed[k])
         group_meets[k / size_t(asked_.groups)] = group_meets[k % size_t(asked_.groups)] = 1;
+    to_read_.reserve(count());
     for (int32_t box = 0; box < int32_t(count()); ++box) {
       to_read_.push_back(box);
       meets_[size_t(box)] = asked_.groups && group_meets[size_t(asked_.group[box])];
@@ -324,7 +326,7 @@ class BroadPhase {
   std::vector<Row> pairs_, stale_;
   // From call to call.
   std::vector<Bounds> fat_;
-  std::vector<std::array<double, 7>> last_;  // the pose of a box that is settled
+  std::unique_ptr<std::array<double, 7>[]> last_;  // the pose of a box that is settled
   std::vector<uint8_t> is_settled_;  // whether the bounds are those of it, within the fat ones
   std::vector<uint64_t> kept_;
   bool is_partial_ = false;  // not all pairs whose fat bounds overlap are kept
