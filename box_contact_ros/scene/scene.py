@@ -13,8 +13,8 @@ import fnmatch
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, fields
-from functools import cached_property
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 from itertools import count
 from typing import Any, NamedTuple
 
@@ -193,7 +193,7 @@ class Scene:
 
     def matching(self, pattern: str) -> np.ndarray:
         """Return which boxes (n,) a pattern matches by their names, or by those of their bodies."""
-        is_alike = re.compile(fnmatch.translate(pattern)).match
+        is_alike = _matcher_of(pattern)
         bodies = {name for name in self.bodies if is_alike(name)}
         return np.array([is_alike(name) is not None or box.body in bodies
                          for name, box in self.boxes.items()])
@@ -206,7 +206,8 @@ class Scene:
         only what changes is looked at.
         """
         given = {name: box for name, box in changes.items() if box is not None}
-        boxes = {**self.boxes, **given}
+        boxes = dict(self.boxes)  # a copy without a look at any
+        boxes.update(given)
         gone = [self.index_of[name] for name in changes.keys() - given.keys()]
         for name in changes.keys() - given.keys():
             del boxes[name]
@@ -216,7 +217,8 @@ class Scene:
 
         def merged(rows: np.ndarray, values: np.ndarray) -> np.ndarray:
             rows = np.concatenate((rows, values[is_new]))
-            rows[replaced] = values[~is_new]
+            if replaced:
+                rows[replaced] = values[~is_new]
             return np.delete(rows, gone, axis=0) if gone else rows
 
         for key in ('sizes', 'box_poses', 'body_of', 'is_fixed'):
@@ -225,11 +227,17 @@ class Scene:
         number_of = {row.tobytes(): number for number, row in enumerate(kinds)}
         numbers = [number_of.setdefault(row.tobytes(), len(number_of)) for row in part.sides]
         if self.patterns and len(number_of) <= len(boxes):  # else kinds of no box any more go
-            kinds = np.frombuffer(b''.join(number_of), bool).reshape(-1, kinds.shape[1])
-            vars(scene)['_kinds'] = kinds, merged(kind, np.array(numbers, np.int32))
+            kind = merged(kind, np.array(numbers, np.int32))
+            if len(number_of) == len(kinds):
+                vars(scene)['groups'] = kind, self.groups[1]
+            else:
+                kinds = np.frombuffer(b''.join(number_of), bool).reshape(-1, kinds.shape[1])
+            vars(scene)['_kinds'] = kinds, kind
         if not gone:
-            added = [name for name in given if name not in self.boxes]
-            vars(scene)['index_of'] = {**self.index_of, **dict(zip(added, count(len(self.boxes))))}
+            added = tuple(name for name in given if name not in self.boxes)
+            vars(scene)['names'] = self.names + added
+            index = vars(scene)['index_of'] = dict(self.index_of)
+            index.update(zip(added, count(len(index))))
             vars(scene)['rows'] = self.rows
         vars(scene)['listed_names'] = self.listed_names
         if not self.listed_names.isdisjoint(changes):
@@ -239,7 +247,7 @@ class Scene:
     def _with(self, boxes: Mapping[str, Box]) -> Scene:
         """Return an unchecked scene of other boxes."""
         scene = object.__new__(Scene)
-        vars(scene).update({part.name: getattr(self, part.name) for part in fields(self)},
+        vars(scene).update({key: getattr(self, key) for key in self.__dataclass_fields__},
                            boxes=boxes)
         return scene
 
@@ -261,7 +269,8 @@ class Scene:
     @cached_property
     def row_of(self) -> Mapping[str, int]:
         """Return by name the rows of poses (n + m, 7): those of boxes, then those of bodies."""
-        return {**self.index_of, **dict(zip(self.bodies, count(len(self.boxes))))}
+        bodies = dict(zip(self.bodies, count(len(self.boxes))))
+        return {**self.index_of, **bodies} if bodies else self.index_of
 
     @cached_property
     def sizes(self) -> np.ndarray:
@@ -310,11 +319,15 @@ class Scene:
         local = np.where(of_body[:, None], self.box_poses, AT_FRAME)
         return np.where(of_body, len(self.boxes) + self.body_of, -1).astype(np.int64), local
 
-    def fixed_poses(self) -> np.ndarray:
-        """Return new poses (n + m, 7) of boxes and bodies, by `row_of`: NaN for what moves."""
-        poses = np.concatenate((self.box_poses, _poses_of(self.bodies)))
+    def fixed_poses(self, spare: int = 0) -> np.ndarray:
+        """Return new poses (n + m, 7) of boxes and bodies, by `row_of`: NaN for what moves.
+
+        spare: how many rows of NaN follow.
+        """
+        nowhere = np.full((spare, 7), np.nan)
+        poses = np.concatenate((self.box_poses, _poses_of(self.bodies), nowhere))
         if self.bodies:
-            self.place_boxes(poses)
+            self.place_boxes(poses[:len(poses) - spare])
         return poses
 
     def place_boxes(self, poses: np.ndarray) -> None:
@@ -386,7 +399,7 @@ class Scene:
     def is_asked(self) -> np.ndarray:
         """Return which boxes (n,) patterns pair with others."""
         group, allowed = self.groups
-        return allowed.max(axis=1)[group] > 0 if self.patterns else np.zeros(len(group), bool)
+        return (allowed.max(axis=1) > 0)[group] if self.patterns else np.zeros(len(group), bool)
 
     def partners(self, index: int) -> np.ndarray:
         """Return which boxes (n,) patterns pair a box with, without those of listed pairs."""
@@ -431,13 +444,22 @@ class Scene:
     @cached_property
     def moving(self) -> tuple[str, ...]:
         """Names of boxes, then of bodies that move; without an array, only of those in a pair."""
-        asked = self.is_asked | self.pose_array
-        asked[self.rows.ravel()] = True
+        moves = ~self.is_fixed
+        if not self.pose_array:
+            asked = self.is_asked.copy()
+            asked[self.rows.ravel()] = True
+            moves &= asked
         names = self.names
-        movers = [names[box] for box in np.flatnonzero(asked & ~self.is_fixed).tolist()]
+        movers = [names[box] for box in np.flatnonzero(moves).tolist()]
         bodies = {self.mover(name) for name in movers} if self.bodies else set()
         return (*(name for name in movers if not self.boxes[name].body),
                 *(name for name in self.bodies if name in bodies))
+
+
+@lru_cache
+def _matcher_of(pattern: str) -> Callable[[str], object]:
+    """Return what tells whether a name matches a pattern."""
+    return re.compile(fnmatch.translate(pattern)).match
 
 
 def _poses_of(parts: Mapping[str, Box] | Mapping[str, Frame]) -> np.ndarray:

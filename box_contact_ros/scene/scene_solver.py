@@ -99,7 +99,7 @@ class SceneSolver:
         self.moving = tuple(moving)
         """Whose poses a call takes, in their order. What moves no more has a row still, which is
         not read."""
-        self._rows = np.concatenate((scene.fixed_poses(), [NOWHERE]))
+        self._rows = scene.fixed_poses(spare=1)
         """Poses of boxes, of bodies, and of what moves no more."""
         self._poses = self._rows[:len(scene.boxes)]
         is_moving = set(scene.moving)
@@ -123,8 +123,9 @@ class SceneSolver:
         kept = np.arange(len(self.scene.boxes))
         index = self.scene.index_of
         kept[[index[name] for name in changes if name in index]] = -1
-        kept = np.delete(kept, [index[name] for name, box in changes.items() if box is None])
-        kept = np.append(kept, np.full(len(scene.boxes) - len(kept), -1))
+        if gone := [index[name] for name, box in changes.items() if box is None]:
+            kept = np.delete(kept, gone)
+        kept = np.concatenate((kept, np.full(len(scene.boxes) - len(kept), -1)))
         rows = (*self.moving, *(name for name in moving or {} if name not in self.moving))
         solver = object.__new__(SceneSolver)
         vars(solver).update(vars(self))
@@ -191,11 +192,11 @@ class SceneSolver:
     def parts(self) -> tuple[native.BroadPhase, ContactSolver, float, int, np.ndarray, np.ndarray,
                              np.ndarray, np.ndarray, np.ndarray]:
         """Return what native.TickWriter answers ticks of the scene by: its first nine arguments."""
-        scene, solver, size = self.scene, self._solver, self.scene.sizes[0]
-        if (scene.sizes == size).all():  # model `paper` is in C++ for boxes of one size
-            solver = ContactSolver(size, size, model=self.model, margin=self.margin)
+        scene, solver, sizes = self.scene, self._solver, self.scene.sizes
+        if (sizes[1:] == sizes[:-1]).all():  # model `paper` is in C++ for boxes of one size
+            solver = ContactSolver(sizes[0], sizes[0], model=self.model, margin=self.margin)
         bodies = scene.placement if scene.bodies else (NO_BODIES, self._rows[:0])
-        return (self._broad_phase, solver, self.margin, self._most_near, scene.sizes, self._rows,
+        return (self._broad_phase, solver, self.margin, self._most_near, sizes, self._rows,
                 self._moving, *bodies)
 
     def _set_poses(self, poses: Sequence[np.ndarray | None] | ArrayLike) -> None:
