@@ -10,6 +10,7 @@ import math
 import runpy
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,14 +25,15 @@ matplotlib.use('Agg')  # before pyplot: no display is needed
 
 from matplotlib import pyplot as plt
 from matplotlib.colors import to_rgba
-from mpl_toolkits.mplot3d import Axes3D
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 sys.path.append(str(Path(__file__).resolve().parents[2]))  # where benchmarks/ is, not installed
 from benchmarks.contestant import CHOICES
 from benchmarks.engines import mujoco_engines
 from benchmarks.output import COLOURS
 from benchmarks.paper.dataset import quaternion_from_euler
+
+if TYPE_CHECKING:
+    from mpl_toolkits.mplot3d import Axes3D
 
 STACK, LOAD, OVERLAP, POINT, CORNER = '#8c8c8c', '#4477aa', '#ccbb44', '#222222', '#ee6677'
 CONTAINER = (12.192, 2.438, 2.591)
@@ -148,6 +150,7 @@ def plan_descent(folder: Path) -> None:
 
 def faces(axes: Axes3D, turn: np.ndarray, centre: np.ndarray, sign: float, colour: str) -> None:
     """Draw a cube of edge 2, with its three faces on the side of a sign filled: its trihedron."""
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # --help runs without matplotlib
     square = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
     for axis in range(3):
         for side in (-1.0, 1.0):
