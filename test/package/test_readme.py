@@ -430,8 +430,8 @@ LIMITS = {
         f'shrinks to 1 / {constant(CLOCK, "step_shrinkage")} per step',
         f'by more than {constant("force/iterations.hpp", "impact_change")} m/s, up to '
         f'{constant("force/iterations.hpp", "impact_iterations")} times',
-        f'no more than {constant("force/patch_forces.hpp", "gap_share")}·g·dt²',
-        f'apart by {1e3 * float(constant("force/patch_forces.hpp", "pressed_gap")):g} mm',
+        f'no more than {constant("force/gaps.hpp", "gap_share")}·g·dt²',
+        f'apart by {1e3 * float(constant("force/gaps.hpp", "pressed_gap")):g} mm',
         f'the frequency {SOFT}/window', f'{float(SOFT) ** -2:.1f}·g·h² deep',
         f'the frequency is {LATE}/T', f'g·T²/{float(LATE) ** 2}',
         f'faster than {constant(FORCES, "push_out_limit")} m/s',
