@@ -61,6 +61,13 @@ def test_loads_come_to_rest_at_every_timing(make: partial[Scene], timing: Timing
     assert outcome.rest < 3.0 and outcome.moved < 10.0 and outcome.turned < 0.5
 
 
+@pytest.mark.parametrize('timing, rest', [(TIMINGS[5], 0.3), (TIMINGS[6], 3.0)], ids=str)
+def test_heavy_on_light_comes_to_rest_by_late_answers(timing: Timing, rest: float) -> None:
+    """100 on 1: what an answer finds closing is slowed over several steps, not at once."""
+    assert timing.latency > 0.0
+    assert run(partial(ratio, 100.0), timing).rest < rest
+
+
 @pytest.mark.parametrize('order', ORDERS)
 def test_real_pallets_stand(order: str) -> None:
     """Every box of a stable set stays within 5 mm and 0.5°, with answers at each step of 1 ms."""

@@ -56,6 +56,7 @@ T frequency_of(T late, double period) {
 struct SubSteps {
   double dt, length;  // of all, and of each [s]
   int count, rounds;  // how many, and how many times all iterations are in each
+  bool is_late;       // whether answers are late
   double window;      // the time in which the impulses that patches keep are given [s]
   double share;       // of the window in the longest step [1]: answers are late compared with that
   double period;      // from one answer to the next [s]
@@ -136,8 +137,15 @@ class Clock {
     bool is_late = frequency_of(late_, period_) < soft_frequency / longest;
     double window = is_late ? longest : std::min(longest / substeps, sub_step_limit);
     int count = SubSteps::count_of(dt, window);
-    return {dt,     dt / count,       count,   is_late ? substeps : 1,
-            window, window / longest, period_, overdue_periods * std::max(period_, dt)};
+    return {dt,
+            dt / count,
+            count,
+            is_late ? substeps : 1,
+            is_late,
+            window,
+            window / longest,
+            period_,
+            overdue_periods * std::max(period_, dt)};
   }
   // Since the last answer [s]; 0 with contacts of each step.
   double since() const { return std::max(0.0, since_); }

@@ -20,6 +20,9 @@ constexpr double least_change = 1e-8;
 constexpr double impact_change = 0.01;
 constexpr double impact_share = 0.2;
 constexpr int impact_iterations = 100;
+// Late answers bear nothing so hard: what closes is slowed over several steps [m/s]. Solved at once, a load
+// of 100 times what bears it never rests.
+constexpr double no_impact = 1e300;
 // After every so many of them, all that presses in the island is scaled, where the factor is far from 1:
 // by this or more, or by its inverse or less.
 constexpr int scaled_every = 8;

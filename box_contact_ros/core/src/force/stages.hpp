@@ -32,7 +32,8 @@ struct Stages {
   // Prepare a sub-step, and push.
   static void push(void* all) {
     const Work& work = work_of(all);
-    for (Island* island = work.first; island < work.last; ++island) island->impact = impact_change;
+    for (Island* island = work.first; island < work.last; ++island)
+      island->impact = work.steps.is_late ? no_impact : impact_change;
     each(work, [&](G& group) { prepare(work, group); });
     each(work, [&](G& group) { warm_start(work, group); });
     iterate_all(work, work.iterations, true);
