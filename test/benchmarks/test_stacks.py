@@ -68,6 +68,14 @@ def test_heavy_on_light_comes_to_rest_by_late_answers(timing: Timing, rest: floa
     assert run(partial(ratio, 100.0), timing).rest < rest
 
 
+def test_a_tower_on_a_turntable_does_not_sway() -> None:
+    """Three cubes 2 m from the axis, in steps of 4 ms."""
+    scene = replace(turntable(), seconds=4.0)
+    for _ in steps(scene, TIMINGS[1]):
+        pass
+    assert np.abs(scene.boxes.velocity[1:, 3:5]).max() < 1e-5
+
+
 @pytest.mark.parametrize('order', ORDERS)
 def test_real_pallets_stand(order: str) -> None:
     """Every box of a stable set stays within 5 mm and 0.5°, with answers at each step of 1 ms."""

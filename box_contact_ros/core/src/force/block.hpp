@@ -90,6 +90,7 @@ struct Kept {
 template <class T>
 struct Arms {
   Vec<T> arm_a, arm_b;  // from the centres of mass to the point
+  Vec<T> carried;       // velocity of B at the point relative to A, beside what arms tell [m/s]
 };
 // What is known of it at the end of a sub-step.
 template <class T>
@@ -245,7 +246,8 @@ BC_INLINE void store(const SubSteps& steps, Rows<T>& block) {
 // Velocities of B relative to A: at the point, and angular.
 template <class T, class Body>
 BC_INLINE Vec<T> speed(const Rows<T>& block, const Body& a, const Body& b) {
-  return (b.linear + cross(b.angular, block.arm_b)) - (a.linear + cross(a.angular, block.arm_a));
+  return ((b.linear + cross(b.angular, block.arm_b)) - (a.linear + cross(a.angular, block.arm_a))) +
+         block.carried;
 }
 
 // Solve friction and torsion of the blocks that are due. Returns by how much a speed changed.

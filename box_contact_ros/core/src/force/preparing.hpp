@@ -97,14 +97,21 @@ BC_INLINE void soften(const SubSteps& step, const Turned& turned, Rows<T>& block
   if (any(is_spring)) put<T>(is_spring, rows, block.relaxed);
 }
 
-// From a body's centre of mass to a point. On one that no force moves, a point goes around by the chord
-// of the step: by the tangent, what lies on a turntable would creep outward.
+// Beside a body that no force moves and that turns, points go around by the chord of a step h, which begins
+// here or, below 0, ends here: by the tangent, what lies on a turntable would creep outward. Returns how the
+// velocity of B relative to A differs by that.
 template <class T, class Body>
-BC_INLINE Vec<T> arm_of(const Body& body, const PlacedOf<T>& at, const Vec<T>& point, double h) {
-  Vec<T> arm = point - at.position;
-  Mask<T> is_free = body.inverse_mass > 0.0;
-  if (!any(body.inverse_mass <= 0.0)) return arm;
-  return select(is_free, arm, arm + 0.5 * h * cross(body.angular, arm));
+BC_INLINE Vec<T> along_chords(const Body& a, const Body& b, const Vec<T>& arm_a,
+                              const Vec<T>& arm_b, double h) {
+  auto turns = [](const Body& body) __attribute__((always_inline)) {
+    return (body.inverse_mass <= 0.0) & (dot(body.angular, body.angular) > 0.0);
+  };
+  Mask<T> is_carrier = turns(a) | turns(b);
+  if (!any(is_carrier)) return {};
+  auto inward = [](const Body& body, const Vec<T>& arm) __attribute__((always_inline)) {
+    return cross(body.angular, cross<T>(body.angular, arm));
+  };
+  return select(is_carrier, (0.5 * h) * (inward(b, arm_b) - inward(a, arm_a)), Vec<T>{});
 }
 
 template <class T>
@@ -124,7 +131,8 @@ BC_INLINE Place<T> place(const Body& a, const Body& b, const Where<T>& at_a, con
   T share = select<T>(b.inverse_mass > 0.0, splat<T>(0.5), splat<T>(1.0));
   share = select<T>(a.inverse_mass > 0.0, share, T{});
   Vec<T> point = block.point + (1.0 - share) * way_a + share * way_b;
-  return {{arm_of<T>(a, at_a.placed, point, h), arm_of<T>(b, at_b.placed, point, h)},
+  Vec<T> arm_a = point - at_a.placed.position, arm_b = point - at_b.placed.position;
+  return {{arm_a, arm_b, along_chords(a, b, arm_a, arm_b, h)},
           block.asked_depth + dot(way_a - way_b, block.normal)};
 }
 
@@ -169,7 +177,7 @@ BC_INLINE void follow(const Body& a, const Body& b, const Where<T>& at_a, const 
   T moved = h * max(way / block.shape.half_1, turned);
   Mask<T> goes = moved > still;
   if (!any(goes)) return;
-  put<T>(goes, place(a, b, at_a, at_b, h, block).arms, static_cast<Arms<T>&>(block));
+  put<T>(goes, place(a, b, at_a, at_b, -h, block).arms, static_cast<Arms<T>&>(block));
   Mask<T> weighs = moved > alike;
   if (!any(weighs)) return;
   put<T>(weighs, weigh(a, b, block), static_cast<Masses<T>&>(block));

@@ -28,6 +28,7 @@ struct alignas(64) Group : Rows<T> {
     const NormalRows<T>& rows = rows_of<T>(*this, is_pushing);
     copy(this->arm_a, block.arm_a);
     copy(this->arm_b, block.arm_b);
+    copy(this->carried, block.carried);
     copy(this->normal_impulses, block.normal_impulses);
     copy(rows.softness, rows_of(block, is_pushing).softness);
     copy(rows.bias, rows_of(block, is_pushing).bias);
