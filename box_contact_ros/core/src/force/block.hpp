@@ -80,6 +80,7 @@ struct Asked {
   RectangleOf<T> shape;
   T friction, asked_depth, stiffness, late, age;
   Vec<T> local_a, local_b;  // its point in the frames of its bodies
+  Vec<T> closing;           // velocities along N, τ1 and τ2 that close the faces: see closing.hpp
 };
 // The impulses that it gave in the last window, and that window: see Patch.
 template <class T>
@@ -136,10 +137,10 @@ inline void take(const Patch& patch, Block& block) {
   auto local = [&](const Placed& asked) {
     return transposed_times(asked.axes, patch.point - asked.position);
   };
-  static_cast<Asked<double>&>(block) = {patch.normal,         patch.point,         patch.surface,
-                                        patch.shape,          patch.friction,      patch.depth,
-                                        patch.stiffness,      patch.late,          patch.age,
-                                        local(patch.asked_a), local(patch.asked_b)};
+  static_cast<Asked<double>&>(block) = {patch.normal,         patch.point,          patch.surface,
+                                        patch.shape,          patch.friction,       patch.depth,
+                                        patch.stiffness,      patch.late,           patch.age,
+                                        local(patch.asked_a), local(patch.asked_b), {}};
   static_cast<Kept<double>&>(block) = {patch.window,          patch.normal_impulse,
                                        patch.torsion_impulse, patch.friction_impulse,
                                        patch.rocking_impulse, patch.impulse_arm};

@@ -106,6 +106,17 @@ struct Face {
   }
 };
 
+// Its plane along a normal, above a place: height + slope · place.
+struct Plane {
+  Point slope;
+  double height;
+};
+template <class Flat>
+Plane plane_of(const Face& face, const Vec<double>& normal, const Flat& flat) {
+  double along = dot(face.outward, normal);
+  return {(-1.0 / along) * flat(face.outward), dot(face.centre, face.outward) / along};
+}
+
 // The face of a box most along a direction.
 inline Face face_along(const Placed& box, const bc_size& size, const Vec<double>& origin,
                        const Vec<double>& direction) {
@@ -180,12 +191,8 @@ inline FacePatch patch_of_faces(const bc_pose& pose_a, const bc_size& size_a, co
   }
 
   // Heights of both planes along the normal.
-  auto plane = [&](const Face& face) {
-    double along = dot(face.outward, normal);
-    return std::pair{(-1.0 / along) * flat(face.outward), dot(face.centre, face.outward) / along};
-  };
-  auto [slope_a, height_a] = plane(a);
-  auto [slope_b, height_b] = plane(b);
+  auto [slope_a, height_a] = plane_of(a, normal, flat);
+  auto [slope_b, height_b] = plane_of(b, normal, flat);
   Point slope = slope_b - slope_a;
   double gap = height_b - height_a;
   patch.polygon.cut([&](const Point& at) { return gap + dot(slope, at) - tolerance; });

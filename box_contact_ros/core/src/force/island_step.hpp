@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "clock.hpp"
+#include "closing.hpp"
 #include "fineness.hpp"
 #include "islands.hpp"
 #include "iterations.hpp"
@@ -175,11 +176,19 @@ class IslandStep {
       });
     };
     const SubSteps& steps = work.steps;
+    // From one answer to the next.
+    double time = factor > 1 ? std::min(parts_of_a_contact * steps.length, steps.dt) : steps.dt;
+    if (!steps.is_late)
+      each_island([&](const Island& island) {
+        each_block(island, [&](Block& block, const Patch& patch, Moving& a, Moving& b) {
+          close(patch, a, b, time, block);
+        });
+      });
     kernel.load(&work);
     for (int number = 1; number <= steps.count; ++number) {
       if (factor > 1 && number > 1 && number % parts_of_a_contact == 1) {
         end();
-        each_island([&](const Island& island) { ask_again(island); });
+        each_island([&](const Island& island) { ask_again(island, time); });
         kernel.load(&work);
       }
       work.is_last = number == steps.count;
@@ -220,12 +229,24 @@ class IslandStep {
   }
 
   // Solve the contacts of an island anew, where its bodies are within the advance.
-  void ask_again(const Island& island) const {
+  void ask_again(const Island& island, double time) const {
     each_block(island, [&](Block& block, Patch& patch, Moving& a, Moving& b) {
       step_.own->solve_again(step_.solve_pair, pose_of(a), pose_of(b), a.placed, b.placed,
                              is_lighter_b(bodies_, patch), patch);
       take(patch, block);
+      close(patch, a, b, time, block);
     });
+  }
+  // Let faces close that do so within a time.
+  void close(const Patch& patch, const Moving& a, const Moving& b, double time,
+             Block& block) const {
+    auto pull = [&](const Moving& moving) {
+      return step_.outside
+                 ? moving.inverse_mass *
+                       std::fabs(dot(vector(step_.outside[moving.body].force), block.normal))
+                 : 0.0;
+    };
+    close_faces(patch, a, b, time, std::max(pull(a), pull(b)), block);
   }
 
   // Move a body by its velocities for a time.

@@ -17,6 +17,14 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
+// The faces by which two boxes meet, from the point of their patch: how far both reach along its axes, and
+// the gap between them, gap + slope · place.
+struct FacePair {
+  Span span_1, span_2;
+  double gap;
+  Point slope;
+};
+
 // The boxes of a pair, the lower first.
 using BoxPair = std::pair<int32_t, int32_t>;
 
@@ -28,6 +36,7 @@ struct Patch {
   Placed asked_a, asked_b;
   Vec<double> normal, point;
   Rectangle shape;
+  FacePair faces;       // without sizes: none
   double depth;         // the lesser of volume / area and −separation; below 0: apart [m]
   double friction;      // μ [1]
   double stiffness;     // [N/m], up to what step and answers bear; 0: that
@@ -79,11 +88,17 @@ struct Patch {
   // tip late, and one whose middle is beyond an edge would stay.
   void end_at_rim(const Placed& box_at_a, const bc_size& size_a, const Placed& box_at_b,
                   const bc_size& size_b) {
-    for (const Face& face : {face_along(box_at_a, size_a, point, normal),
-                             face_along(box_at_b, size_b, point, -normal)}) {
-      shape.span_1 = shape.span_1.within(face.span_along(shape.axis_1));
-      shape.span_2 = shape.span_2.within(face.span_along(shape.axis_2));
-    }
+    Face a = face_along(box_at_a, size_a, point, normal),
+         b = face_along(box_at_b, size_b, point, -normal);
+    auto flat = [&](const Vec<double>& v) {
+      return Point{dot(v, shape.axis_1), dot(v, shape.axis_2)};
+    };
+    Plane of_a = plane_of(a, normal, flat), of_b = plane_of(b, normal, flat);
+    faces = {a.span_along(shape.axis_1).within(b.span_along(shape.axis_1)),
+             a.span_along(shape.axis_2).within(b.span_along(shape.axis_2)),
+             of_b.height - of_a.height, of_b.slope - of_a.slope};
+    shape.span_1 = shape.span_1.within(faces.span_1);
+    shape.span_2 = shape.span_2.within(faces.span_2);
   }
 
   // Whether area and depth are numbers: what no limit of an answer alone makes sure of.

@@ -61,7 +61,8 @@ BC_INLINE void soften(const SubSteps& step, const Turned& turned, Rows<T>& block
   T depth = block.depth, none{};
   double h = step.length;
   T apart = select<T>(depth < 0.0, -depth / h, none);
-  block.relaxed = {{none, none, none}, {apart, none, none}, inverse(compliance)};
+  block.relaxed = {{none, none, none}, block.closing, inverse(compliance)};
+  block.relaxed.bias[0] += apart;
   block.pushing = block.relaxed;
   Mask<T> pushes = (depth >= 0.0) & (block.age <= step.overdue);
   if (!any(pushes)) return;
@@ -91,7 +92,7 @@ BC_INLINE void soften(const SubSteps& step, const Turned& turned, Rows<T>& block
   T slowed = min(limit / (rate * depth), splat<T>(1.0));
   slowed = select<T>(is_spring, splat<T>(1.0), slowed);
   rows.softness[0] = slowed * softness * compliance[0][0];
-  rows.bias[0] = -slowed * rate * depth;
+  rows.bias[0] = block.closing[0] - slowed * rate * depth;
   rows.mass = softened(compliance, rows.softness);
   put<T>(pushes, rows, block.pushing);
   if (any(is_spring)) put<T>(is_spring, rows, block.relaxed);

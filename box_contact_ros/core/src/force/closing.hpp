@@ -1,0 +1,57 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// Faces that close within a step.
+//
+// The patch of a box that stands on an edge is a strip along it. Where the rest of its face comes down
+// within the step, it is a constraint of the step, too: nothing else would stop it, and the overlap would be
+// pushed out with more energy than the impact took. A tall box would rock for ever.
+#pragma once
+
+#include "gaps.hpp"
+#include "one_by_one.hpp"
+
+namespace box_contact::BOX_CONTACT_SET::force {
+
+// A patch that is at least so wide as a part of its faces stops a turn by itself [1].
+constexpr double wide = 0.5;
+
+// Let the centre of pressure go as far as the faces reach, along each axis along which they close within a
+// time, and the faces close in that time by a turn about the other rim. `pull`: by outside wrenches, along
+// the normal [m/s²].
+inline void close_faces(const Patch& patch, const Moving& a, const Moving& b, double time,
+                        double pull, Block& block) {
+  const FacePair& faces = patch.faces;
+  Rectangle& shape = block.shape;
+  auto is_narrow = [](const Span& face, const Span& span) {
+    return span.high - span.low < wide * (face.high - face.low);
+  };
+  bool is_narrow_1 = is_narrow(faces.span_1, shape.span_1),
+       is_narrow_2 = is_narrow(faces.span_2, shape.span_2);
+  if (!is_narrow_1 && !is_narrow_2) return;
+  auto [arms, depth] = place<double>(a, b, a, b, 0.0, block);
+  static_cast<Arms<double>&>(block) = arms;
+  Vec<double> turned = turned_since(patch, a, b), spin = b.angular - a.angular;
+  double gap = faces.gap - (depth - block.asked_depth);
+  if (gap > 0.0) return;  // they touch elsewhere
+  double falls = time * (closing_speed<double>(block, a, b) + gap_share * time * pull);
+  // Returns the turn that closes the faces along an axis. `slope`: of the gap; `rate`: its change.
+  auto close = [&](const Span& face, double slope, double rate, Span& span) {
+    bool rises = slope > 0.0;
+    double far = rises ? face.high : face.low, rim = rises ? span.low : span.high;
+    double apart = gap + far * slope;
+    if (!(apart > 0.0) || apart + time * far * rate > falls) return 0.0;
+    (rises ? span.high : span.low) = far;
+    double turn = apart / (time * (far - rim));
+    block.closing[0] -= rim * turn;
+    return turn;
+  };
+  if (is_narrow_1)
+    block.closing[2] = -close(faces.span_1, faces.slope.x - dot(turned, shape.axis_2),
+                              -dot(spin, shape.axis_2), shape.span_1);
+  if (is_narrow_2)
+    block.closing[1] = close(faces.span_2, faces.slope.y + dot(turned, shape.axis_1),
+                             dot(spin, shape.axis_1), shape.span_2);
+}
+
+}  // namespace box_contact::BOX_CONTACT_SET::force
