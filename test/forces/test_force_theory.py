@@ -68,6 +68,19 @@ def test_a_tall_box_that_comes_down_from_an_edge_stands(degrees: float, dt: floa
     assert rotation_matrix(world.poses[1, 3:])[2, 2] == pytest.approx(1.0, abs=1e-6)
 
 
+def test_a_box_that_rocks_loses_what_its_impacts_take() -> None:
+    """Each leaves 1 - 3/2 sin² of the angle of its diagonal, if nothing slides (Housner, 1963)."""
+    width, height, tilt = 0.15, 0.38, math.radians(2.0)
+    low = 0.5 * (width * math.sin(tilt) + height * math.cos(tilt))
+    world = World(FLOOR, ((width, 0.21, height), 6.0, (0, 0, low), turned((0, 1, 0), tilt)),
+                  friction=1.0)
+    turns = np.array([world.step().velocities[1, 4] for _ in range(450)])
+    sides = np.split(turns, np.flatnonzero(np.diff(np.sign(turns))) + 1)
+    fastest = np.array([np.abs(side).max() for side in sides])[:5]
+    assert fastest[1:] / fastest[:-1] == pytest.approx(
+        1.0 - 1.5 * width**2 / (width**2 + height**2), rel=0.06)
+
+
 # --- carriers -------------------------------------------------------------------------------------
 
 
