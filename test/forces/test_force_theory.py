@@ -81,6 +81,19 @@ def test_a_box_that_rocks_loses_what_its_impacts_take() -> None:
         1.0 - 1.5 * width**2 / (width**2 + height**2), rel=0.06)
 
 
+@pytest.mark.parametrize('seed', range(40))
+def test_what_falls_comes_to_rest(seed: int) -> None:
+    """Up to six boxes of .1 to .8 m in random poses, on the floor and each other: within 6 s."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for k in range(rng.integers(2, 7)):
+        turn = rng.normal(size=4)
+        rows.append((np.exp(rng.uniform(np.log(0.1), np.log(0.8), 3)), np.exp(rng.uniform(0, 3)),
+                     (*rng.uniform(-0.3, 0.3, 2), 0.6 + 0.8 * k), turn / np.linalg.norm(turn)))
+    world = World(FLOOR, *rows).run(6.0, FRAME)
+    assert np.abs(world.velocities[1:]).max() < 1e-3
+
+
 # --- carriers -------------------------------------------------------------------------------------
 
 
