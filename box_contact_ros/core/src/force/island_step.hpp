@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "carriers.hpp"
 #include "clock.hpp"
 #include "closing.hpp"
 #include "fineness.hpp"
@@ -271,28 +272,13 @@ class IslandStep {
     moving.angular += h * (moving.inverse_inertia * vector(step_.outside[k].torque));
   }
 
-  // Let the velocity of a body that no force moves change within the step, as it did lately. Its mean is
-  // what was given. Had the first sub-step all of the change, friction would have to give it in so short a
-  // time. `part`: of the step, from its middle [1].
+  // A body that no force moves. `part`: of the step, from its middle [1].
   void carry(Moving& moving, double part) const {
     auto k = size_t(moving.body);
     const auto& [before, last] = ended_[k];
-    Vec<double> linear = vector(step_.velocities[k].linear);
-    Vec<double> angular = vector(step_.velocities[k].angular);
-    // Lanes add zeros of either sign to it: only a positive one stays as it is.
-    moving.linear = (linear + part * least_change_of(before.linear, last.linear, linear)) + 0.0;
-    moving.angular =
-        (angular + part * least_change_of(before.angular, last.angular, angular)) + 0.0;
-  }
-  // The smaller of two changes in turn, where they have one sign (minmod): a jump is none.
-  static Vec<double> least_change_of(const Vec<double>& x, const Vec<double>& y,
-                                     const Vec<double>& z) {
-    Vec<double> change{0.0, 0.0, 0.0};
-    for (int i = 0; i < 3; ++i) {
-      double first = y[i] - x[i], second = z[i] - y[i];
-      if (first * second > 0.0) change[i] = std::fabs(first) < std::fabs(second) ? first : second;
-    }
-    return change;
+    const bc_velocity& given = step_.velocities[k];
+    moving.linear = carried_at(part, before.linear, last.linear, vector(given.linear));
+    moving.angular = carried_at(part, before.angular, last.angular, vector(given.angular));
   }
 
   // A sum is finite only if all its numbers are.

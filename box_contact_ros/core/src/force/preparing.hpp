@@ -5,6 +5,7 @@
 #pragma once
 
 #include "block.hpp"
+#include "carriers.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
@@ -96,23 +97,6 @@ BC_INLINE void soften(const SubSteps& step, const Turned& turned, Rows<T>& block
   rows.mass = softened(compliance, rows.softness);
   put<T>(pushes, rows, block.pushing);
   if (any(is_spring)) put<T>(is_spring, rows, block.relaxed);
-}
-
-// Beside a body that no force moves and that turns, points go around by the chord of a step h, which begins
-// here or, below 0, ends here: by the tangent, what lies on a turntable would creep outward. Returns how the
-// velocity of B relative to A differs by that.
-template <class T, class Body>
-BC_INLINE Vec<T> along_chords(const Body& a, const Body& b, const Vec<T>& arm_a,
-                              const Vec<T>& arm_b, double h) {
-  auto turns = [](const Body& body) __attribute__((always_inline)) {
-    return (body.inverse_mass <= 0.0) & (dot(body.angular, body.angular) > 0.0);
-  };
-  Mask<T> is_carrier = turns(a) | turns(b);
-  if (!any(is_carrier)) return {};
-  auto inward = [](const Body& body, const Vec<T>& arm) __attribute__((always_inline)) {
-    return cross(body.angular, cross<T>(body.angular, arm));
-  };
-  return select(is_carrier, (0.5 * h) * (inward(b, arm_b) - inward(a, arm_a)), Vec<T>{});
 }
 
 template <class T>

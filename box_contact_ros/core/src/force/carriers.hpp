@@ -1,0 +1,50 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// Bodies that no force moves, within a step: a lift, a turntable, a lorry that brakes.
+#pragma once
+
+#include <cmath>
+
+#include "../lanes/triples.hpp"
+
+namespace box_contact::BOX_CONTACT_SET::force {
+
+// The smaller of two changes in turn, where they have one sign (minmod): a jump is none.
+inline Vec<double> least_change_of(const Vec<double>& x, const Vec<double>& y,
+                                   const Vec<double>& z) {
+  Vec<double> change{0.0, 0.0, 0.0};
+  for (int i = 0; i < 3; ++i) {
+    double first = y[i] - x[i], second = z[i] - y[i];
+    if (first * second > 0.0) change[i] = std::fabs(first) < std::fabs(second) ? first : second;
+  }
+  return change;
+}
+
+// A velocity that changes within the step as it did lately. Its mean is what was given. Had the first
+// sub-step all of the change, friction would have to give it in so short a time. `part`: of the step, from
+// its middle [1]. `before`, `last`: given for the last steps.
+inline Vec<double> carried_at(double part, const Vec<double>& before, const Vec<double>& last,
+                              const Vec<double>& given) {
+  // Lanes add zeros of either sign to it: only a positive one stays as it is.
+  return (given + part * least_change_of(before, last, given)) + 0.0;
+}
+
+// Beside a body that no force moves and that turns, points go around by the chord of a step h, which begins
+// here or, below 0, ends here: by the tangent, what lies on a turntable would creep outward. Returns how the
+// velocity of B relative to A differs by that.
+template <class T, class Body>
+BC_INLINE Vec<T> along_chords(const Body& a, const Body& b, const Vec<T>& arm_a,
+                              const Vec<T>& arm_b, double h) {
+  auto turns = [](const Body& body) __attribute__((always_inline)) {
+    return (body.inverse_mass <= 0.0) & (dot(body.angular, body.angular) > 0.0);
+  };
+  Mask<T> is_carrier = turns(a) | turns(b);
+  if (!any(is_carrier)) return {};
+  auto inward = [](const Body& body, const Vec<T>& arm) __attribute__((always_inline)) {
+    return cross(body.angular, cross<T>(body.angular, arm));
+  };
+  return select(is_carrier, (0.5 * h) * (inward(b, arm_b) - inward(a, arm_a)), Vec<T>{});
+}
+
+}  // namespace box_contact::BOX_CONTACT_SET::force
