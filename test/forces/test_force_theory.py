@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from worlds import FIXED, FLOOR, STEP, World, turned
 
-from box_contact_ros import Body, PatchForces
+from box_contact_ros import Body, PatchForces, contacts_of
 from box_contact_ros.forces.patch_forces import FRICTION, GRAVITY
 from box_contact_ros.solver.pose import rotation_matrix
 
@@ -66,6 +66,23 @@ def test_a_tall_box_that_comes_down_from_an_edge_stands(degrees: float, dt: floa
     world = World(FLOOR, (size, 6.0, (0, 0, low), turned((0, 1, 0), tilt))).run(1.2, dt)
     assert np.abs(world.velocities[1]).max() < 1e-4
     assert rotation_matrix(world.poses[1, 3:])[2, 2] == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize('every, late', [(5, 0), (5, 2), (20, 5)])
+@pytest.mark.parametrize('degrees', [1.0, 5.0])
+def test_a_tall_box_stands_by_late_answers(degrees: float, every: int, late: int) -> None:
+    """Of others, every so many steps of 1 ms and so many late: within 2 s it is still."""
+    size, tilt = (0.15, 0.21, 0.38), math.radians(degrees)
+    low = 0.5 * (size[0] * math.sin(tilt) + size[2] * math.cos(tilt))
+    world = World(FLOOR, (size, 6.0, (0, 0, low), turned((0, 1, 0), tilt)), pairs=[])
+    world.forces.set_boxes(world.size)
+    for step in range(2000):
+        if step % every == 0:
+            asked = *contacts_of(world.size, world.poses), world.poses.copy()
+        if step % every == late:
+            world.forces.hold(*asked, age=late * STEP, period=every * STEP)
+        world.step()
+    assert np.abs(world.velocities[1]).max() < 1e-4
 
 
 def test_a_box_that_rocks_loses_what_its_impacts_take() -> None:

@@ -179,12 +179,12 @@ class IslandStep {
     const SubSteps& steps = work.steps;
     // From one answer to the next.
     double time = factor > 1 ? std::min(parts_of_a_contact * steps.length, steps.dt) : steps.dt;
-    if (!steps.is_late)
-      each_island([&](const Island& island) {
-        each_block(island, [&](Block& block, const Patch& patch, Moving& a, Moving& b) {
-          close(patch, a, b, time, block);
-        });
+    each_island([&](const Island& island) {
+      each_block(island, [&](Block& block, const Patch& patch, Moving& a, Moving& b) {
+        close(patch, a, b, time, block);
+        if (steps.is_late) block.closing = {};  // rocking is soft
       });
+    });
     kernel.load(&work);
     for (int number = 1; number <= steps.count; ++number) {
       if (factor > 1 && number > 1 && number % parts_of_a_contact == 1) {
