@@ -3,9 +3,9 @@
 
 // Faces that close within a step.
 //
-// The patch of a box that stands on an edge is a strip along it. Where the rest of its face comes down
-// within the step, it is a constraint of the step, too: nothing else would stop it, and the overlap would be
-// pushed out with more energy than the impact took. A tall box would rock for ever.
+// The patch of a box that stands on an edge is a strip along it. If the rest of its face comes down within the
+// step, the whole face is a constraint. Nothing else would stop it. It would overlap, and be pushed out with
+// more energy than the impact took: a tall box would rock for ever.
 #pragma once
 
 #include "gaps.hpp"
@@ -16,9 +16,9 @@ namespace box_contact::BOX_CONTACT_SET::force {
 // A patch that is at least so wide as a part of its faces stops a turn by itself [1].
 constexpr double wide = 0.5;
 
-// Let the centre of pressure go as far as the faces reach, along each axis along which they close within a
-// time, and the faces close in that time by a turn about the other rim. `pull`: by outside wrenches, along
-// the normal [m/s²].
+// Where faces close along an axis within a time, the centre of pressure may go as far along it as they reach.
+// They close in that time, by a turn about the other rim. `pull`: by outside wrenches, along the normal
+// [m/s²].
 inline void close_faces(const Patch& patch, const Moving& a, const Moving& b, double time,
                         double pull, Block& block) {
   const FacePair& faces = patch.faces;
