@@ -30,9 +30,9 @@ inline Vec<double> carried_at(double part, const Vec<double>& before, const Vec<
   return (given + part * least_change_of(before, last, given)) + 0.0;
 }
 
-// Beside a body that no force moves and that turns, points go around by the chord of a step h, which begins
-// here or, below 0, ends here: by the tangent, what lies on a turntable would creep outward. Returns how the
-// velocity of B relative to A differs by that.
+// Beside a body that no force moves and that turns, points go around by the chord of a step h. The step
+// begins here or, below 0, ends here. By the tangent, what lies on a turntable would creep outward. Returns
+// how the velocity of B relative to A differs by that.
 template <class T, class Body>
 BC_INLINE Vec<T> along_chords(const Body& a, const Body& b, const Vec<T>& arm_a,
                               const Vec<T>& arm_b, double h) {

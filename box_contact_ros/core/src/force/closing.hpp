@@ -13,9 +13,6 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// A patch that is at least so wide as a part of its faces stops a turn by itself [1].
-constexpr double wide = 0.5;
-
 // Where faces close along an axis within a time, the centre of pressure may go as far along it as they reach.
 // They close in that time, by a turn about the other rim. `pull`: by outside wrenches, along the normal
 // [m/s²].
@@ -23,11 +20,7 @@ inline void close_faces(const Patch& patch, const Moving& a, const Moving& b, do
                         double pull, Block& block) {
   const FacePair& faces = patch.faces;
   Rectangle& shape = block.shape;
-  auto is_narrow = [](const Span& face, const Span& span) {
-    return span.high - span.low < wide * (face.high - face.low);
-  };
-  bool is_narrow_1 = is_narrow(faces.span_1, shape.span_1),
-       is_narrow_2 = is_narrow(faces.span_2, shape.span_2);
+  bool is_narrow_1 = faces.is_narrow_1(shape), is_narrow_2 = faces.is_narrow_2(shape);
   if (!is_narrow_1 && !is_narrow_2) return;
   auto [arms, depth] = place<double>(a, b, a, b, 0.0, block);
   static_cast<Arms<double>&>(block) = arms;

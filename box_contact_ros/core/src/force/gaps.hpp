@@ -20,6 +20,11 @@ constexpr double gap_share = 2.0;
 // and go by nanometres, and with them the friction that bore weight.
 constexpr double pressed_gap = 1e-5;
 
+// How fast an outside wrench speeds a body up along a normal [m/s²].
+inline double pull_along(const Vec<double>& normal, const bc_wrench& outside, double inverse_mass) {
+  return std::fabs(dot(vector(outside.force), normal)) * inverse_mass;
+}
+
 // The gaps of a step `dt`.
 class Gaps {
  public:
@@ -39,9 +44,7 @@ class Gaps {
   bool is_near(int32_t box_a, int32_t box_b, const Vec<double>& normal, double apart) const {
     auto pull = [&](int32_t box) {
       auto body = size_t(boxes_[size_t(box)].body);
-      return outside_
-                 ? std::fabs(dot(vector(outside_[body].force), normal)) * bodies_[body].inverse_mass
-                 : 0.0;
+      return outside_ ? pull_along(normal, outside_[body], bodies_[body].inverse_mass) : 0.0;
     };
     return apart <= gap_share * dt_ * dt_ * std::max(pull(box_a), pull(box_b)) ||
            (apart <= pressed_gap && has_pressed(box_a, box_b));

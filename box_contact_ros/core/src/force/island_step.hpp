@@ -243,8 +243,7 @@ class IslandStep {
              Block& block) const {
     auto pull = [&](const Moving& moving) {
       return step_.outside
-                 ? moving.inverse_mass *
-                       std::fabs(dot(vector(step_.outside[moving.body].force), block.normal))
+                 ? pull_along(block.normal, step_.outside[moving.body], moving.inverse_mass)
                  : 0.0;
     };
     close_faces(patch, a, b, time, std::max(pull(a), pull(b)), block);

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
 
 #include "block.hpp"
 
@@ -20,9 +21,9 @@ constexpr double least_change = 1e-8;
 constexpr double impact_change = 0.01;
 constexpr double impact_share = 0.2;
 constexpr int impact_iterations = 100;
-// Late answers bear nothing so hard: what closes is slowed over several steps [m/s]. Solved at once, a load
-// of 100 times what bears it never rests.
-constexpr double no_impact = 1e300;
+// With late answers no change of a closing speed is an impact [m/s]. Their patches are soft, and slow what
+// closes over several steps. If it were solved at once, 100 on 1 would never rest.
+constexpr double no_impact = std::numeric_limits<double>::infinity();
 // After every so many of them, all that presses in the island is scaled, where the factor is far from 1:
 // by this or more, or by its inverse or less.
 constexpr int scaled_every = 8;

@@ -17,12 +17,21 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// The faces by which two boxes meet, from the point of their patch: how far both reach along its axes, and
-// the gap between them, gap + slope · place.
+// A patch that is at least so wide as a part of its faces stops a turn by itself [1].
+constexpr double wide = 0.5;
+
+// The faces by which two boxes meet, from the point of their patch: how far both reach along its axes. Where
+// it is narrow, also the gap between them, gap + slope · place.
 struct FacePair {
   Span span_1, span_2;
   double gap;
   Point slope;
+
+  static bool is_narrow(const Span& face, const Span& patch) {
+    return patch.high - patch.low < wide * (face.high - face.low);
+  }
+  bool is_narrow_1(const Rectangle& shape) const { return is_narrow(span_1, shape.span_1); }
+  bool is_narrow_2(const Rectangle& shape) const { return is_narrow(span_2, shape.span_2); }
 };
 
 // The boxes of a pair, the lower first.
@@ -90,15 +99,19 @@ struct Patch {
                   const bc_size& size_b) {
     Face a = face_along(box_at_a, size_a, point, normal),
          b = face_along(box_at_b, size_b, point, -normal);
+    faces = {a.span_along(shape.axis_1).within(b.span_along(shape.axis_1)),
+             a.span_along(shape.axis_2).within(b.span_along(shape.axis_2)),
+             0.0,
+             {0.0, 0.0}};
+    shape.span_1 = shape.span_1.within(faces.span_1);
+    shape.span_2 = shape.span_2.within(faces.span_2);
+    if (!faces.is_narrow_1(shape) && !faces.is_narrow_2(shape)) return;
     auto flat = [&](const Vec<double>& v) {
       return Point{dot(v, shape.axis_1), dot(v, shape.axis_2)};
     };
     Plane of_a = plane_of(a, normal, flat), of_b = plane_of(b, normal, flat);
-    faces = {a.span_along(shape.axis_1).within(b.span_along(shape.axis_1)),
-             a.span_along(shape.axis_2).within(b.span_along(shape.axis_2)),
-             of_b.height - of_a.height, of_b.slope - of_a.slope};
-    shape.span_1 = shape.span_1.within(faces.span_1);
-    shape.span_2 = shape.span_2.within(faces.span_2);
+    faces.gap = of_b.height - of_a.height;
+    faces.slope = of_b.slope - of_a.slope;
   }
 
   // Whether area and depth are numbers: what no limit of an answer alone makes sure of.
