@@ -391,9 +391,8 @@ class StampPairing(Pairing):
 
     def _is_awaiting(self, key: int, tick: WaitingTick) -> bool:
         """Return whether a box that is missing from a tick may still give its pose."""
-        names = self._streams
-        while tick.settled < len(names):
-            box = names[tick.settled]
+        while tick.settled < len(self._streams):
+            box = self._streams[tick.settled]
             if box not in tick.poses and self._may_come(self._boxes[box], key, tick):
                 return True
             tick.settled += 1
@@ -444,13 +443,11 @@ class LatestPairing(Pairing):
             self._count(OLD, box, stamp)
             return []
         state.newest, state.last = stamp, pose
-        recent = dict(self._recent(stamp))
         if not self._can_answer:
             given = {name: other for name, other in self._boxes.items() if other.last}
             self._can_answer = any(self._has_partner(name, given) for name in given)
-        if not self._can_answer:
-            return []
-        return [list(map(recent.get, self._boxes))]
+        recent = dict(self._recent(stamp))
+        return [list(map(recent.get, self._boxes))] if self._can_answer else []
 
     def _recent(self, now: int) -> Iterator[tuple[str, StampedPose]]:
         """Yield the last pose of each box that is not stale at a stamp [ns]."""
