@@ -16,10 +16,12 @@ the nodes' cores (nice), or one on each core of the machine (busy).
 
 The first lines of the report say how many times as long a node takes as another one, with 95 %
 intervals. A table has latencies, and answers that are lost or differ from the exact contacts.
-With --out, a picture of the latencies stands before them, those of the first surroundings.
+With --out, they are a page, too, under a picture of the latencies in the first surroundings. A void
+run writes none.
 
 The exit status is 0 only if contact and echo node lost nothing, no answer was wrong, and the run is
-not void. It is void if the bench itself was late by more than a period in over 1 % of the pairs.
+not void. It is void if, in quiet surroundings, the bench itself was late by more than a period in
+over 1 % of the pairs. Loops make it late, which is no part of a latency.
 """
 from __future__ import annotations
 
@@ -57,8 +59,8 @@ def main(args: Sequence[str] | None = None) -> int:
     """Run the bench; return its exit status."""
     args = sys.argv[1:] if args is None else list(args)
     options = _options(outside_ros_args(args))
-    names = list(NODES)
-    if not find_spec('fcl'):
+    names = options.nodes or list(NODES)
+    if 'soup' in names and not find_spec('fcl'):
         print('without the soup node: python-fcl is not installed (extra: soup)')
         names.remove('soup')
     keep_to_this_host()
@@ -88,15 +90,15 @@ def main(args: Sequence[str] | None = None) -> int:
     rows = [{'beside': beside, **row} for beside in logs for row in figures(logs[beside])]
     compared = '\n'.join(f'{beside}: {comparison(logs[beside], block=bench.block)}'
                          for beside in logs)
-    void = void_reason(rows, options.rate)
+    void = void_reason([row for row in rows if row['beside'] == QUIET], options.rate)
     stopped = 'interrupted: figures are of what was sent before' if signals else ''
     results = '\n\n'.join(filter(None, (void, compared, table(rows), *faults, stopped)))
     print(f'\n{results}', flush=True)
-    if options.out:
-        name = f'bench_{options.model}'
-        draw(options.out / f'{name}.png', logs[options.beside[0]], block=bench.block)
-        (options.out / f'{name}.md').write_text(
-            f'# Bench of `{options.model}`\n\n![Latencies of each node]({name}.png)\n\n'
+    if options.out and not void:
+        picture = options.out.with_suffix('.png')
+        draw(picture, logs[options.beside[0]], block=bench.block)
+        options.out.write_text(
+            f'# Bench of `{options.model}`\n\n![Latencies of each node]({picture.name})\n\n'
             f'{about}\n\n{results}\n', 'utf-8')
     faulty = any(row['wrong'] or row['lost'] and row['node'] != 'soup' for row in rows)
     return 128 + signals[0] if signals else int(faulty or bool(faults) or bool(void))
@@ -122,19 +124,24 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
                              '%(default)g)')
     parser.add_argument('--model', type=model_name, default='exact', metavar='NAME',
                         help=f'of the contact node: {", ".join(MODELS)} (default: %(default)s)')
+    parser.add_argument('--nodes', nargs='+', choices=NODES, metavar='NAME',
+                        help=f'that take turns, contact among them: {", ".join(NODES)} (default: '
+                             'all)')
     parser.add_argument('--beside', nargs='+', choices=SURROUNDINGS, default=[QUIET],
                         metavar='NAME', help=f'surroundings, one after the other, each for the '
                         f'whole time: {", ".join(SURROUNDINGS)} (default: {QUIET})')
-    parser.add_argument('--out', type=Path, metavar='DIR',
-                        help='folder for the report, bench_NAME.md, and its picture, which needs '
-                             'the extra report (default: none)')
+    parser.add_argument('--out', type=Path, metavar='FILE.md',
+                        help='file for the report; its picture, which needs the extra report, is '
+                             'FILE.png (default: none)')
     options = parser.parse_args(list(args))
+    if 'contact' not in (options.nodes or NODES):
+        parser.error('argument --nodes: the contact node must be among them')
     if options.out:
         try:
-            options.out.mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=options.out).close()
+            options.out.parent.mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=options.out.parent).close()
         except OSError as error:
-            parser.error(f'cannot write to {options.out} ({error.strerror})')
+            parser.error(f'cannot write to {options.out.parent} ({error.strerror})')
         require('report')
     return options
 

@@ -128,7 +128,7 @@ def void_reason(rows: Sequence[Mapping[str, Any]], rate: float) -> str:
 
     One late pair of a hundred is let pass.
     """
-    lateness, period = max(float(row[LATE]) for row in rows), 1e3 / rate
+    lateness, period = max((float(row[LATE]) for row in rows), default=0.0), 1e3 / rate
     return '' if not lateness > period else (
         f'void: the bench itself was late by p99 {lateness:.2f} ms, at a period of {period:.2f} ms')
 
@@ -175,7 +175,10 @@ def draw(path: Path, logs: Sequence[AnswerLog], *, block: int) -> None:
     axes[-1].xaxis.set_major_formatter('{x:g}')
     axes[-1].set_xlabel('time from the stamp of the poses to the answer [ms]')
     log_of = {log.node: log for log in logs}
-    times_as_long = ratio(log_of['contact'], log_of['echo'], block=block)[0]
-    figure.suptitle(f'The contact node takes {times_as_long:.2f} times as long as transport alone\n'
-                    '(median of the ratios of blocks in turn)')
+    for node, other in COMPARED:  # the title is the first that ran
+        if node in log_of and other in log_of:
+            times_as_long = ratio(log_of[node], log_of[other], block=block)[0]
+            figure.suptitle(f'The {node} node takes {times_as_long:.2f} times as long as the '
+                            f'{other} node\n(median of the ratios of blocks in turn)')
+            break
     figure.savefig(path)

@@ -128,6 +128,7 @@ def test_a_late_bench_is_void():
         log.lateness[:late] = 0.2
         assert bool(reason := void_reason(figures([log]), 200.0)) == void
     assert reason.startswith('void: ') and '200.00 ms, at a period of 5.00 ms' in reason
+    assert not void_reason([], 200.0)  # beside loops alone, which make it late
 
 
 def test_a_dead_node_has_a_report():
