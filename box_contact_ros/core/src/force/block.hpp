@@ -81,6 +81,7 @@ struct Asked {
   T friction, asked_depth, stiffness, late, age;
   Vec<T> local_a, local_b;  // its point in the frames of its bodies
   Vec<T> closing;           // velocities along N, τ1 and τ2 that close the faces: see closing.hpp
+  T over_relaxation;        // of pressing and rocking: see iterations.hpp [1]
 };
 // The impulses that it gave in the last window, and that window: see Patch.
 template <class T>
@@ -120,6 +121,9 @@ struct Block : Rows<double> {
       load;  // of its point; of its normal, upward; of the weights above [m], [1], [N]
 };
 
+// Where no rim is faster than this, a block is solved, and not over-relaxed [m/s]: what rests stays solved.
+constexpr double least_over_relaxed = 1e-6;
+
 // Rocking whose centre of pressure is within the span.
 template <class T>
 BC_INLINE T bounded(const SpanOf<T>& per_pressing, T normal, T rocking) {
@@ -133,14 +137,15 @@ BC_INLINE void bound(Vec<T>& impulses, T limit) {
 }
 
 // Take what an answer, and the last window, say of a patch.
-inline void take(const Patch& patch, Block& block) {
+inline void take(const Patch& patch, double over_relaxation, Block& block) {
   auto local = [&](const Placed& asked) {
     return transposed_times(asked.axes, patch.point - asked.position);
   };
   static_cast<Asked<double>&>(block) = {patch.normal,         patch.point,          patch.surface,
                                         patch.shape,          patch.friction,       patch.depth,
                                         patch.stiffness,      patch.late,           patch.age,
-                                        local(patch.asked_a), local(patch.asked_b), {}};
+                                        local(patch.asked_a), local(patch.asked_b), {},
+                                        over_relaxation};
   static_cast<Kept<double>&>(block) = {patch.window,          patch.normal_impulse,
                                        patch.torsion_impulse, patch.friction_impulse,
                                        patch.rocking_impulse, patch.impulse_arm};
@@ -293,9 +298,19 @@ template <class T, class Body>
 BC_INLINE T solve_normal(Rows<T>& block, const NormalRows<T>& rows, Mask<T> due, Body& a, Body& b) {
   const Vec<T> before = block.normal_impulses;
   Vec<T> v = pressing_speeds(block, rows, a, b) + rows.softness * before;
-  Vec<T> next = before - rows.mass * v;
-  Mask<T> within = (bounded<T>(rocking_1(block.shape), next[0], next[1]) == next[1]) &
-                   (bounded<T>(rocking_2(block.shape), next[0], next[2]) == next[2]);
+  auto is_within = [&](const Vec<T>& x) __attribute__((always_inline)) {
+    return (bounded<T>(rocking_1(block.shape), x[0], x[1]) == x[1]) &
+           (bounded<T>(rocking_2(block.shape), x[0], x[2]) == x[2]);
+  };
+  Vec<T> change = rows.mass * v, next = before - change;
+  Mask<T> within = is_within(next);
+  T reach = max<T>(block.shape.half_1, block.shape.half_2);
+  T fastest = max<T>(abs(v[0]), reach * max<T>(abs(v[1]), abs(v[2])));
+  Mask<T> sways = within & (fastest > least_over_relaxed);
+  if (any(sways)) {
+    Vec<T> beyond = before - block.over_relaxation * change;
+    next = select(sways & is_within(beyond), beyond, next);
+  }
   if (bits(due) & ~bits(within)) {
     // The pressure would be negative at a rim.
     Mat<T> soft = block.across;

@@ -114,7 +114,7 @@ class IslandStep {
       return;
     }
     each_block(island, [&](Block& block, const Patch& patch, Moving&, Moving&) {
-      take(patch, block);
+      take(patch, over_relaxation_of(island), block);
       block.normal_sum = block.friction_sum = {};
     });
     island.factor = step_.own ? fineness_of_(island, step_.steps, fineness_) : 1;
@@ -234,9 +234,13 @@ class IslandStep {
     each_block(island, [&](Block& block, Patch& patch, Moving& a, Moving& b) {
       step_.own->solve_again(step_.solve_pair, pose_of(a), pose_of(b), a.placed, b.placed,
                              is_lighter_b(bodies_, patch), patch);
-      take(patch, block);
+      take(patch, over_relaxation_of(island), block);
       close(patch, a, b, time, block);
     });
+  }
+  // Late patches are soft: none is over-relaxed.
+  double over_relaxation_of(const Island& island) const {
+    return step_.steps.is_late ? 1.0 : over_relaxation(island.block_end - island.block);
   }
   // Let faces close that do so within a time.
   void close(const Patch& patch, const Moving& a, const Moving& b, double time,

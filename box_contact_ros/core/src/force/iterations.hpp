@@ -29,6 +29,16 @@ constexpr double no_impact = std::numeric_limits<double>::infinity();
 constexpr int scaled_every = 8;
 constexpr double least_factor = 2.0;
 
+// Pressing and rocking are over-relaxed: their impulses change by more than what solves a block alone, by up
+// to this factor (successive over-relaxation, Young, 1954) [1]. The sway of stacks dies away in half of the
+// steps. With 1.4 a real pallet, whose flush sides come and go by nanometres, sways for ever.
+constexpr double most_over_relaxation = 1.3;
+
+// The factor in an island of so many blocks: one alone is solved at once [1].
+inline double over_relaxation(size_t blocks) {
+  return 1.0 + (most_over_relaxation - 1.0) * (1.0 - 1.0 / double(blocks));
+}
+
 struct Island {
   size_t body, body_end;  // among those that move
   size_t block, block_end;
