@@ -6,10 +6,10 @@
 `python -m benchmarks.stacks` runs every scene by `PatchForces`, at several steps, rates and
 latencies, and by MuJoCo with contacts of its own. Both begin with the same boxes, and get the same
 outside forces. Four scenes run by Box3D, Jolt and Rapier, too (`rivals`). The program prints and
-writes stacks.md, .csv and .png, and stacks_rivals.csv and .png. The exit status is 1 if a scene of
-ours does not come to rest with answers at each step of 1 ms, and 2 where a rival is missing.
-`--record FILE` writes the pairs of all scenes to a file instead, as they were placed and after they
-have settled.
+writes stacks.md, .csv and .png, stacks_parts.png, and stacks_rivals.csv and .png. The exit status
+is 1 if a scene of ours does not come to rest with answers at each step of 1 ms, and 2 where a rival
+is missing. `--record FILE` writes the pairs of all scenes to a file instead, as they were placed
+and after they have settled.
 
 Lengths in m, masses in kg, times in s.
 """
@@ -55,6 +55,8 @@ class Outcome:
     moved: float  # the farthest box
     turned: float
     cost: float  # of contacts and forces, a step [µs]
+    contacts: float = math.nan  # of this, pairs and their contacts; NaN: MuJoCo does not tell
+    hold: float = math.nan  # and handing them over
 
 
 def run(make: Callable[[], Scene], timing: Timing | None) -> Outcome:
@@ -78,8 +80,8 @@ def run(make: Callable[[], Scene], timing: Timing | None) -> Outcome:
         if not speed < LOST_SPEED:
             break
     way, angle = moved(boxes, start)
-    return Outcome(rest, speed, 1e3 * deepest, way.max(), angle.max(),
-                   1e6 * loop.spent / max(1, loop.tick))
+    parts = 1e6 * loop.parts / max(1, loop.tick)
+    return Outcome(rest, speed, 1e3 * deepest, way.max(), angle.max(), parts.sum(), *parts[:-1])
 
 
 def moved(boxes: Boxes, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -184,7 +186,8 @@ def pushed(orders: Sequence[str]) -> str:
 def main(args: Sequence[str] | None = None) -> int:
     """Run all scenes, print and write; 1 if one of ours moves with answers at each step."""
     parser = output.report_parser(
-        'stacks', __doc__, out='stacks.md, .csv and .png, stacks_rivals.csv and .png',
+        'stacks', __doc__,
+        out='stacks.md, .csv and .png, stacks_parts.png, stacks_rivals.csv and .png',
         quick=f'every {QUICK}th scene, two beside rivals')
     add_leave_out(parser)
     parser.add_argument('--record', type=Path, metavar='FILE', help='write pairs, and no report')
@@ -224,6 +227,7 @@ def main(args: Sequence[str] | None = None) -> int:
         {'scene': name, 'way': way, **asdict(each)}
         for name, ways in found.items() for way, each in ways.items()), digits=3, about=about)
     stacks_picture.draw(folder / 'stacks.png', folder / 'stacks.csv')
+    stacks_picture.draw_parts(folder / 'stacks_parts.png', folder / 'stacks.csv')
     output.write_page(folder, 'stacks', args, machine=about, rest=rest, both=both, **beside,
                       pushed=pushed(ORDERS[:1] if options.quick else ORDERS))
     missed = [name for name, ways in found.items() if math.isnan(ways[ours].rest)]

@@ -1,17 +1,23 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The picture of the report `stacks`: a map of scenes and timings, and when each comes to rest."""
+"""The pictures of the report `stacks`: when each scene comes to rest, and what its time goes to."""
 from __future__ import annotations
 
 import math
+import statistics
 from pathlib import Path
+
+import numpy as np
 
 from . import output
 
 FALLEN_DEG = 45.0  # a box that turned more fell
 REST = ((0.1, '#1a9850'), (0.5, '#66bd63'), (2.0, '#a6d96a'), (math.inf, '#d9ef8b'))
 """Times by which a scene is at rest [s], and their colours."""
+PARTS = (('contacts', 'pairs and contacts', '#e6146e'), ('hold', 'hold', '#9aa0a6'),
+         ('advance', 'advance', '#4678aa'))
+"""Of a step's time: a column of the CSV, what it is, and its colour."""
 CREEPS, MOVES, FELL = '#fee08b', '#f46d43', '#a50026'
 CREEP = 10.0  # the fastest corner of a scene that creeps [mm/s]
 
@@ -60,4 +66,31 @@ def draw(path: Path, table: Path) -> None:
             *zip(bounds, (colour for _, colour in REST)), (f'up to {CREEP:g} mm/s', CREEPS),
             ('faster', MOVES), ('fell', FELL))],
         loc='outside lower center', ncols=7, fontsize=8, frameon=False)
+    figure.savefig(path, metadata={'Software': None})
+
+
+def draw_parts(path: Path, table: Path) -> None:
+    """Draw what of a step's time goes to each part, from the CSV: a bar per scene, at 1 ms."""
+    first, *_ = rows = output.read_csv(table)
+    chosen = [row for row in rows if row['way'] == first['way']]
+    shares = {'contacts': [], 'hold': [], 'advance': []}
+    for row in chosen:
+        cost, contacts, hold = (float(row[key]) for key in ('cost', 'contacts', 'hold'))
+        for key, part in zip(shares, (contacts, hold, cost - contacts - hold)):
+            shares[key].append(100.0 * part / cost)
+    figure, axes = output.subplots(1, 1, (7.0, 1.4 + 0.2 * len(chosen)))
+    axis, before = axes[0, 0], np.zeros(len(chosen))
+    for key, label, colour in PARTS:
+        axis.barh(range(len(chosen)), shares[key], left=before, color=colour, label=label)
+        before += shares[key]
+    for place, row in enumerate(chosen):
+        axis.text(101.0, place, f'{float(row["cost"]):.3g} µs', va='center', fontsize=8)
+    axis.set_yticks(range(len(chosen)), [row['scene'] for row in chosen], fontsize=8)
+    axis.set(xlim=(0.0, 100.0), ylim=(len(chosen) - 0.4, -0.6),
+             xlabel="of a step's time [%], called from Python")
+    axis.spines[['top', 'right']].set_visible(False)
+    median = {key: statistics.median(values) for key, values in shares.items()}
+    axis.set_title(f'Of a step at 1 ms, contacts take {median["contacts"]:.0f} % in the median '
+                   f'scene, and forces {median["advance"]:.0f} %', fontsize=10)
+    figure.legend(loc='outside lower center', ncols=len(PARTS), fontsize=8, frameon=False)
     figure.savefig(path, metadata={'Software': None})

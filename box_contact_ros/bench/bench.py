@@ -16,8 +16,8 @@ the nodes' cores (nice), or one on each core of the machine (busy).
 
 The first lines of the report say how many times as long a node takes as another one, with 95 %
 intervals. A table has latencies, and answers that are lost or differ from the exact contacts.
-With --out, they are a page, too, under a picture of the latencies in the first surroundings. A void
-run writes none.
+With --out, they are a page, too, under a picture of the latencies in the first surroundings. A run
+that is void, or interrupted, writes none.
 
 The exit status is 0 only if contact and echo node lost nothing, no answer was wrong, and the run is
 not void. It is void if, in quiet surroundings, the bench itself was late by more than a period in
@@ -94,7 +94,7 @@ def main(args: Sequence[str] | None = None) -> int:
     stopped = 'interrupted: figures are of what was sent before' if signals else ''
     results = '\n\n'.join(filter(None, (void, compared, table(rows), *faults, stopped)))
     print(f'\n{results}', flush=True)
-    if options.out and not void:
+    if options.out and not (void or stopped):
         picture = options.out.with_suffix('.png')
         draw(picture, logs[options.beside[0]], block=bench.block)
         options.out.write_text(

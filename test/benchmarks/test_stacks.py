@@ -82,6 +82,14 @@ def test_real_pallets_stand(order: str) -> None:
     assert stays(lambda: sideways(order, 0.0), TIMINGS[0]).all()
 
 
+def test_a_run_tells_what_its_time_goes_to() -> None:
+    """The parts are less than the whole; MuJoCo's step is one call."""
+    ours, theirs = (run(lambda: replace(tower(2), seconds=0.02), timing)
+                    for timing in (TIMINGS[0], None))
+    assert 0.0 < ours.hold < ours.contacts + ours.hold < ours.cost
+    assert theirs.cost > 0.0 and np.isnan([theirs.contacts, theirs.hold]).all()
+
+
 def test_a_push_topples_boxes() -> None:
     """Boxes that are pushed by 0.3 of their weight do not all stay."""
     assert not stays(lambda: sideways(ORDERS[0], 0.3), TIMINGS[0]).all()
@@ -118,8 +126,9 @@ def test_pairs_are_recorded(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> 
 
 def test_the_map_tells_rest_from_creep_and_fall(tmp_path: Path) -> None:
     """A box that falls with the best answers, too, is no fault; the picture has every run."""
-    still = {'rest': '0.3', 'end_speed': '1e-9', 'turned': '0'}
-    moves = {'rest': '', 'end_speed': '0.57', 'turned': '60'}
+    parts = {'cost': '100', 'contacts': '30', 'hold': '10'}
+    still = {'rest': '0.3', 'end_speed': '1e-9', 'turned': '0', **parts}
+    moves = {'rest': '', 'end_speed': '0.57', 'turned': '60', **parts}
     assert stacks_picture.cell(still, still)[0] == '0.3 s'
     assert stacks_picture.cell(moves, still)[0] == 'fell'
     text, colour = stacks_picture.cell(moves, moves)
@@ -129,5 +138,6 @@ def test_the_map_tells_rest_from_creep_and_fall(tmp_path: Path) -> None:
         ('tower', 'each step', still), ('tower', MUJOCO, moves),
         ('heap', 'each step', moves), ('heap', MUJOCO, still))]
     output.write_csv(tmp_path / 'stacks.csv', rows)
-    stacks_picture.draw(tmp_path / 'stacks.png', tmp_path / 'stacks.csv')
-    assert (tmp_path / 'stacks.png').stat().st_size > 10_000
+    for draw in (stacks_picture.draw, stacks_picture.draw_parts):
+        draw(tmp_path / 'stacks.png', tmp_path / 'stacks.csv')
+        assert (tmp_path / 'stacks.png').stat().st_size > 10_000
