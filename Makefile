@@ -84,7 +84,7 @@ RESULTS := $(if $(filter --quick,$(ARGS)),quick-results,docs/results)
 # make reports LEAVE_OUT='drake jolt'
 LEAVE_OUT ?=
 LEFT_OUT := $(if $(LEAVE_OUT),--leave-out $(LEAVE_OUT))
-BENCH := box_contact_ros.bench.bench --duration $(if $(filter --quick,$(ARGS)),6,90)
+BENCH := box_contact_ros.bench.bench --duration $(if $(filter --quick,$(ARGS)),6,60)
 reports:
 	@.ci/setup reports
 	failed=
@@ -104,7 +104,9 @@ reports:
 	run benchmarks.speed $(ARGS)
 	run benchmarks.paper $(ARGS)
 	run benchmarks.paper.search $(ARGS)
-	for model in exact mlp paper; do run $(BENCH) --rate 1000 --model $$model --out $(RESULTS); done
+	for model in exact mlp paper; do
+	    run $(BENCH) --model $$model --beside quiet nice busy --out $(RESULTS)/bench_$$model.md
+	done
 	if [ $(RESULTS) = docs/results ]; then
 	    for figures in docs/figures/make_*.py; do $(PY) $$figures || failed+=" $$figures"; done
 	    $(PY) docs/tables.py || failed+=' docs/tables.py'

@@ -53,10 +53,11 @@ CHOICES = (
 SHOWN = {'avx512': 'AVX-512', 'avx2': 'AVX2'}
 """Instruction sets as native.csv and frontier.csv call them, the README's first."""
 AT_REST, SWAY = 'settled by PatchForces', 'containers'  # sets of native.csv
-RATIOS = re.compile(r'^contact / echo .*$', re.MULTILINE)
-"""The first line that the bench prints."""
-MEDIAN = re.compile(r'^\| *contact(?: \| *[\d.]+){3} \| *([\d.]+)', re.MULTILINE)
+RATIOS = re.compile(r'^quiet: (contact / echo .*)$', re.MULTILINE)
+"""What the bench prints first."""
+MEDIAN = re.compile(r'^\| *quiet \| *contact(?: \| *[\d.]+){3} \| *([\d.]+)', re.MULTILINE)
 """The median latency of the contact node [ms]."""
+RATE = re.compile(r'([\d.]+) pairs per second')
 SETS = {
     'landings': 'containers that land on each other',
     'settled': 'goods at rest',
@@ -136,16 +137,17 @@ def bench() -> str:
     """Return what the node's answers take beside an echo's, by the reports of the bench."""
     found = {model: RATIOS.search((RESULTS / f'bench_{model}.md').read_text('utf-8'))
              for model in ('exact', 'mlp')}
-    median = MEDIAN.search((RESULTS / 'bench_exact.md').read_text('utf-8'))
-    assert median and all(found.values())
-    exact, mlp = (line and line[0] for line in found.values())
+    of_exact = (RESULTS / 'bench_exact.md').read_text('utf-8')
+    median, rate = MEDIAN.search(of_exact), RATE.search(of_exact)
+    assert median and rate and all(found.values())
+    exact, mlp = (line and line[1] for line in found.values())
     soup = str(exact).partition('soup / contact ')[2].partition(' ')[0]
     of_mlp = str(mlp).removeprefix('contact / echo ').partition(',')[0].partition(' ')[0]
     ratio, _, rest = str(exact).removeprefix('contact / echo ').partition(' ')
     return (f'Over ROS, an answer takes {ratio} times as long as that of an echo node, which sends '
             f'each pose back and computes nothing (95 % interval {rest.partition("]")[0]}]; with '
-            f'`mlp` {of_mlp}). The median answer at 1 kHz takes {median[1]} ms; that of a node '
-            f'with the polygon soup takes {soup} times as long. See [the '
+            f'`mlp` {of_mlp}). The median answer at {rate[1]} Hz takes {median[1]} ms; that of a '
+            f'node with the polygon soup takes {soup} times as long. See [the '
             'report](docs/results/bench_exact.md).')
 
 
