@@ -47,7 +47,7 @@ help:
 	echo 'make test-debian13  make demo, then make test, on a fresh Debian 13 (root)'
 	echo 'make dist     wheel and source distribution in dist/, both installed and tried'
 	echo 'make coverage lines of solver, scenes and nodes that their tests run'
-	echo 'make reports  every table and picture of docs, in an hour; ARGS=--quick tries them out,'
+	echo 'make reports  every table and picture of docs, in hours; ARGS=--quick tries them out,'
 	echo '              LEAVE_OUT=drake does without a rival that is not installed'
 	echo 'make rivals   fetch Box3D and Jolt, and compile what the reports run'
 	echo 'make docs     the documentation as HTML: build/docs/index.html'

@@ -84,13 +84,14 @@ def draw_parts(path: Path, table: Path) -> None:
         axis.barh(range(len(chosen)), shares[key], left=before, color=colour, label=label)
         before += shares[key]
     for place, row in enumerate(chosen):
-        axis.text(101.0, place, f'{float(row["cost"]):.3g} µs', va='center', fontsize=8)
+        text = output.number(float(row['cost']), 3)
+        axis.text(101.0, place, f'{text} µs', va='center', fontsize=8)
     axis.set_yticks(range(len(chosen)), [row['scene'] for row in chosen], fontsize=8)
     axis.set(xlim=(0.0, 100.0), ylim=(len(chosen) - 0.4, -0.6),
-             xlabel="of a step's time [%], called from Python")
+             xlabel="of a step's time [%], called from Python; NumPy searches for pairs")
     axis.spines[['top', 'right']].set_visible(False)
     median = {key: statistics.median(values) for key, values in shares.items()}
-    axis.set_title(f'Of a step at 1 ms, contacts take {median["contacts"]:.0f} % in the median '
+    axis.set_title(f'Pairs and contacts take {median["contacts"]:.0f} % of a step in the median '
                    f'scene, and forces {median["advance"]:.0f} %', fontsize=10)
     figure.legend(loc='outside lower center', ncols=len(PARTS), fontsize=8, frameon=False)
     figure.savefig(path, metadata={'Software': None})
