@@ -206,7 +206,7 @@ class Ours:
             [Body(mass=m, inertia=i, centre=c)
              for m, i, c in zip(boxes.mass, boxes.inertia, boxes.centre)], **options)
         self.tick, self.searched = 0, -SEARCHED
-        self.parts = np.zeros(3)
+        self.spent = np.zeros(3)
         """Time spent on pairs and their contacts, on `hold`, and on `advance` [s]."""
         self.answers: deque = deque()
         if boxes.parts is None:
@@ -263,7 +263,7 @@ class Ours:
         times.append(time.perf_counter())
         boxes.pose, boxes.velocity, *_ = self.forces.advance(h, boxes.pose, boxes.velocity, outside)
         times.append(time.perf_counter())
-        self.parts += np.diff(times)
+        self.spent += np.diff(times)
         self.time += h
         self.tick += 1
 
@@ -300,7 +300,7 @@ class Theirs:
                                   quat=(qw, qx, qy, qz), friction=(FRICTION, 0.005, 0.0001))
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
-        self.tick, self.time, self.parts = 0, 0.0, np.zeros(1)
+        self.tick, self.time, self.spent = 0, 0.0, np.zeros(1)
         self.bodies = 1 + np.flatnonzero(self.free)
         joints = self.model.body_jntadr[self.bodies]
         self.places = self.model.jnt_qposadr[joints][:, None] + np.arange(7)
@@ -334,7 +334,7 @@ class Theirs:
             self.drive()
         start = time.perf_counter()
         mujoco.mj_step(self.model, self.data)
-        self.parts += time.perf_counter() - start
+        self.spent += time.perf_counter() - start
         boxes.pose[free] = self.data.qpos[self.places][:, [0, 1, 2, 4, 5, 6, 3]]
         if self.carrier is not None and self.scene.belt is None:
             boxes.pose[self.carrier] = self.data.qpos[self.carried]

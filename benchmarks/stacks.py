@@ -80,8 +80,8 @@ def run(make: Callable[[], Scene], timing: Timing | None) -> Outcome:
         if not speed < LOST_SPEED:
             break
     way, angle = moved(boxes, start)
-    parts = 1e6 * loop.parts / max(1, loop.tick)
-    return Outcome(rest, speed, 1e3 * deepest, way.max(), angle.max(), parts.sum(), *parts[:-1])
+    spent = 1e6 * loop.spent / max(1, loop.tick)
+    return Outcome(rest, speed, 1e3 * deepest, way.max(), angle.max(), spent.sum(), *spent[:-1])
 
 
 def moved(boxes: Boxes, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-import statistics
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +14,8 @@ from . import output
 FALLEN_DEG = 45.0  # a box that turned more fell
 REST = ((0.1, '#1a9850'), (0.5, '#66bd63'), (2.0, '#a6d96a'), (math.inf, '#d9ef8b'))
 """Times by which a scene is at rest [s], and their colours."""
-PARTS = (('contacts', 'pairs and contacts', '#e6146e'), ('hold', 'hold', '#9aa0a6'),
-         ('advance', 'advance', '#4678aa'))
-"""Of a step's time: a column of the CSV, what it is, and its colour."""
+PARTS = {'pairs and contacts': '#e6146e', 'hold': '#9aa0a6', 'advance': '#4678aa'}
+"""What a step's time goes to, and the colours."""
 CREEPS, MOVES, FELL = '#fee08b', '#f46d43', '#a50026'
 CREEP = 10.0  # the fastest corner of a scene that creeps [mm/s]
 
@@ -73,25 +71,22 @@ def draw_parts(path: Path, table: Path) -> None:
     """Draw what of a step's time goes to each part, from the CSV: a bar per scene, at 1 ms."""
     first, *_ = rows = output.read_csv(table)
     chosen = [row for row in rows if row['way'] == first['way']]
-    shares = {'contacts': [], 'hold': [], 'advance': []}
-    for row in chosen:
-        cost, contacts, hold = (float(row[key]) for key in ('cost', 'contacts', 'hold'))
-        for key, part in zip(shares, (contacts, hold, cost - contacts - hold)):
-            shares[key].append(100.0 * part / cost)
+    cost, contacts, hold = (np.array([float(row[column]) for row in chosen])
+                            for column in ('cost', 'contacts', 'hold'))
+    shares = 100.0 * np.array([contacts, hold, cost - contacts - hold]) / cost
     figure, axes = output.subplots(1, 1, (7.0, 1.4 + 0.2 * len(chosen)))
     axis, before = axes[0, 0], np.zeros(len(chosen))
-    for key, label, colour in PARTS:
-        axis.barh(range(len(chosen)), shares[key], left=before, color=colour, label=label)
-        before += shares[key]
-    for place, row in enumerate(chosen):
-        text = output.number(float(row['cost']), 3)
-        axis.text(101.0, place, f'{text} µs', va='center', fontsize=8)
+    for share, (label, colour) in zip(shares, PARTS.items()):
+        axis.barh(range(len(chosen)), share, left=before, color=colour, label=label)
+        before += share
+    for place, time in enumerate(cost):
+        axis.text(101.0, place, f'{output.number(time, 3)} µs', va='center', fontsize=8)
     axis.set_yticks(range(len(chosen)), [row['scene'] for row in chosen], fontsize=8)
     axis.set(xlim=(0.0, 100.0), ylim=(len(chosen) - 0.4, -0.6),
              xlabel="of a step's time [%], called from Python; NumPy searches for pairs")
     axis.spines[['top', 'right']].set_visible(False)
-    median = {key: statistics.median(values) for key, values in shares.items()}
-    axis.set_title(f'Pairs and contacts take {median["contacts"]:.0f} % of a step in the median '
-                   f'scene, and forces {median["advance"]:.0f} %', fontsize=10)
+    asked, _, advanced = np.median(shares, axis=1)
+    axis.set_title(f'Pairs and contacts take {asked:.0f} % of a step in the median scene, and '
+                   f'forces {advanced:.0f} %', fontsize=10)
     figure.legend(loc='outside lower center', ncols=len(PARTS), fontsize=8, frameon=False)
     figure.savefig(path, metadata={'Software': None})

@@ -58,6 +58,8 @@ RATIOS = re.compile(r'^quiet: (contact / echo .*)$', re.MULTILINE)
 MEDIAN = re.compile(r'^\| *quiet \| *contact(?: \| *[\d.]+){3} \| *([\d.]+)', re.MULTILINE)
 """The median latency of the contact node [ms]."""
 RATE = re.compile(r'([\d.]+) pairs per second')
+MACHINE = re.compile(r'^- machine: (.*), \d+ cores', re.MULTILINE)
+"""Processor and instruction set."""
 SETS = {
     'landings': 'containers that land on each other',
     'settled': 'goods at rest',
@@ -138,16 +140,16 @@ def bench() -> str:
     found = {model: RATIOS.search((RESULTS / f'bench_{model}.md').read_text('utf-8'))
              for model in ('exact', 'mlp')}
     of_exact = (RESULTS / 'bench_exact.md').read_text('utf-8')
-    median, rate = MEDIAN.search(of_exact), RATE.search(of_exact)
-    assert median and rate and all(found.values())
+    median, rate, machine = (each.search(of_exact) for each in (MEDIAN, RATE, MACHINE))
+    assert median and rate and machine and all(found.values())
     exact, mlp = (line and line[1] for line in found.values())
     soup = str(exact).partition('soup / contact ')[2].partition(' ')[0]
     of_mlp = str(mlp).removeprefix('contact / echo ').partition(',')[0].partition(' ')[0]
     ratio, _, rest = str(exact).removeprefix('contact / echo ').partition(' ')
     return (f'Over ROS, an answer takes {ratio} times as long as that of an echo node, which sends '
             f'each pose back and computes nothing (95 % interval {rest.partition("]")[0]}]; with '
-            f'`mlp` {of_mlp}). The median answer at {rate[1]} Hz takes {median[1]} ms; that of a '
-            f'node with the polygon soup takes {soup} times as long. See [the '
+            f'`mlp` {of_mlp}; {machine[1]}). The median answer at {rate[1]} Hz takes {median[1]} '
+            f'ms, and that of the soup node {soup} times as long. See [the '
             'report](docs/results/bench_exact.md).')
 
 

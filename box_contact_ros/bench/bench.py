@@ -11,8 +11,8 @@ one drawn at random. The bench sends pairs of poses of equal stamp: a container 
 another one. Blocks of half a second go to one node after the other, in an order that is drawn for
 each block.
 
-The nodes run alone, or beside loops that do nothing but take time: one of low priority on each of
-the nodes' cores (nice), or one on each core of the machine (busy).
+The nodes run alone (quiet), or beside loops that do nothing but take time: with nice, one of low
+priority on each of the nodes' cores; with busy, one on each core of the machine.
 
 The first lines of the report say how many times as long a node takes as another one, with 95 %
 intervals. A table has latencies, and answers that are lost or differ from the exact contacts.
@@ -21,7 +21,7 @@ that is void, or interrupted, writes none.
 
 The exit status is 0 only if contact and echo node lost nothing, no answer was wrong, and the run is
 not void. It is void if, in quiet surroundings, the bench itself was late by more than a period in
-over 1 % of the pairs. Loops make it late, which is no part of a latency.
+over 1 % of the pairs. Loops make it late by themselves.
 """
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """Run the bench; return its exit status."""
     args = sys.argv[1:] if args is None else list(args)
     options = _options(outside_ros_args(args))
-    names = options.nodes or list(NODES)
+    names = list(dict.fromkeys(options.nodes))
     if 'soup' in names and not find_spec('fcl'):
         print('without the soup node: python-fcl is not installed (extra: soup)')
         names.remove('soup')
@@ -124,7 +124,7 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
                              '%(default)g)')
     parser.add_argument('--model', type=model_name, default='exact', metavar='NAME',
                         help=f'of the contact node: {", ".join(MODELS)} (default: %(default)s)')
-    parser.add_argument('--nodes', nargs='+', choices=NODES, metavar='NAME',
+    parser.add_argument('--nodes', nargs='+', choices=NODES, default=list(NODES), metavar='NAME',
                         help=f'that take turns, contact among them: {", ".join(NODES)} (default: '
                              'all)')
     parser.add_argument('--beside', nargs='+', choices=SURROUNDINGS, default=[QUIET],
@@ -134,7 +134,7 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
                         help='file for the report; its picture, which needs the extra report, is '
                              'FILE.png (default: none)')
     options = parser.parse_args(list(args))
-    if 'contact' not in (options.nodes or NODES):
+    if 'contact' not in options.nodes:
         parser.error('argument --nodes: the contact node must be among them')
     if options.out:
         try:

@@ -73,7 +73,7 @@ struct NormalRows {
   Mat<T> mass;
 };
 
-// A patch as an answer has it.
+// A patch as an answer has it, and what its island makes of it.
 template <class T>
 struct Asked {
   Vec<T> normal, point, surface;

@@ -113,8 +113,9 @@ class IslandStep {
       for (size_t k = island.body; k < island.body_end; ++k) fly(moving_[k]);
       return;
     }
+    double factor = over_relaxation_of(island);
     each_block(island, [&](Block& block, const Patch& patch, Moving&, Moving&) {
-      take(patch, over_relaxation_of(island), block);
+      take(patch, factor, block);
       block.normal_sum = block.friction_sum = {};
     });
     island.factor = step_.own ? fineness_of_(island, step_.steps, fineness_) : 1;
@@ -231,10 +232,11 @@ class IslandStep {
 
   // Solve the contacts of an island anew, where its bodies are within the advance.
   void ask_again(const Island& island, double time) const {
+    double factor = over_relaxation_of(island);
     each_block(island, [&](Block& block, Patch& patch, Moving& a, Moving& b) {
       step_.own->solve_again(step_.solve_pair, pose_of(a), pose_of(b), a.placed, b.placed,
                              is_lighter_b(bodies_, patch), patch);
-      take(patch, over_relaxation_of(island), block);
+      take(patch, factor, block);
       close(patch, a, b, time, block);
     });
   }

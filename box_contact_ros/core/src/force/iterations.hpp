@@ -15,9 +15,9 @@ namespace box_contact::BOX_CONTACT_SET::force {
 // jittered tower of 20 sways for 8 s.
 constexpr double least_change = 1e-8;
 
-// An impact goes on being solved, at most so often, while an iteration changes a closing speed by more
-// than this [m/s], and by more than this share of the largest closing speed of its island [1]. What is
-// left of a closing speed comes back as an overlap that is pushed out.
+// An impact goes on being solved while an iteration changes a closing speed by more than this [m/s], and by
+// more than this share of its island's largest [1]. It ends after so many iterations. What is left of a
+// closing speed comes back as an overlap that is pushed out.
 constexpr double impact_change = 0.01;
 constexpr double impact_share = 0.2;
 constexpr int impact_iterations = 100;
