@@ -254,10 +254,15 @@ class RunningProgram:
 
 @pytest.fixture
 def signal_handlers() -> Iterator[None]:
-    """Give back the handlers of signals: a program that was asked to end keeps its own."""
+    """Give back the handlers of signals: a program that was asked to end keeps its own.
+
+    A node's also passes SIGHUP on as SIGTERM, as the number arrives at its wakeup descriptor.
+    """
     before = {number: signal.getsignal(number)
               for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    wakeup = signal.set_wakeup_fd(-1)
     yield
+    signal.set_wakeup_fd(wakeup)
     for number, handler in before.items():
         if handler is not None:
             signal.signal(number, handler)

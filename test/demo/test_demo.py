@@ -79,7 +79,7 @@ def is_running(pid):
 
 
 @pytest.fixture
-def programs(monkeypatch):
+def programs(monkeypatch, signal_handlers):
     """Return what stands for the programs: Python code by module, with `values` for parameters."""
     codes = {'node.contact_node': 'import time; time.sleep(1000)'}
     monkeypatch.setattr(
