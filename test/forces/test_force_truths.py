@@ -291,6 +291,16 @@ def test_two_boxes_land_as_one() -> None:
 # --- heavy on light -------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize('mass', [70.0, 100.0, 300.0, 3000.0])
+def test_a_load_on_a_kilogram_sinks_by_less_than_a_millimetre(mass: float) -> None:
+    """At 1/60 s, `most_depth`, of each of both patches; from 62 kg on sub-steps are shorter."""
+    world = World(FLOOR, ((0.5, 0.5, 0.1), 1.0, (0, 0, 0.05)),
+                  ((1.0, 1.0, 1.0), mass, (0, 0, 0.6)))
+    world.run(3.0, 1 / 60)
+    assert 0.05 - world.poses[1, 2] < 1e-3
+    assert world.poses[1, 2] + 0.55 - world.poses[2, 2] < 1e-3
+
+
 def test_a_cube_of_8000_times_the_mass_rests_on_four() -> None:
     """Of 20 m, on four of 1 m: less than 2 mm deep."""
     corners = [(x, y, 0.5) for x in (-9.0, 9.0) for y in (-9.0, 9.0)]
