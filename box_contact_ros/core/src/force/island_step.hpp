@@ -309,13 +309,7 @@ class IslandStep {
             step_.motion.velocities[k].angular);
   }
   bc_pose pose_of(const Moving& moving) const {
-    bc_pose pose;
-    const Vec<double> position =
-        moving.placed.position - moving.placed.axes * bodies_[size_t(moving.body)].centre;
-    std::copy_n(position.v, 3, pose.position);
-    double scale = 1.0 / std::sqrt(squared_norm(moving.quaternion));
-    for (int i = 0; i < 4; ++i) pose.quaternion[i] = scale * moving.quaternion[i];
-    return pose;
+    return pose_at(moving.placed, moving.quaternion, bodies_[size_t(moving.body)].centre);
   }
   void write_pose(const Moving& moving) const {
     if (step_.motion.poses) step_.motion.poses[size_t(moving.body)] = pose_of(moving);

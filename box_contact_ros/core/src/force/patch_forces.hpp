@@ -13,6 +13,7 @@
 
 #include "../../include/box_contact/force.h"
 #include "answers.hpp"
+#include "before.hpp"
 #include "island_step.hpp"
 #include "loads.hpp"
 #include "own_contacts.hpp"
@@ -209,23 +210,11 @@ class PatchForces {
     return -1;
   }
   // Keep what an advance changes before its end, for one that fails.
-  void keep() {
-    kept_patches_ = patches_;
-    kept_clock_ = clock_;
-    kept_fineness_ = fineness_;
-    is_rest_kept_ = false;
-  }
+  void keep() { before_.keep(patches_, clock_, fineness_); }
   // All is as it was then.
   void restore() {
-    patches_.swap(kept_patches_);
-    clock_ = kept_clock_;
-    fineness_ = kept_fineness_;
+    if (before_.restore(patches_, clock_, fineness_, rest_, loads_)) is_chosen_ = false;
     is_grouped_ = false;
-    if (!is_rest_kept_) return;
-    std::swap(rest_, kept_rest_);
-    rest_.unmark();
-    loads_.swap(kept_loads_);
-    is_chosen_ = false;
   }
   // Wake what rests and is not given as it was, before an advance. One that gives the wrenches alone
   // moves all bodies.
@@ -242,16 +231,10 @@ class PatchForces {
   bool is_awake(size_t body) const { return !rest_.is_quiet(body); }
 
  private:
-  void keep_rest() {
-    if (is_rest_kept_) return;
-    kept_rest_ = rest_;
-    kept_loads_ = loads_;
-    is_rest_kept_ = true;
-  }
   // Wake the islands that are marked.
   void wake() {
     if (!rest_.is_any_marked()) return;
-    keep_rest();
+    before_.keep_rest(rest_, loads_);
     rest_.wake(bodies_, window_, clock_.since(), patches_, loads_);
     is_grouped_ = is_chosen_ = false;
   }
@@ -296,11 +279,9 @@ class PatchForces {
     if (patches > room_) room_ = std::max(patches, 2 * room_);
     patches_.reserve(room_);
     next_.reserve(room_);
-    kept_patches_.reserve(room_);
-    kept_fineness_.reserve(bodies_.size());
     loads_.reserve(room_);
-    kept_loads_.reserve(room_);
-    for (Rest* rest : {&rest_, &kept_rest_}) rest->make_room(bodies_.size(), room_);
+    rest_.make_room(bodies_.size(), room_);
+    before_.make_room(bodies_.size(), room_);
     islands_.make_room(bodies_.size(), room_);
     reader_.make_room(bodies_.size(), size_t(box_count()));
   }
@@ -357,12 +338,7 @@ class PatchForces {
   // Memory that calls use again.
   PatchReader reader_;
   Islands islands_;
-  std::vector<Patch> kept_patches_;  // for an advance that fails
-  Clock kept_clock_;
-  std::vector<Fineness> kept_fineness_;
-  Rest kept_rest_;  // before something woke
-  std::vector<Load> kept_loads_;
-  bool is_rest_kept_ = false;
+  Before before_;
   size_t room_ = 0;          // for patches
   bool is_chosen_ = false;   // whether pairs that are solved are those of what is awake
   bool is_grouped_ = false;  // whether islands are those of the patches

@@ -98,6 +98,16 @@ inline Placed placed_at(const bc_pose& pose, const Vec<double>& centre) {
 inline Placed box_at(const bc_pose& pose) {
   return {vector(pose.position), rotation_matrix(pose.quaternion)};
 }
+// The pose of a body that is placed so. quaternion: of any length.
+inline bc_pose pose_at(const Placed& placed, const double (&quaternion)[4],
+                       const Vec<double>& centre) {
+  bc_pose pose;
+  const Vec<double> position = placed.position - placed.axes * centre;
+  std::copy_n(position.v, 3, pose.position);
+  double scale = 1.0 / std::sqrt(squared_norm(quaternion));
+  for (int i = 0; i < 4; ++i) pose.quaternion[i] = scale * quaternion[i];
+  return pose;
+}
 
 // Where bodies or boxes are: each is found once, when it is asked for.
 class PlacedOnce {
