@@ -132,7 +132,7 @@ def models() -> str:
     return (f'{table}\n\nMedians on one core, {SHOWN[where["instruction_set"]]}, '
             f'{where["processor"]}. Errors: the 99th percentile of distances, in % of the smaller '
             "box's longest edge. Python's times hold the size of the patch, and MuJoCo's both "
-            '`mj_kinematics` and `mj_collision`; in C, MuJoCo is as fast. A dash: not measured.')
+            '`mj_kinematics` and `mj_collision`; in C, its box test alone. A dash: not measured.')
 
 
 def bench() -> str:
