@@ -293,7 +293,7 @@ def test_two_boxes_land_as_one() -> None:
 
 @pytest.mark.parametrize('mass', [70.0, 100.0, 300.0, 3000.0])
 def test_a_load_on_a_kilogram_sinks_by_less_than_a_millimetre(mass: float) -> None:
-    """At 1/60 s, `most_depth`, of each of both patches; from 62 kg on sub-steps are shorter."""
+    """At 1/60 s, `most_depth`, of each of both patches; from 61 kg on sub-steps are shorter."""
     world = World(FLOOR, ((0.5, 0.5, 0.1), 1.0, (0, 0, 0.05)),
                   ((1.0, 1.0, 1.0), mass, (0, 0, 0.6)))
     world.run(3.0, 1 / 60)
