@@ -11,8 +11,8 @@ one drawn at random. The bench sends pairs of poses of equal stamp: a container 
 another one. Blocks of half a second go to one node after the other, in an order that is drawn for
 each block.
 
-The nodes run alone (quiet), or beside loops that do nothing but take time: with nice, one of low
-priority on each of the nodes' cores; with busy, one on each core of the machine.
+The nodes run alone (quiet), or while loops take time and do nothing else. With nice, a loop of low
+priority runs on each of the nodes' cores. With busy, a loop runs on each core of the machine.
 
 The first lines of the report say how many times as long a node takes as another one, with 95 %
 intervals. A table has latencies, and answers that are lost or differ from the exact contacts.

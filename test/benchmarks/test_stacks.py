@@ -139,5 +139,6 @@ def test_the_map_tells_rest_from_creep_and_fall(tmp_path: Path) -> None:
         ('heap', 'each step', moves), ('heap', MUJOCO, still))]
     output.write_csv(tmp_path / 'stacks.csv', rows)
     for draw in (stacks_picture.draw, stacks_picture.draw_parts):
-        draw(tmp_path / 'stacks.png', tmp_path / 'stacks.csv')
-        assert (tmp_path / 'stacks.png').stat().st_size > 10_000
+        picture = tmp_path / f'{draw.__name__}.png'
+        draw(picture, tmp_path / 'stacks.csv')
+        assert picture.stat().st_size > 10_000

@@ -338,7 +338,7 @@ class PatchForces {
   // Memory that calls use again.
   PatchReader reader_;
   Islands islands_;
-  Before before_;
+  Before before_;            // for an advance that fails
   size_t room_ = 0;          // for patches
   bool is_chosen_ = false;   // whether pairs that are solved are those of what is awake
   bool is_grouped_ = false;  // whether islands are those of the patches
