@@ -263,6 +263,19 @@ def real_pallet(order: str) -> Scene:
                  Boxes.of([rows[k] for k in kept]), 5.0)
 
 
+def landed_pallet(order: str) -> Scene:
+    """Return a real pallet of boxes of 0.2 to 100 kg that is set down with a tilt of 0.4°."""
+    scene = real_pallet(order)
+    boxes, tilt = scene.boxes, turned((1, 2, 0), math.radians(0.4))
+    turn = rotation_matrix(tilt)
+    boxes.pose[1:, :3] = boxes.pose[1:, :3] @ turn.T
+    boxes.pose[1:, 3:] = tilt
+    reach = 0.5 * boxes.size[1:] @ np.abs(turn[2])
+    boxes.pose[1:, 2] -= (boxes.pose[1:, 2] - reach).min()
+    boxes.mass[1:] = 0.2 * 500.0 ** np.random.default_rng(1).random(len(boxes.mass) - 1)
+    return replace(scene, name=f'order {order}, landed, 0.2 to 100 kg', seconds=6.0)
+
+
 def sideways(order: str, share: float) -> Scene:
     """Return a real pallet whose boxes are all pushed along x by a share of their weight."""
     scene = real_pallet(order)
@@ -459,7 +472,7 @@ SCENES: tuple[Callable[[], Scene], ...] = (
     cube_on_four, twist_locks, heap, packed_pallets, spreader, turntable,
     partial(slope, 'plate'), partial(slope, 'tall'), partial(slope, 'five'),
     *(partial(gripper, force) for force in (2.0, 5.0, 20.0, 50.0)),
-    *(partial(real_pallet, order) for order in ORDERS),
+    *(partial(make, order) for make in (real_pallet, landed_pallet) for order in ORDERS),
     rolling_deck, braking_lorry, reach_stacker, dammed_belt, dominoes, card_house,
     partial(tower, 200), seesaw, timbers, partial(timbers, 5, 2), full_on_empty, flush_pallet,
     gaps, wide_floor, partial(wide_floor, 1.0 / 3.0), table, twin_spreader)
