@@ -16,7 +16,16 @@ pytest.importorskip('mujoco')
 
 from benchmarks import output, rivals, settled, stacks, stacks_picture
 from benchmarks.loops import MUJOCO, TIMINGS, Boxes, Scene, Timing, corner_speeds, steps
-from benchmarks.stack_scenes import ORDERS, off_centre, ratio, sideways, slope, tower, turntable
+from benchmarks.stack_scenes import (
+    ORDERS,
+    landed_pallet,
+    off_centre,
+    ratio,
+    sideways,
+    slope,
+    tower,
+    turntable,
+)
 from benchmarks.stacks import run, stays
 from box_contact_ros.forces.patch_forces import GRAVITY
 
@@ -50,6 +59,12 @@ def test_a_turntable_carries_its_tower(timing: Timing | None) -> None:
     assert speeds.max() < 0.02
     scene.boxes.velocity[1:] = 0.0
     assert corner_speeds(scene.boxes).min() > 1.0
+
+
+@pytest.mark.parametrize('order', ORDERS)
+def test_a_pallet_of_light_and_heavy_boxes_comes_to_rest_soon_after_it_lands(order: str) -> None:
+    """Boxes of 0.2 to 100 kg, by own contacts at uneven steps of up to 8 ms."""
+    assert run(partial(landed_pallet, order), TIMINGS[3]).rest < 2.0
 
 
 @pytest.mark.parametrize('timing', TIMINGS, ids=str)

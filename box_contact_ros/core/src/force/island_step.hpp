@@ -67,9 +67,9 @@ class IslandStep {
 
   void advance(const Chunk& chunk) const {
     for (Island& island : islands_.of(chunk)) begin(island);
-    // Those whose sub-steps are as fine are advanced together.
+    // Those with as many iterations, in sub-steps that are as fine, are advanced together.
     for (const Island& island : islands_.of(chunk))
-      if (island.factor > 0) advance(chunk, island.factor);
+      if (island.factor > 0) advance(chunk, island.factor, island.rounds);
   }
 
   // The first body whose numbers are not finite at the end of the islands, or −1.
@@ -92,8 +92,7 @@ class IslandStep {
     if (motion.velocities) motion.velocities[k] = velocity;
     if (motion.wrenches) motion.wrenches[k] = {};
     if (!motion.poses) return;
-    const double* numbers = velocity.linear;
-    if (are_within(numbers, 3, 0.0) && are_within(velocity.angular, 3, 0.0)) {
+    if (are_within(velocity.linear, 3, 0.0) && are_within(velocity.angular, 3, 0.0)) {
       motion.poses[k] = step_.poses[k];
       return;
     }
@@ -113,16 +112,20 @@ class IslandStep {
       for (size_t k = island.body; k < island.body_end; ++k) fly(moving_[k]);
       return;
     }
+    island.rounds = 1;
     double factor = over_relaxation_of(island);
-    each_block(island, [&](Block& block, const Patch& patch, Moving&, Moving&) {
+    each_block(island, [&](Block& block, const Patch& patch, Moving& a, Moving& b) {
       take(patch, factor, block);
       block.normal_sum = block.friction_sum = {};
+      if (!step_.steps.is_late && is_uneven(a.inverse_mass, b.inverse_mass))
+        island.rounds = uneven_rounds;
     });
     island.factor = step_.own ? fineness_of_(island, step_.steps, fineness_) : 1;
   }
-  // Advance the islands whose sub-steps are finer by a factor.
-  void advance(const Chunk& chunk, int factor) const {
-    const SubSteps steps = step_.steps.finer(factor);
+  // Advance the islands whose sub-steps are finer by a factor, and which have so many rounds.
+  void advance(const Chunk& chunk, int factor, int rounds) const {
+    SubSteps steps = step_.steps.finer(factor);
+    steps.rounds *= rounds;
     auto advance = [&](Islands::Range range, const detail::ForceKernel& kernel, void* groups,
                        size_t count) {
       bool counts = step_.motion.wrenches;
@@ -131,7 +134,8 @@ class IslandStep {
                 counts};
       advance_by(kernel, factor, work);
     };
-    for (Island& island : islands_.of(chunk)) island.is_shared = island.factor == factor;
+    for (Island& island : islands_.of(chunk))
+      island.is_shared = island.factor == factor && island.rounds == rounds;
     size_t groups = islands_.share(chunk);
     if (groups > 0)
       advance(islands_.of(chunk), *islands_.side(), islands_.groups_of(chunk), groups);
