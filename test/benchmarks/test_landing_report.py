@@ -10,6 +10,7 @@ import math
 import signal
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 
 pytest.importorskip('mujoco')
@@ -74,8 +75,9 @@ def test_expectations_are_stated_for_each_landing():
 def test_the_hardest_of_the_grid_are_within_the_limits_of_held_patches(number, rate_hz, latency):
     """The patch all but lifts off on one side. The report lands all of the grid."""
     planned = aimed(grid()[number])
-    result = landing.run('exact', LoopTiming(rate_hz, latency), planned).result
-    assert result.at_rest and HeldLimits.at(rate_hz).are_met(result), f'\n{result}'
+    timing = LoopTiming(rate_hz, latency)
+    result = landing.run('exact', timing, planned).result
+    assert result.at_rest and HeldLimits.at(timing).are_met(result), f'\n{result}'
     assert result.overhang == pytest.approx(math.hypot(*planned.overhang), abs=0.01)
     assert result.point_step < 1e-7
 
@@ -149,6 +151,31 @@ def test_held_patches_have_limits_of_their_own():
                                                ('manifold', of_grid, result.at_rest)):
                     outcome = landing.Outcome(way, timing, planned, result)
                     assert outcome.as_expected is expected
+
+
+def test_a_depth_that_a_corner_sinks_before_the_answer_is_within_the_limit():
+    """0.5 m/s, 50 Hz and 5 ms late: 12.5 mm. At 200 Hz that is less than the limit."""
+    height = CraneScenario().size[2]
+    still = dataclasses.replace(RESTS, corner_speed=1e-7, creep=1e-8, static_tilt=1e-5,
+                                touch_speed=0.5)
+    for rate_hz, limit in ((50.0, 0.0125 / height), (200.0, 3e-3)):
+        for factor, met in ((0.999, True), (1.001, False)):
+            outcome = landing.Outcome('exact', LoopTiming(rate_hz, 0.005), grid()[0],
+                                      dataclasses.replace(still, depth=factor * limit))
+            assert outcome.as_expected is met
+
+
+def test_the_touch_speed_is_that_of_the_fastest_corner_that_comes_down():
+    """A load tilts about its lower left edge, and falls in the last tick."""
+    scenario = CraneScenario(pitch=0.0)
+    length, _, height = scenario.size
+    flat = scenario.stack_size[2] + 0.5 * height
+    angles, down = np.array([0.03, 0.01, 0.0, 0.0]), np.array([0.0, 0.0, 2e-9, 0.5])
+    poses = np.array([(0.0, 0.0, flat + 0.5 * (length * np.sin(angle) + height * (
+        np.cos(angle) - 1.0)) + 1e-9 - way, 0.0, -np.sin(0.5 * angle), 0.0, np.cos(0.5 * angle))
+        for angle, way in zip(angles, down)])
+    assert landing_ways.touch_speed(poses, scenario) == pytest.approx(
+        length * np.sin(0.01), rel=1e-6)
 
 
 def test_figures_worse_than_the_manifolds_are_bold():
