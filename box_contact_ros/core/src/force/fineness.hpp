@@ -19,8 +19,9 @@
 namespace box_contact::BOX_CONTACT_SET::force {
 
 // A patch is judged if its load would move its bodies apart by more than this [m/s²]: some 60 g. Towers of
-// up to 30 boxes alike are not. Beyond it the factor jumps. If it grew in proportion to the load, a pile would
-// cost a third less, but of landed pallets of 0.2 to 100 kg a third more would still move after 6 s.
+// up to 30 boxes alike are not. Among bodies alike the factor grows in proportion to the load beyond it, so that a
+// pile does not pay five times as much for one patch. Where masses are uneven it jumps: else of landed pallets of
+// 0.2 to 100 kg three times as many still move after 6 s.
 constexpr double least_push = 600.0;
 // Which part of the depth that is wanted is aimed at [1]: what moves presses more than what rests, and the
 // depths of a stack add up.
@@ -104,7 +105,8 @@ class FinenessOf {
     }
     if (!(push > least_push)) return 1;
     double ratio = steps.window * std::sqrt(push / (aimed_depth * most_depth_)) / soft_frequency;
-    return int(std::ceil(std::min(ratio, double(finest))));
+    double most = island.rounds == 1 ? push / least_push : double(finest);
+    return int(std::ceil(std::min({ratio, most, double(finest)})));
   }
 
   // Weights from the top: each body hands what it bears to its patches below, in equal parts.
