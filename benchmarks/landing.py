@@ -62,9 +62,9 @@ class Outcome(NamedTuple):
     def as_expected(self) -> bool:
         """Return whether the load did what it was expected to do; patches have own limits."""
         held = self.way in PATCHES and self.planned.of_grid
-        touch_speed = self.result.touch_speed / self.planned.scenario.size[2]
+        sinking = self.result.touch_speed / self.planned.scenario.size[2]
         return self.planned.as_expected(self.result) and (
-            not held or HeldLimits.at(self.timing, touch_speed).are_met(self.result))
+            not held or HeldLimits.at(self.timing, sinking).are_met(self.result))
 
 
 def run(way: str, timing: LoopTiming, planned: PlannedLanding) -> Outcome:

@@ -115,7 +115,7 @@ class Landed(Landing):
     drop: float = math.nan  # how far the load's centre ends below its place on the stack [m]
     creep: float = math.nan  # mean lateral speed of the load's centre over the window [m/s]
     point_step: float = math.nan  # largest |Δpoint| between neighbouring ticks in the window [m]
-    touch_speed: float = math.nan  # largest of a lower corner that comes down to the stack [m/s]
+    touch_speed: float = math.nan  # of the fastest lower corner at the stack's height [m/s]
 
     @property
     def limits(self) -> dict[str, tuple[bool, str]]:
@@ -136,7 +136,7 @@ class Landed(Landing):
         poses = np.array(record.poses)[:window.stop]
         figures = {'overhang': float(np.hypot(*poses[first, :2])),
                    'drop': scenario.stack_size[2] + 0.5 * scenario.size[2] - float(poses[-1, 2]),
-                   'touch_speed': touch_speed(poses, scenario) * record.rate_hz}
+                   'touch_speed': touch_speed(poses, scenario, record.rate_hz)}
         if len(poses) == window.stop:
             way = poses[-1, :2] - poses[window.start, :2]
             nowhere = np.full(3, math.nan)
@@ -149,16 +149,17 @@ class Landed(Landing):
         return cls(**asdict(landing), **figures, tilt_limit=tilt_limit)
 
 
-def touch_speed(poses: np.ndarray, scenario: CraneScenario) -> float:
-    """Return the longest way of a lower corner in a tick in which it comes down to the stack [m].
+def touch_speed(poses: np.ndarray, scenario: CraneScenario, rate_hz: float) -> float:
+    """Return the largest speed of a lower corner as it comes down to the stack's height [m/s].
 
-    poses: of the load (n, 7).
+    poses: of the load (n, 7), a tick each.
     """
     corners = 0.5 * np.array(scenario.size) * [(x, y, -1) for x, y in product((-1, 1), repeat=2)]
     up = rotation_matrix(poses[:, 3:])[:, 2]
     heights = poses[:, 2, None] + up @ corners.T - scenario.stack_size[2]
     before, after = heights[:-1], heights[1:]
-    return float(np.max(before - after, where=(before > 0.0) & (after <= 0.0), initial=0.0))
+    way = np.max(before - after, where=(before > 0.0) & (after <= 0.0), initial=0.0)
+    return float(way * rate_hz)
 
 
 class HeldLimits(NamedTuple):
@@ -170,15 +171,15 @@ class HeldLimits(NamedTuple):
     static_tilt: float = TILT_LIMIT  # [rad]
 
     @classmethod
-    def at(cls, timing: LoopTiming, touch_speed: float = 0.0) -> Self:
+    def at(cls, timing: LoopTiming, sinking: float = 0.0) -> Self:
         """Return the limits at a timing: a load lies flatter on contacts that come more often.
 
         A corner that touches just after a question sinks on until the next answer acts.
-        touch_speed: of such a corner, by the load's height [1/s].
+        sinking: its speed, by the load's height [1/s].
         """
         rate_hz, latency = timing
         degrees = 0.003 if rate_hz >= 1000.0 else 0.01 if rate_hz >= 200.0 else 0.06
-        sunk = touch_speed * (1.0 / rate_hz + latency)
+        sunk = sinking * (1.0 / rate_hz + latency)
         return cls(static_tilt=math.radians(degrees), depth=max(cls().depth, sunk))
 
     def are_met(self, result: Landed) -> bool:

@@ -174,7 +174,7 @@ def test_the_touch_speed_is_that_of_the_fastest_corner_that_comes_down():
     poses = np.array([(0.0, 0.0, flat + 0.5 * (length * np.sin(angle) + height * (
         np.cos(angle) - 1.0)) + 1e-9 - way, 0.0, -np.sin(0.5 * angle), 0.0, np.cos(0.5 * angle))
         for angle, way in zip(angles, down)])
-    assert landing_ways.touch_speed(poses, scenario) == pytest.approx(
+    assert landing_ways.touch_speed(poses, scenario, 1.0) == pytest.approx(
         length * np.sin(0.01), rel=1e-6)
 
 

@@ -80,9 +80,10 @@ typedef struct bc_force_options {
   size_t size;     /* sizeof(bc_force_options) */
   int substeps;    /* equal parts of the longest step lately, more if 5 ms are exceeded; 1 to
                       1,000 */
-  int iterations;  /* of sequential impulses in a sub-step, at most; three times as many where masses
-                      that touch differ tenfold; 1 to 1,000 */
-  int relaxations; /* iterations more, at most, which remove the speed of pushing out; 0 to 1,000 */
+  int iterations;  /* of sequential impulses in a sub-step, at most; 1 to 1,000 */
+  int relaxations; /* iterations more, at most, which remove the speed of pushing out; 0 to 1,000.
+                      Where masses that touch differ tenfold, there are three times as many of both,
+                      unless answers are late */
   int threads;     /* 1 to 1,024; bodies that patches join are moved by one of them */
   double friction; /* Coulomb's μ [1] */
   double most_depth; /* how deep what rests may be at most [m], where a load is large for the lighter

@@ -105,7 +105,7 @@ class FinenessOf {
     }
     if (!(push > least_push)) return 1;
     double ratio = steps.window * std::sqrt(push / (aimed_depth * most_depth_)) / soft_frequency;
-    double most = island.rounds == 1 ? push / least_push : double(finest);
+    double most = island.is_uneven ? double(finest) : push / least_push;
     return int(std::ceil(std::min({ratio, most, double(finest)})));
   }
 

@@ -67,9 +67,9 @@ class IslandStep {
 
   void advance(const Chunk& chunk) const {
     for (Island& island : islands_.of(chunk)) begin(island);
-    // Those with as many iterations, in sub-steps that are as fine, are advanced together.
+    // Those with as many iterations, in sub-steps as fine, are advanced together.
     for (const Island& island : islands_.of(chunk))
-      if (island.factor > 0) advance(chunk, island.factor, island.rounds);
+      if (island.factor > 0) advance(chunk, island.factor, island.is_uneven);
   }
 
   // The first body whose numbers are not finite at the end of the islands, or −1.
@@ -112,20 +112,19 @@ class IslandStep {
       for (size_t k = island.body; k < island.body_end; ++k) fly(moving_[k]);
       return;
     }
-    island.rounds = 1;
+    island.is_uneven = false;
     double factor = over_relaxation_of(island);
     each_block(island, [&](Block& block, const Patch& patch, Moving& a, Moving& b) {
       take(patch, factor, block);
       block.normal_sum = block.friction_sum = {};
-      if (!step_.steps.is_late && is_uneven(a.inverse_mass, b.inverse_mass))
-        island.rounds = uneven_rounds;
+      island.is_uneven = island.is_uneven || is_uneven(a.inverse_mass, b.inverse_mass);
     });
     island.factor = step_.own ? fineness_of_(island, step_.steps, fineness_) : 1;
   }
-  // Advance the islands whose sub-steps are finer by a factor, and which have so many rounds.
-  void advance(const Chunk& chunk, int factor, int rounds) const {
+  // Advance the islands whose sub-steps are finer by a factor, and whose masses are uneven or not.
+  void advance(const Chunk& chunk, int factor, bool is_uneven) const {
     SubSteps steps = step_.steps.finer(factor);
-    steps.rounds *= rounds;
+    if (is_uneven && !steps.is_late) steps.rounds *= uneven_rounds;
     auto advance = [&](Islands::Range range, const detail::ForceKernel& kernel, void* groups,
                        size_t count) {
       bool counts = step_.motion.wrenches;
@@ -135,7 +134,7 @@ class IslandStep {
       advance_by(kernel, factor, work);
     };
     for (Island& island : islands_.of(chunk))
-      island.is_shared = island.factor == factor && island.rounds == rounds;
+      island.is_shared = island.factor == factor && island.is_uneven == is_uneven;
     size_t groups = islands_.share(chunk);
     if (groups > 0)
       advance(islands_.of(chunk), *islands_.side(), islands_.groups_of(chunk), groups);
