@@ -3,7 +3,7 @@
 
 """ContactSolver: what it returns, where touch begins, and which batches there are.
 
-test_hygiene.py has what is refused.
+test_bad_input.py has what is refused.
 """
 from __future__ import annotations
 

@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "../lanes/triples.hpp"
+#include "rigid_body.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 

@@ -12,12 +12,12 @@
 #include <vector>
 
 #include "../../include/box_contact/force.h"
-#include "answers.hpp"
-#include "before.hpp"
 #include "island_step.hpp"
 #include "loads.hpp"
 #include "own_contacts.hpp"
+#include "patch_reader.hpp"
 #include "rest.hpp"
+#include "rollback.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
@@ -210,10 +210,10 @@ class PatchForces {
     return -1;
   }
   // Keep what an advance changes before its end, for one that fails.
-  void keep() { before_.keep(patches_, clock_, fineness_); }
+  void keep() { rollback_.keep(patches_, clock_, fineness_); }
   // All is as it was then.
   void restore() {
-    if (before_.restore(patches_, clock_, fineness_, rest_, loads_)) is_chosen_ = false;
+    if (rollback_.restore(patches_, clock_, fineness_, rest_, loads_)) is_chosen_ = false;
     is_grouped_ = false;
   }
   // Wake what rests and is not given as it was, before an advance. One that gives the wrenches alone
@@ -234,7 +234,7 @@ class PatchForces {
   // Wake the islands that are marked.
   void wake() {
     if (!rest_.is_any_marked()) return;
-    before_.keep_rest(rest_, loads_);
+    rollback_.keep_rest(rest_, loads_);
     rest_.wake(bodies_, window_, clock_.since(), patches_, loads_);
     is_grouped_ = is_chosen_ = false;
   }
@@ -281,7 +281,7 @@ class PatchForces {
     next_.reserve(room_);
     loads_.reserve(room_);
     rest_.make_room(bodies_.size(), room_);
-    before_.make_room(bodies_.size(), room_);
+    rollback_.make_room(bodies_.size(), room_);
     islands_.make_room(bodies_.size(), room_);
     reader_.make_room(bodies_.size(), size_t(box_count()));
   }
@@ -338,7 +338,7 @@ class PatchForces {
   // Memory that calls use again.
   PatchReader reader_;
   Islands islands_;
-  Before before_;            // for an advance that fails
+  Rollback rollback_;        // for an advance that fails
   size_t room_ = 0;          // for patches
   bool is_chosen_ = false;   // whether pairs that are solved are those of what is awake
   bool is_grouped_ = false;  // whether islands are those of the patches

@@ -13,7 +13,7 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-class Before {
+class Rollback {
  public:
   void make_room(size_t bodies, size_t patches) {
     patches_.reserve(patches);
