@@ -14,6 +14,7 @@ import importlib.util
 import os
 import sys
 from collections.abc import Callable
+from itertools import combinations
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any
@@ -30,7 +31,7 @@ if 'EXTENSION' in os.environ:  # loaded before the package looks for its own
 sys.path.append(str(Path(__file__).parent))  # tests start Python with a safe path
 import poses  # noqa: E402  imports the package
 
-from box_contact_ros import ContactSolver  # noqa: E402
+from box_contact_ros import Body, ContactSolver, PatchForces  # noqa: E402
 from box_contact_ros.core import native  # noqa: E402
 
 assert native.__file__ == os.environ.get('EXTENSION', native.__file__), native.__file__
@@ -298,6 +299,28 @@ def pairs_changed_meanwhile() -> None:
     assert refused > 10, refused
 
 
+def columns_that_fall() -> None:
+    """Boxes of many sizes and masses push each other, in uneven steps, by several threads."""
+    rng, columns, high = np.random.default_rng(8), 60, 8
+    sizes = 10.0 ** rng.uniform(-1.0, 1.0, (columns, high, 3))
+    masses = 10.0 ** rng.uniform(-1.0, 3.0, (columns, high))
+    masses[:, 0] = 0.0
+    places = np.tile(POSE, (columns, high, 1))
+    places[..., 0] = 100.0 * np.arange(columns)[:, None] + rng.uniform(-0.1, 0.1, masses.shape)
+    places[..., 2] = sizes[..., 2].cumsum(axis=1) - 0.5 * sizes[..., 2]
+    sizes, masses, places = sizes.reshape(-1, 3), masses.ravel(), places.reshape(-1, 7)
+    law = PatchForces(list(map(Body.of_box, sizes, masses)), threads=3)
+    law.set_boxes(sizes)
+    law.hold([pair for first in range(0, columns * high, high)
+              for pair in combinations(range(first, first + high), 2)])
+    weight, velocities = np.zeros((2, len(masses), 6))
+    weight[:, 2] = -9.81 * masses
+    for _ in range(30):
+        places, velocities, *_ = law.advance(rng.uniform(1e-6, 0.02), places, velocities, weight)
+    assert len(law.loads().pairs) >= columns
+    assert np.isfinite(places).all()
+
+
 def random_calls(seed: int, rounds: int) -> None:
     """Call each function with some arguments replaced; print how many calls were refused."""
     rng = np.random.default_rng(seed)
@@ -357,6 +380,6 @@ if __name__ == '__main__':
     for attack in (places_of_no_box, rows_of_no_array, bodies_that_rows_lack, arrays_too_short,
                    bounds_without_an_order, networks_that_no_file_has,
                    outputs_that_fill_no_group, threads_that_are_none, extreme_numbers,
-                   pairs_changed_meanwhile):
+                   pairs_changed_meanwhile, columns_that_fall):
         attack()
     random_calls(*map(int, sys.argv[1:]))
