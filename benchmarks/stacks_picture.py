@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import math
+import re
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -41,14 +43,15 @@ def draw(path: Path, table: Path) -> None:
     ways = list(next(iter(runs.values())))
     cells = [[cell(of_scene[way], of_scene[ways[0]]) for way in ways]
              for of_scene in runs.values()]
-    figure, axes = output.subplots(1, 1, (8.0, 1.7 + 0.23 * len(runs)))
+    figure, axes = output.subplots(1, 1, (9.8, 1.7 + 0.23 * len(runs)))
     axis = axes[0, 0]
     for place, line in enumerate(cells):
         for column, (text, colour) in enumerate(line):
             axis.barh(place, 1.0, left=column - 0.5, height=1.0, color=colour, edgecolor='white')
             axis.text(column, place, text, ha='center', va='center', fontsize=8,
                       color='white' if colour in (FELL, REST[0][1]) else 'black')
-    axis.set_xticks(range(len(ways)), [way.replace(', ', ',\n') for way in ways], fontsize=8)
+    names = [re.sub(r'(?<=\d) ', '\N{NO-BREAK SPACE}', way) for way in ways]
+    axis.set_xticks(range(len(ways)), [textwrap.fill(name, 12) for name in names], fontsize=8)
     axis.xaxis.tick_top()
     axis.set_yticks(range(len(runs)), runs, fontsize=8)
     axis.set(xlim=(-0.5, len(ways) - 0.5), ylim=(len(runs) - 0.5, -0.5))
@@ -74,7 +77,7 @@ def draw_parts(path: Path, table: Path) -> None:
     cost, contacts, hold = (np.array([float(row[column]) for row in chosen])
                             for column in ('cost', 'contacts', 'hold'))
     shares = 100.0 * np.array([contacts, hold, cost - contacts - hold]) / cost
-    figure, axes = output.subplots(1, 1, (7.0, 1.4 + 0.2 * len(chosen)))
+    figure, axes = output.subplots(1, 1, (8.0, 1.4 + 0.2 * len(chosen)))
     axis, before = axes[0, 0], np.zeros(len(chosen))
     for share, (label, colour) in zip(shares, PARTS.items()):
         axis.barh(range(len(chosen)), share, left=before, color=colour, label=label)
