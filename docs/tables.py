@@ -125,14 +125,16 @@ def models() -> str:
                      *(from_c(choice, 'single', of_set) for of_set in (AT_REST, SWAY)),
                      *(point_error(choice, of_set) for of_set in (choice.rest, 'landings'))])
     table = markdown_table(
-        ['one pair', 'Python, at rest [µs]', 'C, at rest [ns]', 'C, moving [ns]',
+        ['one pair, one call', 'Python, at rest [µs]', 'C, at rest [ns]', 'C, moving [ns]',
          'point error, at rest [%]', 'point error, landing [%]'], body)
     where = fastest(rows('native.csv', set=SWAY, contestant='exact volume, single'))
     assert where
     return (f'{table}\n\nMedians on one core, {SHOWN[where["instruction_set"]]}, '
             f'{where["processor"]}. Errors: the 99th percentile of distances, in % of the smaller '
-            "box's longest edge. Python's times hold the size of the patch, and MuJoCo's both "
-            '`mj_kinematics` and `mj_collision`; in C, its box test alone. A dash: not measured.')
+            "box's longest edge. At rest: goods that have settled; moving: swaying containers; "
+            "landing: containers that touch down. Times include the size of the patch in Python "
+            "alone. MuJoCo's is of `mj_kinematics` and `mj_collision`, in C of its box test. A "
+            'dash: not measured.')
 
 
 def bench() -> str:

@@ -112,7 +112,7 @@ def slide(axes: plt.Axes) -> None:
         b[:, 4], b[:, 6] = np.sin(0.5 * tilts), np.cos(0.5 * tilts)
         found = ContactSolver(CONTAINER, CONTAINER).batch(a, b)
         axes.plot(degrees, found.point[:, 0], color=colour, linewidth=2,
-                  label=f'{1e3 * depth:g} mm deep')
+                  label=f'centroid, {1e3 * depth:g} mm')
         if depth == RIVAL_DEPTH:
             rival = mujoco_points(a, b)[:, 0]
     axes.plot(degrees, rival, '--', color=COLOURS['MuJoCo'],
@@ -121,11 +121,12 @@ def slide(axes: plt.Axes) -> None:
     ends[tilts == 0.0] = np.nan
     axes.plot(degrees, ends, color=CORNER, linewidth=2)
     axes.text(-1.2e-4, 6.1, 'deepest corner', color=CORNER, fontsize=10, va='center', ha='right')
-    axes.legend(title='centroid, lowest corner', title_fontsize=10, fontsize=9, loc='lower right')
+    axes.legend(title='at a depth of', title_fontsize=10, fontsize=9, loc='lower right')
     # With this scale the axis has no kink where it turns from linear to logarithmic.
     axes.set_xscale('symlog', linthresh=LEAST_TILT, linscale=0.9 / math.log(10.0))
-    axes.set(title='The deepest corner jumps by 12 m', xlabel='tilt of a container [°], log scale',
-             ylabel='contact point along its length [m]', xlim=(-1.5, 1.5), ylim=(-6.8, 6.8))
+    axes.set(title='The deepest corner jumps by 12 m', xlim=(-1.5, 1.5), ylim=(-6.8, 6.8),
+             xlabel=f'tilt of a container [°], log scale beyond {LEAST_TILT:.4f}°',
+             ylabel='contact point along its length [m]')
     axes.set_xticks([-1, -0.01, -LEAST_TILT, 0, LEAST_TILT, 0.01, 1],
                     ['-1', '-0.01', '', '0', '', '0.01', '1'])
     axes.grid(color='#dddddd')
