@@ -90,16 +90,17 @@ reports:
 	failed=
 	if [ $(RESULTS) = docs/results ]; then $(MAKE) rivals ARGS= || failed=' rivals'; fi
 	run() { echo "== $$*"; $(PY) -m "$$@" || failed+=" $$1"; }
+	# Those with rivals come first: one that is missing shows at once.
+	run benchmarks.native $(ARGS) $(LEFT_OUT)
+	run benchmarks.distance $(ARGS) $(LEFT_OUT)
+	run benchmarks.frontier $(ARGS) $(LEFT_OUT)
+	run benchmarks.stacks $(ARGS) $(LEFT_OUT)
 	run benchmarks.accuracy $(ARGS)
 	run benchmarks.stability $(ARGS)
 	run benchmarks.named_failures $(ARGS)
 	run benchmarks.fuzz $(ARGS)
 	run benchmarks.landing $(ARGS)
-	run benchmarks.stacks $(ARGS) $(LEFT_OUT)
 	run benchmarks.force_lines $(ARGS)
-	run benchmarks.frontier $(ARGS) $(LEFT_OUT)
-	run benchmarks.native $(ARGS) $(LEFT_OUT)
-	run benchmarks.distance $(ARGS) $(LEFT_OUT)
 	run benchmarks.scenes $(ARGS)
 	run benchmarks.speed $(ARGS)
 	run benchmarks.paper $(ARGS)
