@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Bad arguments to the native extension, as a program: a crash ends this process alone.
+"""Bad arguments to the native extension, and many boxes at once: a crash ends this process alone.
 
 usage: hostile_calls.py [SEED ROUNDS]
 

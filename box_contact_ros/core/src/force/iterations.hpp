@@ -39,9 +39,9 @@ inline double over_relaxation(size_t blocks) {
   return 1.0 + (most_over_relaxation - 1.0) * (1.0 - 1.0 / double(blocks));
 }
 
-// Where bodies touch whose masses differ by this factor or more, impulses take more iterations to agree: their
-// island has all of them so many times, unless answers are late, whose patches are soft. Of 100 landings of real
-// pallets, of boxes of 0.2 to 100 kg, 5 still move after 6 s; without it, 29 do.
+// Where bodies touch whose masses differ by this factor or more, impulses take more iterations to agree. So
+// their island has so many times as many. With late answers it has not, as late patches are soft. Of 100
+// landings of real pallets, of boxes of 0.2 to 100 kg, 5 still move after 6 s; without it, 29 do.
 constexpr double uneven_masses = 10.0;
 constexpr int uneven_rounds = 3;
 inline bool is_uneven(double inverse_mass_a, double inverse_mass_b) {
