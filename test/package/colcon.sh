@@ -77,7 +77,9 @@ workspace() {
     [ "$(stat --dereference --format %Y "$library")" = "$before" ]
     # Where `ros2 run` and `ros2 launch` look.
     ls install/box_contact_ros/{lib/box_contact_ros/contact_node,share/box_contact_ros/package.xml}
-    "${limited[@]}" colcon test --packages-select box_contact_ros --pytest-args "${arguments[@]}"
+    # Of a run that a crash ends, the results say nothing: its output does.
+    "${limited[@]}" colcon test --packages-select box_contact_ros \
+        --event-handlers console_cohesion+ --pytest-args "${arguments[@]}"
     colcon test-result --verbose
 }
 
