@@ -55,12 +55,12 @@ int64_t patch_boxes(int64_t count, const double* const* pairs, double* axes, dou
   return each_query(count, pairs, [&](const Query<double>& q, int64_t row) {
     const Query<double>* queries[] = {&q};
     mlp::PatchBox<double> box(queries);
-    mlp::Cuts<float> cuts(box);
-    std::copy_n(cuts.features, feature_count, features + feature_count * row);
+    mlp::Features<float> found(box);
+    std::copy_n(found.numbers, feature_count, features + feature_count * row);
     write(point_in_common_frame(q.pair, box.point(box.centre, 0)), middle + 3 * row);
     for (int k = 0; k < 3; ++k) {
       auto axis = k == 2 ? q.axis.normal : triple_of_doubles<double>(box.a.axes[k], 0);
-      Triple<double> common = q.pair.axes_a * (double(cuts.flip[k]) * axis);
+      Triple<double> common = q.pair.axes_a * (double(found.flip[k]) * axis);
       for (int i = 0; i < 3; ++i) axes[9 * row + 3 * i + k] = common[i];
       half[3 * row + k] = box.meetings[0].unit * box.half[k];
     }

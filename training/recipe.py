@@ -38,7 +38,7 @@ from .samples import MlpSamples, describe, draw_samples, mixture
 
 FEATURE_NAMES = ('cuts along x, y, z', 'depths of cuts', 'their squares',
                  'xx, yy, zz, xy, xz, yz of cuts', 'depths at the eight corners')
-"""Features of a contact (core/src/mlp/patch_box.hpp)."""
+"""Features of a contact (core/src/mlp/features.hpp)."""
 HIDDEN = (32, 32)
 """Units of both hidden layers."""
 HARD_START, HARD_COUNT = 200_000, 3_000

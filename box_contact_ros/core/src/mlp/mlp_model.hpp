@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Model `mlp`: SAT, and a multilayer perceptron that decides the answer from what the half-spaces of
-// both boxes cut off the patch box (patch_box.hpp).
+// both boxes cut off the patch box (features.hpp).
 //
 // All pairs take the same instructions, whatever their poses. The network has ten outputs, in the
 // coordinates of the patch box, from −1 to 1: the centroid, the volume, and a triangular root of the
@@ -11,8 +11,8 @@
 #pragma once
 
 #include "../overlap/moments.hpp"
+#include "features.hpp"
 #include "network.hpp"
-#include "patch_box.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
 namespace mlp {
@@ -42,9 +42,9 @@ struct Overlap {
   F point[3];  // −1 to 1 between the bounds
   F volume;    // of the patch box's
 
-  BC_INLINE Overlap(const Network& network, const Cuts<F>& cuts, int wanted) {
-    answer(network, cuts.features, wanted, outputs);
-    for (int i = 0; i < 3; ++i) point[i] = cuts.flip[i] * within<F>(outputs[i], -1.0F, 1.0F);
+  BC_INLINE Overlap(const Network& network, const Features<F>& features, int wanted) {
+    answer(network, features.numbers, wanted, outputs);
+    for (int i = 0; i < 3; ++i) point[i] = features.flip[i] * within<F>(outputs[i], -1.0F, 1.0F);
     volume = within<F>(outputs[3] * outputs[3], least_volume, 1.0F);
   }
   // Move a point that is outside of a box inwards, within the bounds.
@@ -62,7 +62,7 @@ struct Overlap {
 // The covariance L Lᵀ, in the common frame. The network gives the lower triangle L: xx, yy, zz, yx, zx, zy
 // [half extents].
 template <class T>
-BC_INLINE Sym<T> covariance(const PatchBox<T>& box, const Cuts<Floats<T>>& cuts,
+BC_INLINE Sym<T> covariance(const PatchBox<T>& box, const Features<Floats<T>>& features,
                             const Overlap<Floats<T>>& overlap, int block) {
   using F = Floats<T>;
   Triple<F> axis[3];
@@ -72,8 +72,8 @@ BC_INLINE Sym<T> covariance(const PatchBox<T>& box, const Cuts<Floats<T>>& cuts,
     const F* outputs = overlap.outputs + point_outputs;
     axis[i] = box.half[i] * box.a.axes[i];
     root[i] = within<F>(outputs[i], least_deviation, most_deviation);
-    root[3 + i] =
-        (cuts.flip[j] * cuts.flip[k]) * within<F>(outputs[3 + i], -most_deviation, most_deviation);
+    root[3 + i] = (features.flip[j] * features.flip[k]) *
+                  within<F>(outputs[3 + i], -most_deviation, most_deviation);
   }
   Triple<F> columns[3] = {(root[0] * axis[0] + root[3] * axis[1]) + root[4] * axis[2],
                           root[1] * axis[1] + root[5] * axis[2], root[2] * axis[2]};
@@ -100,9 +100,10 @@ struct OverlapByNetwork {
                                       Answers<Found<T>, T> found) {
     using F = Floats<T>;
     mlp::PatchBox<T> box(queries);
-    mlp::Cuts<F> cuts(box);
+    mlp::Features<F> features(box);
     constexpr bool patch = std::is_same_v<Found<T>, Moments<T>>;
-    mlp::Overlap<F> overlap(network, cuts, patch ? detail::network_outputs : mlp::point_outputs);
+    mlp::Overlap<F> overlap(network, features,
+                            patch ? detail::network_outputs : mlp::point_outputs);
     F by_half2[3], from_origin[3];
     for (int i = 0; i < 3; ++i) by_half2[i] = 1.0F / (box.half[i] * box.half[i]);
     for (int n = 0; n < mlp::moves_inwards; ++n) {
@@ -117,7 +118,7 @@ struct OverlapByNetwork {
       found[n]->centroid =
           components<T>(point_in_common_frame(query.pair, box.point(from_origin, n)));
       found[n]->volume = unit3 * doubles<T>(volume, n);
-      if constexpr (patch) found[n]->covariance = mlp::covariance(box, cuts, overlap, n);
+      if constexpr (patch) found[n]->covariance = mlp::covariance(box, features, overlap, n);
     }
   }
 };

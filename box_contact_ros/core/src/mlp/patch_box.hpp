@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The patch box: a cuboid around A∩B in which every overlap looks alike, whatever the sizes and the
-// depth are; and the cuts, what the half-spaces of both boxes take off it.
+// depth are.
 //
 // Its z axis is SAT's normal, so faces and pairs of edges are described alike. P is the box that has
 // less within the depth, Q the other. The x axis is along the edge of P that has most of it across z.
@@ -326,70 +326,6 @@ struct PatchBox {
     above = min<F>(above, above_b + lacking);
     below = min<F>(below, below_b + lacking);
     half[i] = 0.5F * max<F>(above + below, least);
-  }
-};
-
-// What the half-spaces of both boxes cut off the patch box, as its network reads it.
-//
-// A half-space cuts the box [−1, 1]³ to a depth c along a, with Σ|a_i| = 1. Per slab there are two,
-// c⁺ and c⁻. All six slabs of both boxes count alike. The features:
-//
-//   0–2: Σ (c⁺ − c⁻) a       3, 4: Σ c, Σ c²       5–7, 8–10: Σ of (c⁺ − c⁻)² a aᵀ, xx yy zz, xy xz yz
-//   11–18: how deep the corners of the box are cut off, +++ ++− +−+ +−− −++ −+− −−+ −−−
-//
-// Axes are mirrored so that 0–2 are not above 0.
-// A slope that is a smaller part of the sum of the three counts as 0: the digits of float32 end before it.
-constexpr float least_slope = 1e-8F;
-
-template <class F>
-struct Cuts {
-  F flip[3], features[up_to_fours(detail::network_features)];
-
-  template <class T>
-  BC_INLINE explicit Cuts(const PatchBox<T>& box) {
-    for (F& number : features) number = F{};
-    Side<F> slabs[2] = {box.a, box.b};
-    Triple<F> one = uniform(splat<F>(1.0F)), whole = uniform(splat<F>(2.0F)), zero{};
-    Triple<F> depth[2], pull[2][3];
-    for (int n = 0; n < 2; ++n) {
-      Triple<F>(&slope)[3] = slabs[n].slope;
-      Triple<F> scale = inverses<F>((abs(slope[0]) + abs(slope[1])) + abs(slope[2]));
-      for (int i = 0; i < 3; ++i) slope[i] = significant<F>(scale * slope[i], least_slope);
-      slabs[n].plus = scale * slabs[n].plus;
-      slabs[n].minus = scale * slabs[n].minus;
-      auto cut = [&](const Triple<F>& side) { return min(whole, max(one - side, zero)); };
-      Triple<F> above = cut(slabs[n].plus), below = cut(slabs[n].minus);
-      depth[n] = above + below;
-      for (int i = 0; i < 3; ++i) pull[n][i] = (above - below) * slope[i];
-    }
-    auto add = [](const Triple<F>& x, const Triple<F>& y) { return sum(x + y); };
-    auto add_products = [&](int i, int j) {
-      return add(pull[0][i] * pull[0][j], pull[1][i] * pull[1][j]);
-    };
-    for (int i = 0; i < 3; ++i) {
-      F all = add(pull[0][i], pull[1][i]);
-      flip[i] = either<F>(all > F{}, splat<F>(-1.0F), splat<F>(1.0F));
-      features[i] = flip[i] * all;
-      features[5 + i] = add_products(i, i);
-    }
-    features[3] = add(depth[0], depth[1]);
-    features[4] = add(depth[0] * depth[0], depth[1] * depth[1]);
-    features[8] = flip[0] * flip[1] * add_products(0, 1);
-    features[9] = flip[0] * flip[2] * add_products(0, 2);
-    features[10] = flip[1] * flip[2] * add_products(1, 2);
-    for (const Side<F>& of_box : slabs) {
-      Triple<F> a[3];
-      for (int i = 0; i < 3; ++i) a[i] = flip[i] * of_box.slope[i];
-      Triple<F> along = a[0] + a[1], against = a[0] - a[1];
-      Triple<F> corners[4] = {along + a[2], along - a[2], against + a[2], against - a[2]};
-      for (int i = 0; i < 4; ++i) {
-        Triple<F> here = max(corners[i] - of_box.plus, -corners[i] - of_box.minus);
-        Triple<F> there = max(-corners[i] - of_box.plus, corners[i] - of_box.minus);
-        features[11 + i] = max(features[11 + i], largest(here));
-        features[18 - i] = max(features[18 - i], largest(there));
-      }
-    }
-    for (int i = 11; i < detail::network_features; ++i) features[i] = min(features[i], splat<F>(2.0F));
   }
 };
 
