@@ -126,14 +126,19 @@ def _bodies(plan: Plan, meet: _Meetings) -> Bodies:
     given = sums(masses)
     masses = np.where(given[plan.body] > 0.0, masses, 1.0)  # to find a centre
     mass = sums(masses)
-    place = plan.poses[:, :3] + np.einsum('nij,nj->ni', rotation_matrix(plan.poses[:, 3:]),
-                                          plan.centres)
+    place = _mass_centres(plan)
     centre = sums(masses[:, None] * place) / mass[:, None]
     arm = ((place - centre[plan.body])**2).sum(axis=1)
     gyration = np.sqrt(sums(masses * ((plan.sizes**2).sum(axis=1) / 12.0 + arm)) / mass)
     heaviest = given[~meet.fixed].max(initial=0.0) or 1.0
     weight = np.linalg.norm(meet.felt) * np.where(given > 0.0, given, WEIGHTLESS * heaviest)
     return Bodies(weight, centre @ meet.frame.T, gyration, meet.fixed)
+
+
+def _mass_centres(plan: Plan) -> np.ndarray:
+    """Return the centre of mass of each box (n, 3), common frame."""
+    return plan.poses[:, :3] + np.einsum('nij,nj->ni', rotation_matrix(plan.poses[:, 3:]),
+                                         plan.centres)
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,9 +260,7 @@ def _judged(plan: Plan, meet: _Meetings, bodies: Bodies, loads: _Loads | None) -
     mass, centre = np.nan, np.full(3, np.nan)
     if plan.masses is not None:
         mass = float(plan.masses.sum())
-        places = plan.poses[:, :3] + np.einsum(
-            'nij,nj->ni', rotation_matrix(plan.poses[:, 3:]), plan.centres)
-        centre = plan.masses @ places / mass if mass > 0.0 else centre
+        centre = plan.masses @ _mass_centres(plan) / mass if mass > 0.0 else centre
     return Inspection(
         plan=plan, tolerance=meet.tolerance, acceleration=meet.felt,
         overlaps=np.sort(meet.met[deep], axis=1), depths=depth[deep], stands=verdict.stands[body],
