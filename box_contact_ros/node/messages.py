@@ -25,7 +25,7 @@ from ..scene.scene_check import Row
 from ..solver.checks import name_fault
 from ..solver.contact import Contacts
 from ..solver.nearest import Nearests
-from ..stream.cdr import NANOSECONDS
+from ..stream.cdr import CONTACT, NANOSECONDS
 from ..stream.pairing import frames_differ
 
 
@@ -105,8 +105,9 @@ class KeptMessages:
             self._messages.append(ContactMessage(covariance=row))
         numbers = native.message_numbers(contacts.point, contacts.normal, contacts.separation,
                                          contacts.volume, contacts.covariance)
-        self._covariance[:len(names)] = numbers[:, 9:]
-        for message, name, row in zip(self._messages, names, numbers[:, :9].tolist()):
+        covariance = CONTACT['covariance']
+        self._covariance[:len(names)] = numbers[:, -covariance:]
+        for message, name, row in zip(self._messages, names, numbers[:, :-covariance].tolist()):
             message.pair, message.box_a, message.box_b = name
             p, n = message.point, message.normal
             p.x, p.y, p.z, n.x, n.y, n.z, message.depth, message.volume, message.area = row

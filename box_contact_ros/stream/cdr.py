@@ -23,10 +23,11 @@ PADDING = 3
 """Most bytes after the body, of any value: RTPS pads a message to a multiple of four."""
 FRAME_AT = 16
 """Where frame_id's characters are: behind stamp and length."""
-CONTACT_BYTES = 8 * 15
-"""Of a contact behind its names: point, normal, depth, volume, area and covariance."""
-NEAR_BYTES = 8 * 10
-"""Of a pair that is near: distance, normal and both points."""
+CONTACT = {'point': 3, 'normal': 3, 'depth': 1, 'volume': 1, 'area': 1, 'covariance': 6}
+"""How many numbers of each kind a contact has behind its names, in this order."""
+NEAR = {'distance': 1, 'normal': 3, 'point_a': 3, 'point_b': 3}
+"""The same of a pair that is near."""
+CONTACT_BYTES, NEAR_BYTES = 8 * sum(CONTACT.values()), 8 * sum(NEAR.values())
 MOST_NAMES = 2**16
 """Pairs whose names are kept as bytes, some 10 MB."""
 

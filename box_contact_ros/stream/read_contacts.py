@@ -8,7 +8,9 @@ rclpy makes an object of each point and normal, which takes some ten times as lo
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping
 from functools import lru_cache
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,11 +18,13 @@ import numpy as np
 from ..solver.contact import Contacts
 from ..solver.nearest import Nearests
 from .cdr import (
+    CONTACT,
     CONTACT_BYTES,
     ENCAPSULATION,
     FRAME_AT,
     MOST_NAMES,
     NANOSECONDS,
+    NEAR,
     NEAR_BYTES,
     PADDING,
     MessageError,
@@ -95,17 +99,24 @@ def read_contacts(data: bytes) -> ReadContacts:
 
 def _contacts(rows: np.ndarray) -> Contacts:
     """Return contacts by their rows (n, 15)."""
+    point, normal, depth, volume, _, upper = _parts(rows, CONTACT)
     covariance = np.empty((len(rows), 3, 3))
     for column, (i, j) in enumerate(zip(*UPPER)):
-        covariance[:, i, j] = covariance[:, j, i] = rows[:, 9 + column]
-    return Contacts(np.ones(len(rows), bool), -rows[:, 6], rows[:, 3:6].copy(), rows[:, :3].copy(),
-                    rows[:, 7].copy(), covariance, np.full(len(rows), -1, np.int32))
+        covariance[:, i, j] = covariance[:, j, i] = upper[:, column]
+    return Contacts(np.ones(len(rows), bool), -depth, normal, point, volume, covariance,
+                    np.full(len(rows), -1, np.int32))
 
 
 def _nearests(rows: np.ndarray) -> Nearests:
     """Return nearest points by their rows (n, 10)."""
-    return Nearests(np.zeros(len(rows), bool), *(rows[:, part].copy() for part in (
-        0, slice(1, 4), slice(4, 7), slice(7, 10))))
+    return Nearests(np.zeros(len(rows), bool), *_parts(rows, NEAR))
+
+
+def _parts(rows: np.ndarray, counts: Mapping[str, int]) -> list[np.ndarray]:
+    """Return the columns of each kind (n, count), or (n,) of a kind with one number."""
+    starts = accumulate(counts.values(), initial=0)
+    return [(rows[:, start] if count == 1 else rows[:, start:start + count]).copy()
+            for start, count in zip(starts, counts.values())]
 
 
 @lru_cache(MOST_NAMES)  # the same in each message
