@@ -67,9 +67,11 @@ def draw(paths: dict[str, np.ndarray], beside: np.ndarray, picture: str) -> None
         view.plot(path[:, 0], HEIGHTS, color=colour)
         chart.plot(path[:, 2], HEIGHTS, color=colour, label=name)
     chart.axvline(CLEARANCE, color='#e6146e', linestyle='--', label='clearance')
+    aside = np.abs(paths['pushed off'][:, 0]).max()
+    figure.suptitle(f'{100 * aside:.0f} cm aside, the load keeps its clearance')
     view.set(xlabel='y [m]', ylabel='height of the centre [m]', xlim=(-4.2, 4.2), ylim=(0, 10))
     chart.set(xlabel='least distance [m]', ylim=(0, 10), xlim=(0, None))
-    chart.legend(loc='upper right')
+    chart.legend(loc='center right')
     figure.savefig(picture, dpi=110)
 
 

@@ -190,7 +190,8 @@ def outputs(axes: Axes3D, point: np.ndarray) -> None:
         arc = np.linspace(*ends, 30)
         arc *= radius / np.linalg.norm(arc, axis=1, keepdims=True)
         axes.plot(*arc.T, color=CORNER, linewidth=1.5)
-        axes.text(*(1.06 * arc[15]), name, color=CORNER, fontsize=9, va=side)
+        axes.text(*(1.06 * arc[15]), name, color=CORNER, fontsize=9, va=side,
+                  bbox={'facecolor': 'white', 'alpha': 0.7, 'linewidth': 0, 'pad': 0.5})
 
 
 def trihedron(folder: Path) -> None:
@@ -198,7 +199,7 @@ def trihedron(folder: Path) -> None:
     figure = plt.figure(figsize=(9.0, 4.0), dpi=110, layout='constrained')
     for place, (draw, length, title) in enumerate((
             (inputs, 5.0, 'In: t, roll, pitch, yaw'),
-            (outputs, 3.0, 'Out: azimuth and elevation of the point, and of the normal')), 1):
+            (outputs, 3.0, 'Out: azimuth and elevation, of point and normal')), 1):
         axes = figure.add_subplot(1, 2, place, projection='3d', proj_type='ortho')
         draw(axes, np.array((1.0, 0.7, 0.6)))
         axes.set(xlim=(-1, length - 1), ylim=(-1, length - 1), zlim=(-1.15, length - 1.15))
