@@ -46,10 +46,11 @@ CHOICES = (
     Choice('MuJoCo', 'MuJoCo mj_collision', 'mjc_BoxBox'),
     Choice('PyBullet', 'PyBullet getContactPoints'),
     Choice('Drake, hydroelastic', 'Drake hydroelastic'),
+    Choice('`mlp`', 'mlp', 'mlp volume'),
     Choice("the paper's network", 'paper', 'paper', rest='settled cubes'),
     Choice('polygon soup', 'soup-8'),
 )
-"""This package, the engines, and what the source paper compares."""
+"""This package's default, the engines, and networks and soup as the source paper compares them."""
 SHOWN = {'avx512': 'AVX-512', 'avx2': 'AVX2'}
 """Instruction sets as native.csv and frontier.csv call them, the README's first."""
 AT_REST, SWAY = 'settled by PatchForces', 'containers'  # sets of native.csv
@@ -93,6 +94,8 @@ def fastest(found: list[Row], column: str = 'instruction_set') -> Row | None:
 
 def point_error(choice: Choice, of_set: str) -> str:
     """Return within what 99 % of the points are [% of the edge], by the best way to make one."""
+    if choice.contestant == 'exact':
+        return 'reference'
     p99 = [float(row['point_p99']) for row in rows(
         'frontier.csv', contestant=choice.contestant, set=of_set, **{'class': 'all'})
         if row['point_p99']]
@@ -132,9 +135,9 @@ def models() -> str:
     return (f'{table}\n\nMedians on one core, {SHOWN[where["instruction_set"]]}, '
             f'{where["processor"]}. Errors: the 99th percentile of distances, in % of the smaller '
             "box's longest edge. At rest: goods that have settled; moving: swaying containers; "
-            "landing: containers that touch down. Times include the size of the patch in Python "
-            "alone. MuJoCo's is of `mj_kinematics` and `mj_collision`, in C of its box test. A "
-            'dash: not measured.')
+            'landing: containers that touch down. `exact` and `mlp` give the size of the patch, '
+            "too, but not in C. MuJoCo's time is of `mj_kinematics` and `mj_collision`, in C of "
+            'its box test. A dash: not measured.')
 
 
 def bench() -> str:

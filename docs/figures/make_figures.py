@@ -116,12 +116,13 @@ def slide(axes: plt.Axes) -> None:
         if depth == RIVAL_DEPTH:
             rival = mujoco_points(a, b)[:, 0]
     axes.plot(degrees, rival, '--', color=COLOURS['MuJoCo'],
-              label=f'MuJoCo, {1e3 * RIVAL_DEPTH:g} mm')
+              label=f"MuJoCo's mean, {1e3 * RIVAL_DEPTH:g} mm")
     ends = np.sign(tilts) * 0.5 * length * np.cos(tilts) - 0.5 * height * np.sin(tilts)
     ends[tilts == 0.0] = np.nan
     axes.plot(degrees, ends, color=CORNER, linewidth=2)
     axes.text(-1.2e-4, 6.1, 'deepest corner', color=CORNER, fontsize=10, va='center', ha='right')
-    axes.legend(title='at a depth of', title_fontsize=10, fontsize=9, loc='lower right')
+    axes.legend(title='at a depth of', title_fontsize=9, fontsize=8, handlelength=1.3,
+                loc='lower right')
     # With this scale the axis has no kink where it turns from linear to logarithmic.
     axes.set_xscale('symlog', linthresh=LEAST_TILT, linscale=0.9 / math.log(10.0))
     axes.set(title='The deepest corner jumps by 12 m', xlim=(-1.5, 1.5), ylim=(-6.8, 6.8),
