@@ -135,9 +135,9 @@ def models() -> str:
     return (f'{table}\n\nMedians on one core, {SHOWN[where["instruction_set"]]}, '
             f'{where["processor"]}. Errors: the 99th percentile of distances, in % of the smaller '
             "box's longest edge. At rest: goods that have settled; moving: swaying containers; "
-            'landing: containers that touch down. `exact` and `mlp` give the size of the patch, '
-            "too, but not in C. MuJoCo's time is of `mj_kinematics` and `mj_collision`, in C of "
-            'its box test. A dash: not measured.')
+            'landing: containers that touch down. In Python, not in C, `exact` and `mlp` include '
+            "the patch's size. MuJoCo's time is of `mj_kinematics` and `mj_collision`, in C of its "
+            'box test. A dash: not measured.')
 
 
 def bench() -> str:
