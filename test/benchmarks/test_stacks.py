@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -18,8 +19,11 @@ from benchmarks import output, rivals, settled, stacks, stacks_picture
 from benchmarks.loops import MUJOCO, TIMINGS, Boxes, Scene, Timing, corner_speeds, steps
 from benchmarks.stack_scenes import (
     ORDERS,
+    card_house,
     landed_pallet,
+    mixed,
     off_centre,
+    pallet,
     ratio,
     sideways,
     slope,
@@ -65,6 +69,18 @@ def test_a_turntable_carries_its_tower(timing: Timing | None) -> None:
 def test_a_pallet_of_light_and_heavy_boxes_comes_to_rest_soon_after_it_lands(order: str) -> None:
     """Boxes of 0.2 to 100 kg, by own contacts at uneven steps of up to 8 ms."""
     assert run(partial(landed_pallet, order), TIMINGS[3]).rest < 2.0
+
+
+@pytest.mark.parametrize('make', [card_house, pallet])
+def test_what_sways_comes_to_rest_in_steps_of_a_frame(make: Callable[[], Scene]) -> None:
+    """A card house of 5 storeys and a pallet of ten layers, within a second; no box walks away."""
+    outcome = run(lambda: replace(make(), seconds=2.0), TIMINGS[2])
+    assert outcome.rest < 1.0 and outcome.moved < 20.0
+
+
+def test_what_has_swayed_is_still() -> None:
+    """Fewer iterations begin again where it rests, and do not make it sway anew."""
+    assert run(mixed, TIMINGS[1]).end_speed < 1e-6
 
 
 @pytest.mark.parametrize('timing', TIMINGS, ids=str)

@@ -1,7 +1,8 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// How much shorter the sub-steps of an island are, so that no patch is pressed deeper than wanted.
+// How much shorter the sub-steps of an island are, so that no patch is pressed deeper than wanted, and whether
+// it sways.
 //
 // A patch that bears a force F for long is F·c·w²/f² deep. Here c is what an impulse N alone changes the
 // closing speed by, w is the window, and f is `soft_frequency`. Of boxes alike that is little. Of a heavy
@@ -42,7 +43,8 @@ constexpr int parts_of_a_contact = 4;
 // Of a body: its island's, as a patch may be lost for a step.
 struct Fineness {
   int factor = 1;
-  double calm = 0.0;  // for how long less was needed [s]
+  double calm = 0.0;   // for how long less was needed [s]
+  bool sways = false;  // so that it takes more iterations
 };
 
 // Chooses the factor of an island.
@@ -72,9 +74,19 @@ class FinenessOf {
                  : is_spare && calm >= calm_time ? held / 2
                                                  : held;
     each_free(island, [&](size_t body) {
-      all[body] = {factor, is_spare && factor == held ? all[body].calm + steps.dt : 0.0};
+      Fineness& fineness = all[body];
+      fineness.factor = factor;
+      fineness.calm = is_spare && factor == held ? fineness.calm + steps.dt : 0.0;
     });
     return factor;
+  }
+  // Whether an island sways, whose bodies pass each other at a speed [m/s].
+  bool sways(const Island& island, double speed, std::vector<Fineness>& all) const {
+    bool has_swayed = false;
+    each_free(island, [&](size_t body) { has_swayed = has_swayed || all[body].sways; });
+    bool sways = is_sway(speed, has_swayed);
+    each_free(island, [&](size_t body) { all[body].sways = sways; });
+    return sways;
   }
 
  private:

@@ -69,7 +69,7 @@ class IslandStep {
     for (Island& island : islands_.of(chunk)) begin(island);
     // Those with as many iterations, in sub-steps as fine, are advanced together.
     for (const Island& island : islands_.of(chunk))
-      if (island.factor > 0) advance(chunk, island.factor, island.is_uneven);
+      if (island.factor > 0) advance(chunk, island.factor, island.takes_more);
   }
 
   // The first body whose numbers are not finite at the end of the islands, or −1.
@@ -113,18 +113,20 @@ class IslandStep {
       return;
     }
     island.is_uneven = false;
-    double factor = over_relaxation_of(island);
+    double factor = over_relaxation_of(island), fastest = 0.0;
     each_block(island, [&](Block& block, const Patch& patch, Moving& a, Moving& b) {
       take(patch, factor, block);
+      fastest = std::max(fastest, passing_speed(patch, a, b));
       block.normal_sum = block.friction_sum = {};
       island.is_uneven = island.is_uneven || is_uneven(a.inverse_mass, b.inverse_mass);
     });
+    island.takes_more = fineness_of_.sways(island, fastest, fineness_) || island.is_uneven;
     island.factor = step_.own ? fineness_of_(island, step_.steps, fineness_) : 1;
   }
-  // Advance the islands whose sub-steps are finer by a factor, and whose masses are uneven or not.
-  void advance(const Chunk& chunk, int factor, bool is_uneven) const {
+  // Advance the islands whose sub-steps are finer by a factor, and which take more iterations or not.
+  void advance(const Chunk& chunk, int factor, bool takes_more) const {
     SubSteps steps = step_.steps.finer(factor);
-    if (is_uneven && !steps.is_late) steps.rounds *= uneven_rounds;
+    if (takes_more && !steps.is_late) steps.rounds *= more_rounds;
     auto advance = [&](Islands::Range range, const detail::ForceKernel& kernel, void* groups,
                        size_t count) {
       bool counts = step_.motion.wrenches;
@@ -134,7 +136,7 @@ class IslandStep {
       advance_by(kernel, factor, work);
     };
     for (Island& island : islands_.of(chunk))
-      island.is_shared = island.factor == factor && island.is_uneven == is_uneven;
+      island.is_shared = island.factor == factor && island.takes_more == takes_more;
     size_t groups = islands_.share(chunk);
     if (groups > 0)
       advance(islands_.of(chunk), *islands_.side(), islands_.groups_of(chunk), groups);
@@ -243,7 +245,6 @@ class IslandStep {
       close(patch, a, b, time, block);
     });
   }
-  // Late patches are soft: none is over-relaxed.
   double over_relaxation_of(const Island& island) const {
     return step_.steps.is_late ? 1.0 : over_relaxation(island.block_end - island.block);
   }
