@@ -8,6 +8,7 @@
 //    rotation where rounding could decide (near_parallel_edges.hpp).
 #pragma once
 
+#include "lanes/floats.hpp"
 #include "near_parallel_edges.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
@@ -19,6 +20,9 @@ struct Query {
   SeparatingAxis<T> axis;
   Mask<T> touching;  // valid and in contact
 };
+// What a network is asked together: a pair alone, or two blocks of pairs.
+template <class T>
+using Queries = const Query<T>* const (&)[blocks_together<T>];
 
 // Not inlined: most pairs do without.
 template <class T>

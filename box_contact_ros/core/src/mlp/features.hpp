@@ -12,6 +12,7 @@
 // Axes are mirrored so that 0–2 are not above 0.
 #pragma once
 
+#include "network.hpp"
 #include "patch_box.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::mlp {

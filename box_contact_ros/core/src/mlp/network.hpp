@@ -5,7 +5,6 @@
 // them. The weights are in memory, so one function runs networks of all sizes.
 #pragma once
 
-#include "../lanes/floats.hpp"
 #include "../query.hpp"
 #include "format.hpp"
 
@@ -122,9 +121,7 @@ template <class F>
   layer(numbers, second, units, wanted, Activation::none, outputs);
 }
 
-// What is solved together: a pair alone, or two blocks of pairs.
-template <class T>
-using Queries = const Query<T>* const (&)[blocks_together<T>];
+// What a network finds of queries.
 template <class Found, class T>
 using Answers = Found* const (&)[blocks_together<T>];
 

@@ -19,7 +19,7 @@
 #pragma once
 
 #include "../minimum_depth.hpp"
-#include "network.hpp"
+#include "../query.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::mlp {
 
