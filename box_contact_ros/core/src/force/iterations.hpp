@@ -20,7 +20,7 @@ constexpr double least_change = 1e-8;
 // closing speed comes back as an overlap that is pushed out.
 constexpr double impact_change = 0.01;
 constexpr double impact_share = 0.2;
-constexpr int impact_iterations = 100;
+constexpr int impact_iterations = 40;
 // With late answers no change of a closing speed is an impact [m/s]. Their patches are soft, and slow what
 // closes over several steps. If it were solved at once, 100 on 1 would never rest.
 constexpr double no_impact = std::numeric_limits<double>::infinity();
