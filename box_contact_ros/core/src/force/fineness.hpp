@@ -47,7 +47,7 @@ struct Fineness {
   bool sways = false;  // so that it takes more iterations
 };
 
-// Chooses the factor of an island.
+// Chooses the factor of an island, and tells whether it sways. Both are kept with its bodies.
 class FinenessOf {
  public:
   FinenessOf(const std::vector<Body>& bodies, const bc_wrench* outside, double most_depth,
