@@ -7,7 +7,7 @@
 // call to call. While a box stays within its fat bounds, it can be near the boxes of its kept pairs
 // alone. So a call tests the kept pairs, and searches for others for the boxes that left their fat
 // bounds. There are trees to search: one of fixed boxes, a small one of those that came later, and
-// one of the others' fat bounds.
+// one of the others' fat bounds. Where no box has moved, the last answer holds.
 #pragma once
 
 #include <algorithm>
@@ -85,6 +85,7 @@ class BroadPhase {
   void resize(int64_t box, const Vec<double>& half) {
     half_[size_t(box)] = half;
     is_settled_[size_t(box)] = 0;
+    is_found_ = false;
   }
 
   // Take over what `former` knows of fixed boxes, so that only others are read and sorted. kept: the index
@@ -104,18 +105,16 @@ class BroadPhase {
   // Find the pairs that may touch at `poses` (boxes, 7); seven NaN: the box is not there. The poses
   // of fixed boxes are read once. Stops with more than `most` pairs. Returns −1, or a box without a
   // valid pose; nothing is found then.
-  int64_t find(const double* poses, int64_t most) {
-    pairs_.clear();
-    stale_.clear();
-    most_ = size_t(most);
-    int64_t refused = read_poses(poses);
-    if (refused >= 0) return refused;
-    append_listed();
-    for (int32_t box : to_read_)
-      if (meets_[size_t(box)] && !is_known(box)) stale_.emplace_back(box, -1);
-    update_kept();
-    append_kept();
-    return -1;
+  int64_t find(const double* poses, int64_t most) { return find(poses, to_read_, most); }
+  // The same, where only the poses of some boxes may be others than in the last call.
+  int64_t find_changed(const double* poses, const int64_t* changed, int64_t count, int64_t most) {
+    if (!is_found_) return find(poses, most);
+    named_.assign(changed, changed + count);
+    std::sort(named_.begin(), named_.end());
+    named_.erase(std::unique(named_.begin(), named_.end()), named_.end());
+    auto is_read = [this](int32_t box) { return fixed_[size_t(box)] && is_known(box); };
+    named_.erase(std::remove_if(named_.begin(), named_.end(), is_read), named_.end());
+    return find(poses, named_, most);
   }
 
   // Boxes A and B. Those listed first, then the others by the lower and the higher box.
@@ -136,33 +135,57 @@ class BroadPhase {
   // Whether a moving box may be in other pairs than the listed ones.
   bool is_searched(int32_t box) const { return meets_[size_t(box)] && !fixed_[size_t(box)]; }
 
-  // Take the bounds of all boxes but the fixed ones that are known. Returns −1, or a box without a
-  // valid pose.
-  int64_t read_poses(const double* poses) {
+  // boxes: whose poses are read; those of the others are as they were.
+  int64_t find(const double* poses, const std::vector<int32_t>& boxes, int64_t most) {
+    bool was_found = is_found_;
+    is_found_ = false;
+    most_ = size_t(most);
+    int64_t refused = read_poses(poses, boxes);
+    if (was_found && refused < 0 && !is_any_moved_ && pairs_.size() <= most_) {
+      is_found_ = true;
+      return -1;
+    }
+    pairs_.clear();
+    stale_.clear();
+    if (refused >= 0) return refused;
+    append_listed();
+    for (int32_t box : to_read_)
+      if (meets_[size_t(box)] && !is_known(box)) stale_.emplace_back(box, -1);
+    update_kept();
+    append_kept();
+    is_found_ = !is_partial_ && pairs_.size() <= most_;
+    return -1;
+  }
+
+  // Take the bounds of boxes. Returns −1, or one without a valid pose.
+  int64_t read_poses(const double* poses, const std::vector<int32_t>& boxes) {
     changed_.clear();
-    searched_count_ = 0;
+    is_any_moved_ = false;
     bool is_fixed_new = false;
-    for (int32_t box : to_read_) {
+    for (int32_t box : boxes) {
+      bool was_known = is_known(box);
       Bounds& bounds = bounds_[size_t(box)];
       const double* p = poses + 7 * int64_t(box);
-      if (is_settled_[size_t(box)] && std::memcmp(p, &last_[size_t(box)], sizeof last_[0]) == 0) {
-        searched_count_ += is_searched(box);
+      if (is_settled_[size_t(box)] && std::memcmp(p, &last_[size_t(box)], sizeof last_[0]) == 0)
         continue;
-      }
       bounds = nowhere;
       is_settled_[size_t(box)] = 0;
-      if (std::all_of(p, p + 7, [](double number) { return std::isnan(number); })) continue;
+      searched_count_ -= was_known && is_searched(box);
+      if (std::all_of(p, p + 7, [](double number) { return std::isnan(number); })) {
+        is_any_moved_ |= was_known;
+        continue;
+      }
+      is_any_moved_ = true;
       Pose<double> pose{{p[0], p[1], p[2]}, {p[3], p[4], p[5], p[6]}};
       if (!pose_valid(triple(pose.position), squared_norm(pose.quaternion))) return box;
       bounds = bounds_of(pose, half_[size_t(box)]);
       is_fixed_new |= fixed_[size_t(box)];
-      if (!is_searched(box)) continue;
-      ++searched_count_;
-      if (bounds.is_within(fat_[size_t(box)])) {
+      searched_count_ += is_searched(box);
+      if (is_searched(box) && !bounds.is_within(fat_[size_t(box)])) {
+        changed_.push_back(box);
+      } else if (!fixed_[size_t(box)]) {
         std::memcpy(&last_[size_t(box)], p, sizeof last_[0]);
         is_settled_[size_t(box)] = 1;
-      } else {
-        changed_.push_back(box);
       }
     }
     if (is_fixed_new) build_fixed();
@@ -324,6 +347,7 @@ class BroadPhase {
   // Of the last call.
   std::vector<Bounds> bounds_;
   std::vector<Row> pairs_, stale_;
+  bool is_found_ = false;  // whether it answered: all poses were read, and all pairs found
   // From call to call.
   std::vector<Bounds> fat_;
   std::unique_ptr<std::array<double, 7>[]> last_;  // the pose of a box that is settled
@@ -333,7 +357,8 @@ class BroadPhase {
   BoundsTree fixed_tree_, later_tree_, moving_tree_;
   // Memory that calls use again.
   size_t most_ = 0, searched_count_ = 0, near_count_ = 0;
-  std::vector<int32_t> changed_, boxes_;
+  bool is_any_moved_ = false;
+  std::vector<int32_t> named_, changed_, boxes_;
   std::vector<uint8_t> is_changed_;
   std::vector<size_t> begins_;
   std::vector<uint64_t> found_, sorted_;

@@ -105,6 +105,42 @@ bc_status take_fixed(BroadPhase& self, const BroadPhase& former, const int64_t* 
   return BC_OK;
 }
 
+// What a search that ended with `refused` found.
+bc_status answer(const BroadPhase& self, const bc_pose* poses, int64_t refused, bc_near& near) {
+  near = {sizeof(bc_near),
+          reinterpret_cast<const int64_t*>(self.pairs().data()),
+          int64_t(self.pairs().size()),
+          reinterpret_cast<const int64_t*>(self.stale().data()),
+          int64_t(self.stale().size()),
+          refused};
+  if (refused < 0) return BC_OK;
+  char field[32];
+  std::snprintf(field, sizeof field, "pose of box %lld", (long long)refused);
+  return refuse_pose(field, poses[refused].position);
+}
+
+bc_status check_search(const BroadPhase& self, const bc_pose* poses, int64_t most,
+                       const bc_near& near) {
+  if (near.size != sizeof(bc_near)) return fail(BC_BAD_ABI, "near.size is unknown");
+  if (self.count() && !poses) return refuse_null("poses");
+  if (most < 0) return fail(BC_BAD_ARGUMENT, "most must be 0 or more, not %lld", (long long)most);
+  return BC_OK;
+}
+
+bc_status check_changed(const int64_t* changed, int64_t count, int64_t boxes) {
+  if (!changed && count > 0) return refuse_null("changed");
+  for (int64_t k = 0; k < count; ++k)
+    if (!is_box(changed[k], boxes))
+      return fail(BC_BAD_ROWS, "changed[%lld] is %lld, but there are %lld boxes", (long long)k,
+                  (long long)changed[k], (long long)boxes);
+  return BC_OK;
+}
+
+const double* numbers_of(const bc_pose* poses) { return reinterpret_cast<const double*>(poses); }
+BroadPhase& phase_of(bc_broad_phase* broad_phase) {
+  return *reinterpret_cast<BroadPhase*>(broad_phase);
+}
+
 }  // namespace
 }  // namespace box_contact::detail
 
@@ -129,7 +165,7 @@ void bc_broad_phase_destroy(bc_broad_phase* broad_phase) {
 bc_status bc_broad_phase_resize(bc_broad_phase* broad_phase, int64_t box, const bc_size* size) {
   return guarded([&] {
     if (!broad_phase || !size) return refuse_null(size ? "broad_phase" : "size");
-    return resize(*reinterpret_cast<BroadPhase*>(broad_phase), box, *size);
+    return resize(phase_of(broad_phase), box, *size);
   });
 }
 
@@ -138,8 +174,7 @@ bc_status bc_broad_phase_take_fixed(bc_broad_phase* broad_phase, const bc_broad_
   return guarded([&] {
     if (!broad_phase || !former || !kept)
       return refuse_null(!broad_phase ? "broad_phase" : former ? "kept" : "former");
-    return take_fixed(*reinterpret_cast<BroadPhase*>(broad_phase),
-                      *reinterpret_cast<const BroadPhase*>(former), kept);
+    return take_fixed(phase_of(broad_phase), *reinterpret_cast<const BroadPhase*>(former), kept);
   });
 }
 
@@ -147,22 +182,22 @@ bc_status bc_broad_phase_find(bc_broad_phase* broad_phase, const bc_pose* poses,
                               bc_near* near) {
   return guarded([&] {
     if (!broad_phase || !near) return refuse_null(near ? "broad_phase" : "near");
-    if (near->size != sizeof(bc_near)) return fail(BC_BAD_ABI, "near.size is unknown");
-    auto& self = *reinterpret_cast<BroadPhase*>(broad_phase);
-    if (self.count() && !poses) return refuse_null("poses");
-    if (most < 0) return fail(BC_BAD_ARGUMENT, "most must be 0 or more, not %lld", (long long)most);
-    const auto* numbers = reinterpret_cast<const double*>(poses);
-    int64_t refused = self.find(numbers, most);
-    *near = {sizeof(bc_near),
-             reinterpret_cast<const int64_t*>(self.pairs().data()),
-             int64_t(self.pairs().size()),
-             reinterpret_cast<const int64_t*>(self.stale().data()),
-             int64_t(self.stale().size()),
-             refused};
-    if (refused < 0) return BC_OK;
-    char field[32];
-    std::snprintf(field, sizeof field, "pose of box %lld", (long long)refused);
-    return refuse_pose(field, numbers + 7 * refused);
+    BroadPhase& self = phase_of(broad_phase);
+    if (bc_status status = check_search(self, poses, most, *near)) return status;
+    return answer(self, poses, self.find(numbers_of(poses), most), *near);
+  });
+}
+
+bc_status bc_broad_phase_find_changed(bc_broad_phase* broad_phase, const bc_pose* poses,
+                                      const int64_t* changed, int64_t count, int64_t most,
+                                      bc_near* near) {
+  return guarded([&] {
+    if (!broad_phase || !near) return refuse_null(near ? "broad_phase" : "near");
+    BroadPhase& self = phase_of(broad_phase);
+    bc_status status = check_search(self, poses, most, *near);
+    if (!status) status = check_changed(changed, count, int64_t(self.count()));
+    if (status) return status;
+    return answer(self, poses, self.find_changed(numbers_of(poses), changed, count, most), *near);
   });
 }
 
