@@ -1,8 +1,8 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// PatchForces with contacts of its own, and the broad phase at each step. Its first argument is
-// `most_depth` [m].
+// PatchForces with contacts of its own, and the broad phase at each step. Both are told what changed: to
+// the broad phase that is what is awake, to the forces nothing. The first argument is `most_depth` [m].
 #include <numeric>
 
 #include "box_contact/broad_phase.h"
@@ -33,7 +33,8 @@ class World {
       weights_.push_back({{0, 0, -scene.gravity * box.mass}, {0, 0, 0}});
     }
     velocities_.resize(count_);
-    awake_.resize(count_);
+    awake_.assign(count_, 1);
+    moved_.reserve(count_);
     bc::PatchForces::Options options;
     options.substeps = scene.substeps;
     options.friction = scene.friction;
@@ -56,9 +57,13 @@ class World {
   void step() {
     bc_near near{};
     near.size = sizeof near;
-    bc::detail::check(bc_broad_phase_find(broad_phase_, poses_.data(), INT64_MAX, &near));
+    moved_.clear();
+    for (size_t k = 0; k < count_; ++k)
+      if (awake_[k]) moved_.push_back(std::int64_t(k));
+    bc::detail::check(bc_broad_phase_find_changed(broad_phase_, poses_.data(), moved_.data(),
+                                                  std::int64_t(moved_.size()), INT64_MAX, &near));
     forces_->hold(bc::Patches(bc::Span<const std::int64_t>(near.pairs, size_t(2 * near.count))));
-    forces_->advance(step_, poses_, velocities_, weights_, awake_);
+    forces_->advance_changed({}, step_, poses_, velocities_, weights_, awake_);
   }
   int awake() const { return std::accumulate(awake_.begin(), awake_.end(), 0); }
   Pose pose(size_t k) const {
@@ -71,6 +76,7 @@ class World {
   size_t count_;
   std::vector<bc::Size> sizes_;
   std::vector<unsigned char> fixed_, awake_;
+  std::vector<std::int64_t> moved_;
   std::vector<bc::Pose> poses_;
   std::vector<bc::Velocity> velocities_;
   std::vector<bc::Wrench> weights_;

@@ -117,10 +117,10 @@ class PatchForces:
     def set_boxes(self, sizes: np.ndarray, body: np.ndarray | None, poses: np.ndarray | None, /,
                   ) -> None: ...
     def advance(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
-                outside: ArrayLike | None, /,
+                outside: ArrayLike | None, changed: np.ndarray | None, /,
                 ) -> Any: ...  # a tuple of arrays, or None
     def wrenches(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
-                 outside: ArrayLike | None, /,
+                 outside: ArrayLike | None, changed: np.ndarray | None, /,
                  ) -> Any: ...  # an array, or None
     def loads(self) -> tuple[np.ndarray, ...]: ...
     def forget(self, bodies: np.ndarray, /) -> None: ...

@@ -286,14 +286,17 @@ class PatchForces:
             *_columns_of_pairs(friction, surface_velocity, stiffness), *times)
 
     def advance(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
-                wrenches: ArrayLike | None = None) -> Motion:
+                wrenches: ArrayLike | None = None, *, changed: ArrayLike | None = None) -> Motion:
         """Return where the bodies are after a step of `dt` [s], and what contacts did.
 
         poses, velocities: at its start. wrenches: all but those of contacts, gravity among them.
+        changed: (k,) those bodies at rest that may be given otherwise than in the last step: the
+        others are not compared. None: all may be.
         Call `advance` once a step. Steps of less than 1 s may differ in length.
         ValueError: names field and value; nothing changes then.
         """
-        return Motion._make(_step(self._native.advance, dt, poses, velocities, wrenches))
+        named = None if changed is None else as_wholes(changed, 'changed')
+        return Motion._make(_step(self._native.advance, dt, poses, velocities, wrenches, named))
 
     def wrenches(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
                  wrenches: ArrayLike | None = None) -> np.ndarray:
@@ -332,14 +335,14 @@ class PatchForces:
 
 
 def _step(step: Callable[..., Any], dt: float, poses: ArrayLike, velocities: ArrayLike,
-          wrenches: ArrayLike | None) -> Any:
+          wrenches: ArrayLike | None, changed: np.ndarray | None = None) -> Any:
     """Return what a step of C++ gives; it converts nothing, and gives None for other arrays."""
     dt = as_number(dt, 'dt')
-    found = step(dt, poses, velocities, wrenches)
+    found = step(dt, poses, velocities, wrenches, changed)
     if found is not None:
         return found
     return step(dt, _as_rows(poses, 'poses', 7), _as_rows(velocities, 'velocities', 6),
-                None if wrenches is None else _as_rows(wrenches, 'wrenches', 6))
+                None if wrenches is None else _as_rows(wrenches, 'wrenches', 6), changed)
 
 
 def _principal_axes(inertia: np.ndarray) -> np.ndarray:

@@ -4,11 +4,51 @@
 // The loop of force_test.c by the C++ interface, and an advance allocates no memory.
 #include "box_contact/force.hpp"
 
+#include <cmath>
 #include <cstdio>
 
 #include "allocations.hpp"
 
 using namespace box_contact;
+
+namespace {
+
+// The rows of what rests, and is not named, are neither read nor written. One that is named wakes.
+int count_faults_at_rest() {
+  const Size size{1.0, 1.0, 1.0};
+  const Body bodies[] = {{1000.0, {170.0, 170.0, 170.0}}, {0.0, {0.0, 0.0, 0.0}}};
+  const BodyBox boxes[] = {{0, {{{0, 0, 0}, {0, 0, 0, 1}}, size}},
+                           {1, {{{0, 0, 0}, {0, 0, 0, 1}}, size}}};
+  const std::int64_t pair[] = {0, 1}, named[] = {0, 0}, unknown[] = {2};
+  Pose poses[] = {{{0.0, 0.0, 1.0}, {0.0, 0.0, 0.0, 1.0}}, {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}}};
+  Velocity velocities[2] = {};
+  Wrench outside[2] = {{{0.0, 0.0, -9810.0}, {}}, {}};
+  unsigned char awake[2];
+  PatchForces forces(bodies);
+  forces.set_boxes(boxes);
+  forces.hold(Patches(pair));
+  for (int step = 0; step < 1000; ++step)
+    forces.advance(0.001, poses, velocities, outside, awake);
+  int faults = awake[0] || awake[1];
+  const Pose laid = poses[0];
+  poses[0].position[2] = NAN;
+  const long before = allocations;
+  forces.advance_changed({}, 0.001, poses, velocities, outside, awake);
+  faults += allocations != before || awake[0] || !std::isnan(poses[0].position[2]);
+  for (Span<const std::int64_t> changed : {Span<const std::int64_t>(named), {unknown}}) {
+    try {
+      forces.advance_changed(changed, 0.001, poses, velocities, outside);
+      ++faults;
+    } catch (const std::invalid_argument&) {
+    }
+  }
+  poses[0] = laid;
+  outside[0].force[0] = 8000.0;
+  forces.advance_changed(named, 0.001, poses, velocities, outside, awake);
+  return faults + (!awake[0] || awake[1] || !(velocities[0].linear[0] > 0.0));
+}
+
+}  // namespace
 
 int main() {
   const Size size{12.192, 2.438, 2.591};
@@ -21,7 +61,7 @@ int main() {
   Wrench outside[2] = {{{0.0, 0.0, -9.81 * 20000.0}, {}}, {}}, wrenches[2];
   Contact contact{};
   const std::int64_t pair[2] = {0, 1};
-  int failures = 0;
+  int failures = count_faults_at_rest();
   for (int step = 0; step < 2000; ++step) {
     long before = allocations;
     if (step % 5 == 0) {

@@ -147,6 +147,40 @@ def test_what_wakes_goes_on_as_if_it_had_not_rested(event: str,
         assert resting.poses == pytest.approx(awake.poses, abs=1e-6)
 
 
+@pytest.mark.parametrize('event', EVENTS)
+def test_to_name_what_changed_changes_no_bit(event: str,
+                                             twins: tuple[World, World]) -> None:
+    told, other = deepcopy(twins[0]), deepcopy(twins[0])
+    last = told.poses, told.velocities, told.outside.copy()
+    for world in (told, other):
+        EVENTS[event][0](world)
+    for _ in range(20):
+        given = told.poses, told.velocities, told.outside
+        differs = [(now != then).any(axis=1) for now, then in zip(given, last)]
+        found = told.forces.advance(DT, *given, changed=np.flatnonzero(np.any(differs, axis=0)))
+        other.step(DT)
+        for one, another in zip(found, (other.poses, other.velocities, other.wrenches, other.awake)):
+            assert one.tobytes() == another.tobytes()
+        told.poses, told.velocities, *_ = found
+        last = told.poses, told.velocities, told.outside.copy()
+
+
+def test_what_wakes_with_what_is_named_is_checked(twins: tuple[World, World]) -> None:
+    world, twin = deepcopy(twins[0]), deepcopy(twins[0])
+    poses = world.poses.copy()
+    poses[TOP, 6] = np.nan
+    for each in (world, twin):
+        push(each, FOOT, 1, 0, 0, 0, 0, 0)
+    with pytest.raises(ValueError, match=rf'^poses\[{TOP}\] '):
+        world.forces.advance(DT, poses, world.velocities, world.outside, changed=[FOOT])
+    found = world.forces.advance(DT, world.poses, world.velocities, world.outside,
+                                 changed=[FOOT, FOOT])
+    assert found.poses.tobytes() == twin.step(DT).poses.tobytes()
+    for wrong, words in (([9], 'there is no body 9'), ([0.5], 'whole numbers'), (3, 'whole numbers')):
+        with pytest.raises(ValueError, match=f'^changed.* {words}'):
+            world.forces.advance(DT, poses, world.velocities, changed=wrong)
+
+
 def heap(rng: np.random.Generator, count: int) -> list[tuple]:
     """Rows of a World: boxes of a third to all of a metre, turned, that fall onto each other."""
     rows: list[tuple] = [FLOOR]

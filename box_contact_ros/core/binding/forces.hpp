@@ -144,10 +144,11 @@ Struct* rows_of(const Array<double>& array) {
 // `advance` and, for callers who move the bodies by themselves, `wrenches`.
 template <bool by_wrenches>
 inline PyObject* forces_advance(PyObject* self, PyObject* const* args, Py_ssize_t count) {
-  if (count != 4) fail(PyExc_TypeError, "(dt, poses, velocities, outside)");
+  if (count != 5) fail(PyExc_TypeError, "(dt, poses, velocities, outside, changed)");
   double dt = PyFloat_AsDouble(args[0]);
   if (PyErr_Occurred()) return nullptr;
   Array<double> poses, velocities, outside;
+  auto changed = read_given<int64_t>(args[4], "changed", {any_length});
   if (!read_plain(args[1], poses) || !read_plain(args[2], velocities) ||
       !read_plain(args[3], outside) || !poses.object || !velocities.object)
     Py_RETURN_NONE;
@@ -163,9 +164,14 @@ inline PyObject* forces_advance(PyObject* self, PyObject* const* args, Py_ssize_
   bc_motion motion{sizeof(bc_motion), rows_of<bc_pose>(moved), rows_of<bc_velocity>(after),
                    rows_of<bc_wrench>(wrenches),
                    reinterpret_cast<unsigned char*>(awake.numbers)};
-  check(bc_patch_forces_advance(forces_of(self), dt, rows_of<bc_pose>(poses),
-                                rows_of<bc_velocity>(velocities), rows_of<bc_wrench>(outside),
-                                &motion));
+  auto advance = [&](const auto& call, auto... named) {
+    check(call(forces_of(self), dt, rows_of<bc_pose>(poses), rows_of<bc_velocity>(velocities),
+               rows_of<bc_wrench>(outside), named..., &motion));
+  };
+  if (changed.object)
+    advance(bc_patch_forces_advance_changed, changed.numbers, int64_t(changed.length(0)));
+  else
+    advance(bc_patch_forces_advance);
   if (by_wrenches) return wrenches.object.release();
   return pack(&PyTuple_Type, moved, after, wrenches, awake);
 }
@@ -226,10 +232,10 @@ inline PyMethodDef forces_methods[] = {
      "set_boxes(sizes, body, poses)\n--\n\nChange the boxes: (m, 3), (m,), (m, 7); None for the last "
      "two."},
     {"wrenches", method<forces_advance<true>>(), METH_FASTCALL,
-     "wrenches(dt, poses, velocities, outside)\n--\n\nReturn wrenches (n, 6), which move the bodies "
+     "wrenches(dt, poses, velocities, outside, changed)\n--\n\nReturn wrenches (n, 6), which move the bodies "
      "until the next call.\n\nReturn None, and change nothing, where one is no plain array."},
     {"advance", method<forces_advance<false>>(), METH_FASTCALL,
-     "advance(dt, poses, velocities, outside)\n--\n\nReturn poses (n, 7), velocities and wrenches "
+     "advance(dt, poses, velocities, outside, changed)\n--\n\nReturn poses (n, 7), velocities and wrenches "
      "(n, 6), and who is awake (n,).\n\nReturn None, and change nothing, where one is no plain array."},
     {"loads", method<forces_loads>(), METH_NOARGS,
      "loads()\n--\n\nReturn the columns of what each pair carried."},

@@ -170,6 +170,15 @@ BC_API bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, con
                                          const bc_velocity* velocities, const bc_wrench* outside,
                                          const bc_motion* motion);
 
+/* The same, where of the bodies at rest only `count` may be given otherwise than in the last advance: the
+ * others are not compared. Where the poses and velocities in `motion` are those that are given, and it
+ * has no wrenches, their rows are not written either: bodies at rest then take next to no time. */
+BC_API bc_status bc_patch_forces_advance_changed(bc_patch_forces* forces, double dt,
+                                                 const bc_pose* poses,
+                                                 const bc_velocity* velocities,
+                                                 const bc_wrench* outside, const int64_t* changed,
+                                                 int64_t count, const bc_motion* motion);
+
 /* Write what each pair carried in the last advance, by the lower and the higher box, and return how many
  * there are: none if bodies or boxes were changed, or patches forgotten, since. Nothing is written if
  * `capacity` is less. */

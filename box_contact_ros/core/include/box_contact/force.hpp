@@ -131,6 +131,18 @@ class PatchForces {
     advance(dt, poses, velocities, outside,
             {sizeof(bc_motion), poses.data(), velocities.data(), nullptr, awake.data()});
   }
+  // The same, where of the bodies at rest only those of `changed` may be given otherwise than in the last
+  // advance: the others take next to no time.
+  void advance_changed(Span<const std::int64_t> changed, double dt, Span<Pose> poses,
+                       Span<Velocity> velocities, Span<const Wrench> outside = {},
+                       Span<unsigned char> awake = {}) {
+    if (awake.size()) check_count(awake.size());
+    check_rows(poses, velocities, outside);
+    const bc_motion motion{sizeof(bc_motion), poses.data(), velocities.data(), nullptr, awake.data()};
+    detail::check(bc_patch_forces_advance_changed(forces_.get(), dt, poses.data(), velocities.data(),
+                                                  outside.data(), changed.data(),
+                                                  std::int64_t(changed.size()), &motion));
+  }
   // The mean wrenches of contacts, for a simulator that moves the bodies by itself.
   void wrenches(double dt, Span<const Pose> poses, Span<const Velocity> velocities,
                 Span<const Wrench> outside, Span<Wrench> found) {
@@ -158,15 +170,19 @@ class PatchForces {
     if (std::int64_t(count) != bc_patch_forces_bodies(forces_.get()))
       detail::raise(BC_BAD_ARGUMENT, "a row is needed for each body");
   }
+  void check_rows(Span<const Pose> poses, Span<const Velocity> velocities,
+                  Span<const Wrench> outside) const {
+    check_count(poses.size());
+    check_count(velocities.size());
+    if (outside.size()) check_count(outside.size());
+  }
   static void check_column(Span<const double> column, std::size_t count) {
     if (column.size() && column.size() != count)
       detail::raise(BC_BAD_ARGUMENT, "a number is needed for each pair");
   }
   void advance(double dt, Span<const Pose> poses, Span<const Velocity> velocities,
                Span<const Wrench> outside, const bc_motion& motion) {
-    check_count(poses.size());
-    check_count(velocities.size());
-    if (outside.size()) check_count(outside.size());
+    check_rows(poses, velocities, outside);
     detail::check(bc_patch_forces_advance(forces_.get(), dt, poses.data(), velocities.data(),
                                           outside.data(), &motion));
   }

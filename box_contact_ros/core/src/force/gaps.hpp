@@ -32,12 +32,12 @@ class Gaps {
        const std::vector<Patch>& patches, double dt, const bc_wrench* outside)
       : bodies_(bodies), boxes_(boxes), patches_(patches), dt_(dt), outside_(outside) {}
 
-  // No pair that is farther apart is one [m].
-  double farthest() const {
-    double pull = 0.0;
-    for (size_t k = 0; outside_ && k < bodies_.size(); ++k)
-      pull = std::max(pull, length(vector(outside_[k].force)) * bodies_[k].inverse_mass);
-    return std::min(std::max(gap_share * dt_ * dt_ * pull, pressed_gap), length_max);
+  // No pair of a box that is farther apart is one for the sake of this box [m].
+  double around(int32_t box) const {
+    auto body = size_t(boxes_[size_t(box)].body);
+    double pull =
+        outside_ ? length(vector(outside_[body].force)) * bodies_[body].inverse_mass : 0.0;
+    return std::max(gap_share * dt_ * dt_ * pull, pressed_gap);
   }
   // Whether the boxes of a pair are a constraint in the step, though apart at its start: by no more than
   // what the outside wrenches would fall. A gap would else cost each box of a stack a step of free fall.

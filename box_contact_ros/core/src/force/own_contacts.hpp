@@ -43,24 +43,22 @@ class OwnContacts {
     near_.reserve(count());
   }
 
-  // Take the pairs of a question. Where bodies rest, a pair is new until it was solved once, unless
-  // `is_known(pair)` says that its patch rests.
-  enum class Taken { same, others, pair_twice };
-  template <class IsKnown>
-  Taken ask(const bc_patches& asked, double friction, bool is_any_at_rest,
-            const IsKnown& is_known) {
-    auto n = size_t(asked.count);
-    auto is_same = [](const double* column, const std::vector<double>& held, double otherwise) {
-      return column ? std::equal(held.begin(), held.end(), column)
-                    : std::all_of(held.begin(), held.end(),
-                                  [otherwise](double number) { return number == otherwise; });
+  // Whether these pairs are those of the last question, with the same columns.
+  bool is_asked(const bc_patches& pairs) const {
+    auto is_same = [](const double* column, bool is_given, const std::vector<double>& held) {
+      return column ? is_given && std::equal(held.begin(), held.end(), column) : !is_given;
     };
-    if (n > 0 && n == count() &&
-        std::equal(asked.pairs, asked.pairs + 2 * n, asked_.pairs.begin()) &&
-        is_same(asked.friction, asked_.friction, friction) &&
-        is_same(asked.surface, asked_.surface, 0.0) &&
-        is_same(asked.stiffness, asked_.stiffness, 0.0))
-      return Taken::same;
+    return pairs.count > 0 && size_t(pairs.count) == count() && pairs.pairs &&
+           std::equal(asked_.pairs.begin(), asked_.pairs.end(), pairs.pairs) &&
+           is_same(pairs.friction, is_given_.friction, asked_.friction) &&
+           is_same(pairs.surface, is_given_.surface, asked_.surface) &&
+           is_same(pairs.stiffness, is_given_.stiffness, asked_.stiffness);
+  }
+  // Take the pairs of a question. Where bodies rest, a pair is new until it was solved once, unless
+  // `is_known(pair)` says that its patch rests. Returns false, and takes none, if a pair comes twice.
+  template <class IsKnown>
+  bool ask(const bc_patches& asked, double friction, bool is_any_at_rest, const IsKnown& is_known) {
+    auto n = size_t(asked.count);
     next_keys_.clear();
     for (size_t k = 0; k < n; ++k) {
       auto a = int32_t(asked.pairs[2 * k]), b = int32_t(asked.pairs[2 * k + 1]);
@@ -70,11 +68,12 @@ class OwnContacts {
       std::sort(next_keys_.begin(), next_keys_.end());
     auto same = [](const Key& p, const Key& q) { return p.pair == q.pair; };
     if (std::adjacent_find(next_keys_.begin(), next_keys_.end(), same) != next_keys_.end())
-      return Taken::pair_twice;
+      return false;
     resize(n);
     if (is_any_at_rest) note_new(is_known);
     keys_.swap(next_keys_);
     std::copy_n(asked.pairs, 2 * n, asked_.pairs.begin());
+    is_given_ = {asked.friction != nullptr, asked.surface != nullptr, asked.stiffness != nullptr};
     auto copy = [](const double* from, std::vector<double>& to, double otherwise) {
       if (from)
         std::copy_n(from, to.size(), to.begin());
@@ -84,7 +83,7 @@ class OwnContacts {
     copy(asked.friction, asked_.friction, friction);
     copy(asked.surface, asked_.surface, 0.0);
     copy(asked.stiffness, asked_.stiffness, 0.0);
-    return Taken::others;
+    return true;
   }
   // Whether the pair of a patch is asked for, with the numbers of the patch.
   bool is_asked(const Patch& patch) const {
@@ -143,7 +142,7 @@ class OwnContacts {
     auto* numbers = reinterpret_cast<const double*>(poses_.data());
     auto* sizes = reinterpret_cast<const double*>(sizes_.data());
     detail::Rows rows{numbers, numbers, sizes, sizes, 3, 3, live.pairs.data(), long(boxes_.size())};
-    long refused = solve(rows, long(live.count()), found_.results(gaps.farthest()));
+    long refused = solve(rows, long(live.count()), found_.results(farthest(gaps)));
     if (refused < 0) refused = solve_near(gaps, solve);
     return refused < 0 || is_all_ ? refused : long(rows_[size_t(refused)]);
   }
@@ -275,6 +274,13 @@ class OwnContacts {
     make_room();
   }
   const Pairs& chosen() const { return is_all_ ? asked_ : live_; }
+  // No pair that is solved, and farther apart, is a constraint [m].
+  double farthest(const Gaps& gaps) const {
+    double most = 0.0;
+    for (size_t k = 0, n = is_all_ ? boxes_.size() : placed_.size(); k < n; ++k)
+      most = std::max(most, gaps.around(int32_t(is_all_ ? k : placed_[k])));
+    return std::min(most, length_max);
+  }
   // Note which of the next keys are not among the last ones.
   template <class IsKnown>
   void note_new(const IsKnown& is_known) {
@@ -320,6 +326,9 @@ class OwnContacts {
   std::vector<bc_size> sizes_;  // of the boxes
   std::vector<bc_pose> poses_;  // of the boxes, in the common frame
   Pairs asked_;
+  struct {
+    bool friction, surface, stiffness;
+  } is_given_{};  // which columns of them were, and do not have the number that stands for none
   std::vector<uint8_t> is_new_;  // of them
   bool is_any_new_ = false;
   // Those that are solved, by pair, unless all are.

@@ -128,13 +128,14 @@ class PatchForces {
     clock_.answer(answer.age, answer.period);
     return held;
   }
+  // Whether contacts of one's own are those of these pairs already.
+  bool holds(const bc_patches& pairs) const { return own_.is_asked(pairs); }
   // Take pairs whose contacts are solved at the start of each advance. Impulses stay.
   Held hold(const bc_patches& pairs) {
-    auto taken = own_.ask(pairs, options_.friction, rest_.is_any(),
-                          [this](const BoxPair& pair) { return rest_.has(pair); });
-    if (taken == OwnContacts::Taken::pair_twice) return Held::pair_twice;
+    if (!own_.ask(pairs, options_.friction, rest_.is_any(),
+                  [this](const BoxPair& pair) { return rest_.has(pair); }))
+      return Held::pair_twice;
     clock_.answer_each_step();
-    if (taken == OwnContacts::Taken::same) return Held::all;
     is_chosen_ = false;
     make_room(own_.count());
     rest_.mark_if([this](const Patch& patch) { return !own_.is_asked(patch); });
@@ -165,15 +166,14 @@ class PatchForces {
   // chunks of work among threads. Returns −1, or a body whose numbers are not finite at the end: then
   // all is as it was at the last `keep`.
   template <class InThreads>
-  int64_t advance(double dt, const bc_pose* poses, const bc_velocity* velocities,
-                  const bc_wrench* outside, const bc_motion& motion, SolvePair solve_pair,
+  int64_t advance(double dt, const Given& given, const bc_motion& motion, SolvePair solve_pair,
                   const InThreads& in_threads) {
     bc_motion all = motion;
     if (!all.poses) all.poses = poses_.data();
     Advance step{clock_.begin(dt, options_.substeps),
-                 poses,
-                 velocities,
-                 outside,
+                 given.poses,
+                 given.velocities,
+                 given.outside,
                  all,
                  moves_by_wrenches_,
                  own_.count() > 0 ? &own_ : nullptr,
@@ -194,17 +194,19 @@ class PatchForces {
     loads_.resize(patches_.size());
     are_loads_known_ = true;
     window_ = step.steps.window;
-    Given given{poses, velocities, outside};
     bool is_resting =
         options_.rest_speed > 0.0 && motion.poses && motion.velocities &&
         rest_.count(islands_, bodies_, patches_, given, step.steps, options_.rest_speed);
-    rest_.end(poses, dt);
+    rest_.end(given.poses, dt);
     islands.write_ends();
     for (int32_t k : rest_.fixed()) islands.move_alone(size_t(k));
+    if (is_resting) rest_.write_new_ends(all);
+    if (motion.poses) each_read([&](size_t k) { poses_[k] = motion.poses[k]; });
     if (is_resting) lay_down();
-    rest_.write_ends(all);
+    bool is_in_place = motion.poses == given.poses && motion.velocities == given.velocities;
+    if (!is_in_place || motion.wrenches) rest_.write_ends(all);
+    if (motion.awake) rest_.write_awake(motion.awake);
     if (own_.settle()) is_chosen_ = false;
-    if (motion.poses) std::copy_n(motion.poses, bodies_.size(), poses_.data());
     clock_.end(dt);
     moves_by_wrenches_ = motion.wrenches && !motion.poses && !motion.velocities;
     return -1;
@@ -218,17 +220,17 @@ class PatchForces {
   }
   // Wake what rests and is not given as it was, before an advance. One that gives the wrenches alone
   // moves all bodies.
-  void rouse(const bc_pose* poses, const bc_velocity* velocities, const bc_wrench* outside,
-             const bc_motion& motion) {
+  void rouse(const Given& given, const Changed& changed, const bc_motion& motion) {
     if (!(motion.poses && motion.velocities)) rest_.mark_all();
-    if (rest_.compare({poses, velocities, outside})) is_chosen_ = false;
+    if (rest_.compare(given, changed)) is_chosen_ = false;
     wake();
   }
-  bool is_as_laid(size_t body, const bc_pose* poses, const bc_velocity* velocities,
-                  const bc_wrench* outside) const {
-    return rest_.is_as_laid(body, {poses, velocities, outside});
+  // The bodies whose rows an advance reads: all but those at rest.
+  template <class Visit>
+  void each_read(const Visit& visit) const {
+    for (const auto* bodies : {&rest_.awake(), &rest_.fixed()})
+      for (int32_t body : *bodies) visit(size_t(body));
   }
-  bool is_awake(size_t body) const { return !rest_.is_quiet(body); }
 
  private:
   // Wake the islands that are marked.

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "given.hpp"
 #include "rest_conditions.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
@@ -23,13 +24,6 @@ constexpr double calm_share = 0.1;
 constexpr double settled_gap = 1e-5;
 // What is awake rests since then [s].
 constexpr double never = -1e300;
-
-// What an advance is given of each body.
-struct Given {
-  const bc_pose* poses;
-  const bc_velocity* velocities;
-  const bc_wrench* outside;  // none: no wrenches
-};
 
 // Move rows to others, where `goes(place)`. Both are by pair, and there is room.
 template <class Row, class Goes>
@@ -60,15 +54,6 @@ class Rest {
   bool is_at_rest(size_t body) const { return of_[body].island >= 0; }
   // Whether a body is where it was, and stays there.
   bool is_quiet(size_t body) const { return is_at_rest(body) || of_[body].is_fixed_still; }
-  // Whether all that is given of a body at rest is as it was when it was laid down, to the bit.
-  bool is_as_laid(size_t k, const Given& given) const {
-    const OfBody& of = of_[k];
-    constexpr bc_velocity none{};
-    constexpr bc_wrench no_wrench{};
-    return of.island >= 0 && have_same_bits(of.pose, given.poses[k]) &&
-           have_same_bits(none, given.velocities[k]) &&
-           have_same_bits(of.outside, given.outside ? given.outside[k] : no_wrench);
-  }
 
   void make_room(size_t bodies, size_t patches) {
     patches_.reserve(patches);
@@ -132,10 +117,12 @@ class Rest {
 
   // Mark what is given otherwise than when it was laid down, and what lies on a body that no force
   // moves, and that moves. Returns whether other bodies of mass 0 move than lately.
-  bool compare(const Given& given) {
-    if (is_any())
-      for (size_t k = 0; k < of_.size(); ++k)
-        if (is_at_rest(k) && !is_as_laid(k, given)) mark(k);
+  bool compare(const Given& given, const Changed& changed) {
+    size_t count = !is_any() ? 0 : changed.is_known ? size_t(changed.count) : of_.size();
+    for (size_t k = 0; k < count; ++k) {
+      size_t body = changed.is_known ? size_t(changed.bodies[k]) : k;
+      if (is_at_rest(body) && !is_as_laid(body, given)) mark(body);
+    }
     bool is_other = false, is_bearing = false;
     for (int32_t body : fixed_) {
       OfBody& of = of_[size_t(body)];
@@ -232,15 +219,21 @@ class Rest {
     hand_over(patches, patches_, goes);
     list(bodies);
   }
-  // Write where bodies at rest end.
+  // Write where bodies end that come to rest, before they are laid down.
+  void write_new_ends(const bc_motion& motion) const {
+    for (int32_t body : awake_)
+      if (is_at_rest(size_t(body))) write_end(size_t(body), motion);
+  }
+  // Write where all bodies at rest end.
   void write_ends(const bc_motion& motion) const {
-    for (size_t k = 0; k < of_.size(); ++k) {
-      if (!is_at_rest(k)) continue;
-      const OfBody& of = of_[k];
-      motion.poses[k] = of.pose;
-      if (motion.velocities) motion.velocities[k] = {};
-      if (motion.wrenches) motion.wrenches[k] = of.wrench;
-    }
+    for (size_t k = 0; k < of_.size(); ++k)
+      if (is_at_rest(k)) write_end(k, motion);
+  }
+  // Write which bodies are awake.
+  void write_awake(unsigned char* is_awake) const {
+    std::fill_n(is_awake, of_.size(), static_cast<unsigned char>(0));
+    for (int32_t body : awake_) is_awake[body] = 1;
+    for (int32_t body : fixed_) is_awake[body] = !of_[size_t(body)].is_fixed_still;
   }
   // End an advance: keep where the bodies that no force moves were given.
   void end(const bc_pose* poses, double dt) {
@@ -263,6 +256,20 @@ class Rest {
     double slow_time = 0.0;  // for how long its island was slow [s]
     double least = 0.0;      // the least square of its speed since then [m²/s²]
   };
+
+  // Whether all that is given of a body at rest is as it was when it was laid down, to the bit.
+  bool is_as_laid(size_t k, const Given& given) const {
+    const OfBody& of = of_[k];
+    constexpr bc_velocity none{};
+    constexpr bc_wrench no_wrench{};
+    return have_same_bits(of.pose, given.poses[k]) && have_same_bits(none, given.velocities[k]) &&
+           have_same_bits(of.outside, given.outside ? given.outside[k] : no_wrench);
+  }
+  void write_end(size_t k, const bc_motion& motion) const {
+    motion.poses[k] = of_[k].pose;
+    if (motion.velocities) motion.velocities[k] = {};
+    if (motion.wrenches) motion.wrenches[k] = of_[k].wrench;
+  }
 
   // Whether an answer says of a patch at rest what was known. The first one is of poses a little other
   // than those of the patch.

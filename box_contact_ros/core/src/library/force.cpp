@@ -46,6 +46,35 @@ bc_status solve_own(PatchForces& self, double dt, const bc_pose* poses, const bc
   return explain(held);
 }
 
+bc_status advance(bc_patch_forces* forces, double dt, const Given& given, const Changed& changed,
+                  const bc_motion* motion) {
+  if (!forces || !motion) return refuse_null(forces ? "motion" : "forces");
+  PatchForces& self = forces_of(forces);
+  if (!self.bodies().empty() && !(given.poses && given.velocities))
+    return refuse_null(given.poses ? "velocities" : "poses");
+  bc_motion all{};
+  if (!read(motion, all)) return fail(BC_BAD_ABI, "motion.size is unknown");
+  if (bc_status status = check_step(dt)) return status;
+  if (bc_status status = check_changed(changed, self.bodies().size())) return status;
+  self.keep();
+  self.rouse(given, changed, all);
+  bc_status status = check_given(self, given);
+  if (!status) status = solve_own(self, dt, given.poses, given.outside);
+  if (status) {
+    self.restore();
+    return status;
+  }
+  int64_t lost = self.advance(
+      dt, given, all, solve_exactly,
+      [](long threads, long chunks, const auto& work) { in_threads(threads, chunks, work); });
+  if (lost < 0) return BC_OK;
+  return fail(
+      BC_BAD_ARGUMENT,
+      "bodies[%lld]: in a step of %g s its numbers leave the range of float64; try a shorter "
+      "step, or a larger mass and inertia",
+      (long long)lost, dt);
+}
+
 }  // namespace
 }  // namespace box_contact::detail
 
@@ -144,6 +173,7 @@ bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches* answer
     if (!read(answer, all)) return fail(BC_BAD_ABI, "answer.size is unknown");
     PatchForces& self = forces_of(forces);
     if (all.separation && !poses && !self.bodies().empty()) return refuse_null("poses");
+    if (!all.separation && self.holds(all)) return BC_OK;
     if (bc_status status = check_answer(all, self, poses)) return status;
     return explain(all.separation ? self.hold(all, poses) : self.hold(all));
   });
@@ -153,29 +183,16 @@ bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, const bc_p
                                   const bc_velocity* velocities, const bc_wrench* outside,
                                   const bc_motion* motion) {
   return guarded([&] {
-    if (!forces || !motion) return refuse_null(forces ? "motion" : "forces");
-    size_t bodies = forces_of(forces).bodies().size();
-    if (bodies > 0 && !(poses && velocities)) return refuse_null(poses ? "velocities" : "poses");
-    bc_motion all{};
-    if (!read(motion, all)) return fail(BC_BAD_ABI, "motion.size is unknown");
-    PatchForces& self = forces_of(forces);
-    if (bc_status status = check_step(self, dt, poses, velocities, outside)) return status;
-    self.keep();
-    self.rouse(poses, velocities, outside, all);
-    if (bc_status status = solve_own(self, dt, poses, outside)) {
-      self.restore();
-      return status;
-    }
-    int64_t lost = self.advance(
-        dt, poses, velocities, outside, all, solve_exactly,
-        [](long threads, long chunks, const auto& work) { in_threads(threads, chunks, work); });
-    for (size_t k = 0; lost < 0 && all.awake && k < bodies; ++k) all.awake[k] = self.is_awake(k);
-    if (lost < 0) return BC_OK;
-    return fail(
-        BC_BAD_ARGUMENT,
-        "bodies[%lld]: in a step of %g s its numbers leave the range of float64; try a shorter "
-        "step, or a larger mass and inertia",
-        (long long)lost, dt);
+    return advance(forces, dt, {poses, velocities, outside}, {false, nullptr, 0}, motion);
+  });
+}
+
+bc_status bc_patch_forces_advance_changed(bc_patch_forces* forces, double dt, const bc_pose* poses,
+                                          const bc_velocity* velocities, const bc_wrench* outside,
+                                          const int64_t* changed, int64_t count,
+                                          const bc_motion* motion) {
+  return guarded([&] {
+    return advance(forces, dt, {poses, velocities, outside}, {true, changed, count}, motion);
   });
 }
 

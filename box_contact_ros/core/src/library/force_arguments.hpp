@@ -15,6 +15,8 @@
 namespace box_contact::detail {
 
 using force::Body;
+using force::Changed;
+using force::Given;
 using force::PatchForces;
 
 inline bool is_amount_at(const double* numbers, int64_t k) {  // none is as good
@@ -188,22 +190,30 @@ inline bc_status read_boxes(const bc_body_box* given, int64_t count, size_t bodi
   return BC_OK;
 }
 
-// What is given as it was when a body was laid down was checked then.
-inline bc_status check_step(const PatchForces& self, double dt, const bc_pose* poses,
-                            const bc_velocity* velocities, const bc_wrench* outside) {
-  if (!(dt >= force::step_min && dt < force::step_limit))
-    return fail(BC_BAD_ARGUMENT, "dt must be at least 1e-50 s and below 1 s, not %g", dt);
-  auto* speeds = reinterpret_cast<const double*>(velocities);
-  auto* loads = reinterpret_cast<const double*>(outside);
-  for (size_t k = 0; k < self.bodies().size(); ++k) {
-    if (self.is_as_laid(k, poses, velocities, outside)) continue;
-    bc_status status = check_pose(k, poses[k]);
-    if (!status) status = check_within("velocities", k, speeds + 6 * k, 6, force::speed_max);
-    if (!status && outside)
-      status = check_within("wrenches", k, loads + 6 * k, 6, force::wrench_max);
-    if (status) return status;
-  }
+inline bc_status check_step(double dt) {
+  if (dt >= force::step_min && dt < force::step_limit) return BC_OK;
+  return fail(BC_BAD_ARGUMENT, "dt must be at least 1e-50 s and below 1 s, not %g", dt);
+}
+inline bc_status check_changed(const Changed& changed, size_t bodies) {
+  if (!changed.bodies && changed.count > 0) return refuse_null("changed");
+  for (int64_t k = 0; k < changed.count; ++k)
+    if (changed.bodies[k] < 0 || size_t(changed.bodies[k]) >= bodies)
+      return fail(BC_BAD_ARGUMENT, "changed[%lld]: there is no body %lld", (long long)k,
+                  (long long)changed.bodies[k]);
   return BC_OK;
+}
+// What is given as it was when a body was laid down was checked then.
+inline bc_status check_given(const PatchForces& self, const Given& given) {
+  auto* speeds = reinterpret_cast<const double*>(given.velocities);
+  auto* loads = reinterpret_cast<const double*>(given.outside);
+  bc_status status = BC_OK;
+  self.each_read([&](size_t k) {
+    if (!status) status = check_pose(k, given.poses[k]);
+    if (!status) status = check_within("velocities", k, speeds + 6 * k, 6, force::speed_max);
+    if (!status && loads)
+      status = check_within("wrenches", k, loads + 6 * k, 6, force::wrench_max);
+  });
+  return status;
 }
 
 }  // namespace box_contact::detail
