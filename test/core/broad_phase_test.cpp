@@ -52,12 +52,16 @@ int count_wrong_answers() {
   const int count = 200;
   std::mt19937 random(7);
   auto below = [&random](int limit) { return int(random() % unsigned(limit)); };
+  auto place = [](int k) {
+    return bc_pose{{1.01 * (k % 10), 1.01 * (k / 10), 0.0}, {0.0, 0.0, 0.0, 1.0}};
+  };
+  auto one_that_moves = [&below] { return 1 + 5 * below(40) + below(4); };
   std::vector<bc_size> sizes(count, {{1.0, 1.0, 1.0}});
   std::vector<bc_pose> poses(count);
   std::unique_ptr<bool[]> fixed(new bool[count]);
   std::vector<int32_t> groups(count);
   for (int k = 0; k < count; ++k) {
-    poses[k] = {{1.01 * (k % 10), 1.01 * (k / 10), 0.0}, {0.0, 0.0, 0.0, 1.0}};
+    poses[k] = place(k);
     fixed[k] = k % 5 == 0;
     groups[k] = k % 7 != 0;  // the others are in listed pairs alone
   }
@@ -75,23 +79,24 @@ int count_wrong_answers() {
   for (int tick = 0; tick < 3000; ++tick) {
     changed.clear();
     for (int turn = below(4); turn > 0; --turn) {
-      int k = 1 + 5 * below(40) + below(4);
+      int k = one_that_moves();
       changed.insert(changed.end(), 1 + size_t(below(2)), k);
-      poses[k].position[0] = 1.01 * (k % 10) + 1e-3 * below(tick % 2 ? 20 : 2000);
-      double* w = &poses[k].quaternion[3];
-      *w = 1.0;
+      poses[k] = place(k);
+      poses[k].position[0] += 1e-3 * below(tick % 2 ? 20 : 2000);
       if (below(20) == 0) std::fill_n(poses[k].position, 7, NAN);
-      if (below(60) == 0) *w = 0.0;
       if (below(20)) continue;
       bc_size size = {{1.0 + 0.1 * below(5), 1.0, 1.0}};
+      k = one_that_moves();
       wrong += bc_broad_phase_resize(told, k, &size) || bc_broad_phase_resize(other, k, &size);
     }
+    int bad = below(20) || changed.empty() ? -1 : int(changed[0]);
+    if (bad >= 0) poses[bad].quaternion[3] = 0.0;
     int64_t most = below(10) ? INT64_MAX : 100;
     bc_status status = bc_broad_phase_find(other, poses.data(), most, &by_all);
     wrong += bc_broad_phase_find_changed(told, poses.data(), changed.data(),
                                          int64_t(changed.size()), most, &by_names) != status;
-    for (int k = 0; k < count; ++k)
-      if (poses[k].quaternion[3] == 0.0) poses[k].quaternion[3] = 1.0;
+    wrong += (status != BC_OK) != (bad >= 0);
+    if (bad >= 0) poses[bad] = place(bad);
     if (status) continue;
     if (by_all.count > most) {  // which of them were found first is nobody's
       wrong += by_names.count <= most;
