@@ -20,7 +20,7 @@ many pairs are in contact; the boxes of stale pairs, as `Answer.stale` has them.
 
 
 class TickWriter:
-    """Answers the ticks of one scene, each in one call of the core (tick_writer.hpp)."""
+    """Answers the ticks of one scene, each in one call of the core (write_contacts.hpp)."""
 
     def __init__(self, solver: SceneSolver, topics: Mapping[tuple[str, str], Any]) -> None:
         """Take what solves the scene, and whatever stands for the topics of pairs of boxes."""

@@ -11,7 +11,7 @@
 #include "patch_area.hpp"
 #include "pose_faults.hpp"
 #include "read_pose.hpp"
-#include "tick_writer.hpp"
+#include "write_contacts.hpp"
 
 namespace {
 

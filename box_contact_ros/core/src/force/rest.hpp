@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "given.hpp"
+#include "advance_inputs.hpp"
 #include "rest_conditions.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {

@@ -287,7 +287,7 @@ inline PyType_Slot tick_writer_slots[] = {
      const_cast<char*>("TickWriter(broad_phase, solver, margin, most_near, sizes, poses, moving, "
                        "bodies, local, names, listed, labels, watched, topics, frame_id, revision)"
                        "\n--\n\n"
-                       "Answer ticks of a scene as the bytes of messages; see tick_writer.hpp.")},
+                       "Answer ticks of a scene as the bytes of messages; see write_contacts.hpp.")},
     {Py_tp_new, slot<tick_writer_new>()},
     {Py_tp_dealloc, reinterpret_cast<void*>(Holder<TickWriter>::dealloc)},
     {Py_tp_call, slot<tick_writer_call>()},
