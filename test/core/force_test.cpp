@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <vector>
 
 #include "allocations.hpp"
 
@@ -48,6 +49,55 @@ int count_faults_at_rest() {
   return faults + (!awake[0] || awake[1] || !(velocities[0].linear[0] > 0.0));
 }
 
+// Boxes that rest by answers of others wake all at once, after an answer of as many more: there is room.
+int count_faults_of_waking() {
+  const int half = 20, count = 2 * half + 1;
+  std::vector<Body> bodies(count, {12.0, {2.0, 2.0, 2.0}});
+  std::vector<Pose> poses(count);
+  std::vector<Velocity> velocities(count);
+  std::vector<Wrench> outside(count);
+  std::vector<unsigned char> awake(count);
+  bodies[0] = {0.0, {0.0, 0.0, 0.0}};
+  poses[0] = {{0.0, 0.0, -0.5}, {0.0, 0.0, 0.0, 1.0}};
+  for (int k = 1; k < count; ++k) {
+    poses[size_t(k)] = {{2.0 * k, 0.0, 0.4999}, {0.0, 0.0, 0.0, 1.0}};
+    outside[size_t(k)].force[2] = k <= half ? -120.0 : 0.0;
+  }
+  PatchForces forces(bodies);
+  auto hold = [&](int last) {
+    std::vector<std::int64_t> pairs;
+    std::vector<Contact> found;
+    for (int k = 1; k <= last; ++k) {
+      const Pose& at = poses[size_t(k)];
+      pairs.insert(pairs.end(), {0, k});
+      found.push_back(collide({poses[0], {200.0, 200.0, 1.0}}, {at, {1.0, 1.0, 1.0}}));
+    }
+    std::vector<double> separation, normal, point, volume, covariance;
+    for (const Contact& contact : found) {
+      separation.push_back(contact.separation);
+      volume.push_back(contact.volume);
+      normal.insert(normal.end(), contact.normal, contact.normal + 3);
+      point.insert(point.end(), contact.point, contact.point + 3);
+      covariance.insert(covariance.end(), contact.covariance[0], contact.covariance[0] + 9);
+    }
+    Results results;
+    results.separation = separation.data(), results.normal = normal.data();
+    results.point = point.data(), results.volume = volume.data();
+    results.covariance = covariance.data();
+    forces.hold(Patches(pairs, results), poses);
+  };
+  for (int step = 0; step < 1000; ++step) {
+    hold(half);
+    forces.advance(0.001, poses, velocities, outside, awake);
+  }
+  int faults = awake[1] || awake[half];
+  hold(2 * half);
+  for (int k = 1; k < count; ++k) outside[size_t(k)].force[0] = 1.0;
+  const long before = allocations;
+  forces.advance(0.001, poses, velocities, outside, awake);
+  return faults + (allocations != before || !awake[1] || !awake[2 * half]);
+}
+
 }  // namespace
 
 int main() {
@@ -61,7 +111,7 @@ int main() {
   Wrench outside[2] = {{{0.0, 0.0, -9.81 * 20000.0}, {}}, {}}, wrenches[2];
   Contact contact{};
   const std::int64_t pair[2] = {0, 1};
-  int failures = count_faults_at_rest();
+  int failures = count_faults_at_rest() + count_faults_of_waking();
   for (int step = 0; step < 2000; ++step) {
     long before = allocations;
     if (step % 5 == 0) {

@@ -78,7 +78,7 @@ class PatchForces {
     rest_.change_bodies(bodies_, is_changed);
     is_chosen_ = false;
     auto count = int32_t(bodies_.size());
-    make_room(patches_.size());
+    make_room(patches_.size() + rest_.patches().size());
     drop([this, count](const Patch& patch) {
       return !is_of_boxes(patch) || std::max(patch.a, patch.b) >= count || !moves(patch.a, patch.b);
     });
@@ -320,7 +320,7 @@ class PatchForces {
     keep_impulses(patches_, next_);
     patches_.swap(next_);
     is_grouped_ = false;
-    make_room(patches_.size());
+    make_room(patches_.size() + rest_.patches().size());
     return Held::all;
   }
 
