@@ -32,6 +32,8 @@ class OwnContacts {
   }
   void forget() {
     keys_.clear();
+    is_new_.clear();
+    is_any_new_ = false;
     resize(0);
   }
 
@@ -69,8 +71,8 @@ class OwnContacts {
     auto same = [](const Key& p, const Key& q) { return p.pair == q.pair; };
     if (std::adjacent_find(next_keys_.begin(), next_keys_.end(), same) != next_keys_.end())
       return false;
+    note_new(is_any_at_rest, is_known);
     resize(n);
-    if (is_any_at_rest) note_new(is_known);
     keys_.swap(next_keys_);
     std::copy_n(asked.pairs, 2 * n, asked_.pairs.begin());
     is_given_ = {asked.friction != nullptr, asked.surface != nullptr, asked.stiffness != nullptr};
@@ -267,8 +269,6 @@ class OwnContacts {
 
   void resize(size_t n) {
     asked_.resize(n);
-    is_new_.assign(n, 0);
-    is_any_new_ = false;
     is_all_ = true;
     found_.resize(n);
     make_room();
@@ -281,16 +281,20 @@ class OwnContacts {
       most = std::max(most, gaps.around(int32_t(is_all_ ? k : placed_[k])));
     return std::min(most, length_max);
   }
-  // Note which of the next keys are not among the last ones.
+  // Note which of the next keys are not among the last ones, or are new there.
   template <class IsKnown>
-  void note_new(const IsKnown& is_known) {
+  void note_new(bool is_any_at_rest, const IsKnown& is_known) {
+    next_is_new_.assign(next_keys_.size(), 0);
+    is_any_new_ = false;
     auto last = keys_.begin();
     for (const Key& key : next_keys_) {
-      while (last != keys_.end() && *last < key) ++last;
-      bool is_new = !(last != keys_.end() && last->pair == key.pair) && !is_known(key.pair);
-      is_new_[key.row] = is_new;
-      is_any_new_ = is_any_new_ || is_new;
+      if (!is_any_at_rest) break;
+      while (last != keys_.end() && last->pair < key.pair) ++last;
+      bool was_asked = last != keys_.end() && last->pair == key.pair && !is_new_[last->row];
+      next_is_new_[key.row] = !was_asked && !is_known(key.pair);
+      is_any_new_ = is_any_new_ || next_is_new_[key.row];
     }
+    is_new_.swap(next_is_new_);
   }
   template <class Solve>
   long solve_near(const Gaps& gaps, const Solve& solve) {
@@ -329,7 +333,7 @@ class OwnContacts {
   struct {
     bool friction, surface, stiffness;
   } is_given_{};  // which columns of them were, and do not have the number that stands for none
-  std::vector<uint8_t> is_new_;  // of them
+  std::vector<uint8_t> is_new_, next_is_new_;  // of them
   bool is_any_new_ = false;
   // Those that are solved, by pair, unless all are.
   bool is_all_ = true;
