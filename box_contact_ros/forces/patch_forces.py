@@ -290,8 +290,8 @@ class PatchForces:
         """Return where the bodies are after a step of `dt` [s], and what contacts did.
 
         poses, velocities: at its start. wrenches: all but those of contacts, gravity among them.
-        changed: (k,) those bodies at rest that may be given otherwise than in the last step: the
-        others are not compared. None: all may be.
+        changed: (k,) those bodies at rest that may be given otherwise than at the end of the last
+        step: the others are not compared. None: all may be.
         Call `advance` once a step. Steps of less than 1 s may differ in length.
         ValueError: names field and value; nothing changes then.
         """

@@ -108,6 +108,8 @@ int count_wrong_answers() {
   }
   int64_t none[] = {count};
   wrong += bc_broad_phase_find_changed(told, poses.data(), none, 1, 1, &by_names) != BC_BAD_ROWS;
+  wrong +=
+      bc_broad_phase_find_changed(told, poses.data(), none, -1, 1, &by_names) != BC_BAD_ARGUMENT;
   bc_broad_phase_destroy(told);
   bc_broad_phase_destroy(other);
   std::printf("%d wrong answers\n", wrong);

@@ -107,6 +107,9 @@ static void check_rest(void) {
       check(!bc_patch_forces_advance(forces, 1 / 240.0, poses, velocities, outside, &motion),
             "advance");
     check(awake[0] == !rest && awake[1] == 0, "awake");
+    check(bc_patch_forces_advance_changed(forces, 1 / 240.0, poses, velocities, outside, places, -1,
+                                          &motion) == BC_BAD_ARGUMENT,
+          "a count below 0");
     bc_load load;
     check(bc_patch_forces_loads(forces, &load, 1) == 1, "loads");
     check(fabs(load.pressing - 49.05) < 1e-3, "pressing");

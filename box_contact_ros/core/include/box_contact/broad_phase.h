@@ -74,8 +74,9 @@ BC_API bc_status bc_broad_phase_take_fixed(bc_broad_phase* broad_phase,
 BC_API bc_status bc_broad_phase_find(bc_broad_phase* broad_phase, const bc_pose* poses,
                                      int64_t most, bc_near* near);
 
-/* The same, where only the poses of `count` boxes may be others than in the last call: no other pose is
- * read. After a call that was refused, or ended with more than `most` pairs, all are. */
+/* The same, where only the poses of the `count` boxes in `changed` may be others than in the last call.
+ * The others are not read. All are after a resize, and after a call that was refused or ended with more
+ * than `most` pairs. */
 BC_API bc_status bc_broad_phase_find_changed(bc_broad_phase* broad_phase, const bc_pose* poses,
                                              const int64_t* changed, int64_t count, int64_t most,
                                              bc_near* near);

@@ -170,9 +170,10 @@ BC_API bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, con
                                          const bc_velocity* velocities, const bc_wrench* outside,
                                          const bc_motion* motion);
 
-/* The same, where of the bodies at rest only `count` may be given otherwise than in the last advance: the
- * others are not compared. Where the poses and velocities in `motion` are those that are given, and it
- * has no wrenches, their rows are not written either: bodies at rest then take next to no time. */
+/* The same, where of the bodies at rest only the `count` in `changed` may have another pose, velocity or
+ * outside wrench than at the end of the last advance that was not refused: the others are not compared.
+ * Where `motion` has the very arrays of poses and velocities that are given, and no wrenches, rows at
+ * rest are not written either: they then take next to no time. */
 BC_API bc_status bc_patch_forces_advance_changed(bc_patch_forces* forces, double dt,
                                                  const bc_pose* poses,
                                                  const bc_velocity* velocities,

@@ -131,8 +131,8 @@ class PatchForces {
     advance(dt, poses, velocities, outside,
             {sizeof(bc_motion), poses.data(), velocities.data(), nullptr, awake.data()});
   }
-  // The same, where of the bodies at rest only those of `changed` may be given otherwise than in the last
-  // advance: the others take next to no time.
+  // The same, where of the bodies at rest only those of `changed` may be given otherwise than at the end
+  // of the last advance: the other bodies at rest take next to no time.
   void advance_changed(Span<const std::int64_t> changed, double dt, Span<Pose> poses,
                        Span<Velocity> velocities, Span<const Wrench> outside = {},
                        Span<unsigned char> awake = {}) {

@@ -128,6 +128,8 @@ bc_status check_search(const BroadPhase& self, const bc_pose* poses, int64_t mos
 }
 
 bc_status check_changed(const int64_t* changed, int64_t count, int64_t boxes) {
+  if (count < 0)
+    return fail(BC_BAD_ARGUMENT, "count must be 0 or more, not %lld", (long long)count);
   if (!changed && count > 0) return refuse_null("changed");
   for (int64_t k = 0; k < count; ++k)
     if (!is_box(changed[k], boxes))

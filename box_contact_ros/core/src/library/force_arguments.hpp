@@ -195,6 +195,8 @@ inline bc_status check_step(double dt) {
   return fail(BC_BAD_ARGUMENT, "dt must be at least 1e-50 s and below 1 s, not %g", dt);
 }
 inline bc_status check_changed(const Changed& changed, size_t bodies) {
+  if (changed.count < 0)
+    return fail(BC_BAD_ARGUMENT, "count must be 0 or more, not %lld", (long long)changed.count);
   if (!changed.bodies && changed.count > 0) return refuse_null("changed");
   for (int64_t k = 0; k < changed.count; ++k)
     if (changed.bodies[k] < 0 || size_t(changed.bodies[k]) >= bodies)
