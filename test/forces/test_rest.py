@@ -379,6 +379,25 @@ def test_a_step_that_is_refused_wakes_nobody(torque: float, twins: tuple[World, 
         assert world.step(DT).poses.tobytes() == twin.step(DT).poses.tobytes()
 
 
+@pytest.mark.parametrize('torque', [np.nan, 1e100])
+@pytest.mark.parametrize('change', [hold, others])
+def test_a_step_that_is_refused_changes_no_patch(change: Callable[[World], None], torque: float,
+                                                 twins: tuple[World, World]) -> None:
+    """Where all is awake, with contacts of one's own and with answers."""
+    world, twin = deepcopy(twins[1]), deepcopy(twins[1])
+    for each in (world, twin):
+        change(each)
+        push(each, TOP, 20, 0, 0, 0, 0, 2)
+        each.run(0.1, DT)
+    wild = world.outside.copy()
+    wild[FLOATING, 3:] = torque
+    for _ in range(3):
+        with pytest.raises(ValueError):
+            world.forces.advance(3 * DT, world.poses, world.velocities, wild)
+    for _ in range(20):
+        assert world.step(DT).poses.tobytes() == twin.step(DT).poses.tobytes()
+
+
 def test_threads_and_order_of_pairs_change_no_bit() -> None:
     found = set()
     for threads, order in ((1, 1), (2, 1), (1, -1)):

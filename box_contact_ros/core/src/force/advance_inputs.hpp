@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "../../include/box_contact/force.h"
+#include "../lanes/target.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "advance_inputs.hpp"
 #include "carriers.hpp"
 #include "clock.hpp"
 #include "closing.hpp"
@@ -39,9 +40,7 @@ struct Ended {
 // What an advance begins with, and where its end goes.
 struct Advance {
   SubSteps steps;
-  const bc_pose* poses;
-  const bc_velocity* velocities;
-  const bc_wrench* outside;
+  Given given;
   const bc_motion& motion;
   bool came_by_wrenches;   // whether those of the last advance moved the bodies
   const OwnContacts* own;  // none: contacts are those of an answer
@@ -63,7 +62,7 @@ class IslandStep {
         moving_(islands.moving),
         blocks_(islands.blocks),
         fineness_(fineness),
-        fineness_of_(bodies, step.outside, options.most_depth, patches, islands) {}
+        fineness_of_(bodies, step.given.outside, options.most_depth, patches, islands) {}
 
   void advance(const Chunk& chunk) const {
     for (Island& island : islands_.of(chunk)) begin(island);
@@ -86,14 +85,14 @@ class IslandStep {
 
   // A body that no force moves goes on by its velocity. One that rests keeps its pose to the bit.
   void move_alone(size_t k) const {
-    const bc_velocity velocity = step_.velocities[k];
+    const bc_velocity velocity = step_.given.velocities[k];
     const bc_motion& motion = step_.motion;
     ended_[k] = {ended_[k].relaxed, {vector(velocity.linear), vector(velocity.angular)}};
     if (motion.velocities) motion.velocities[k] = velocity;
     if (motion.wrenches) motion.wrenches[k] = {};
     if (!motion.poses) return;
     if (are_within(velocity.linear, 3, 0.0) && are_within(velocity.angular, 3, 0.0)) {
-      motion.poses[k] = step_.poses[k];
+      motion.poses[k] = step_.given.poses[k];
       return;
     }
     Moving moving{};
@@ -209,11 +208,11 @@ class IslandStep {
 
   void begin(Moving& moving) const {
     auto k = size_t(moving.body);
-    moving.placed = placed_at(step_.poses[k], bodies_[k].centre);
-    moving.linear = vector(step_.velocities[k].linear);
-    moving.angular = vector(step_.velocities[k].angular);
-    double scale = 1.0 / std::sqrt(squared_norm(step_.poses[k].quaternion));
-    for (int i = 0; i < 4; ++i) moving.quaternion[i] = scale * step_.poses[k].quaternion[i];
+    moving.placed = placed_at(step_.given.poses[k], bodies_[k].centre);
+    moving.linear = vector(step_.given.velocities[k].linear);
+    moving.angular = vector(step_.given.velocities[k].angular);
+    double scale = 1.0 / std::sqrt(squared_norm(step_.given.poses[k].quaternion));
+    for (int i = 0; i < 4; ++i) moving.quaternion[i] = scale * step_.given.poses[k].quaternion[i];
     moving.impulse = moving.angular_impulse = {};
     if (!bodies_[k].is_free()) return;
     moving.inverse_inertia = inverse_inertia_of(bodies_[k], moving.placed);
@@ -252,8 +251,8 @@ class IslandStep {
   void close(const Patch& patch, const Moving& a, const Moving& b, double time,
              Block& block) const {
     auto pull = [&](const Moving& moving) {
-      return step_.outside
-                 ? pull_along(block.normal, step_.outside[moving.body], moving.inverse_mass)
+      return step_.given.outside
+                 ? pull_along(block.normal, step_.given.outside[moving.body], moving.inverse_mass)
                  : 0.0;
     };
     close_faces(patch, a, b, time, std::max(pull(a), pull(b)), block);
@@ -276,16 +275,16 @@ class IslandStep {
       carry(moving, (number - 0.5) / steps.count - 0.5);
       return;
     }
-    if (!step_.outside) return;
-    moving.linear += (h * bodies_[k].inverse_mass) * vector(step_.outside[k].force);
-    moving.angular += h * (moving.inverse_inertia * vector(step_.outside[k].torque));
+    if (!step_.given.outside) return;
+    moving.linear += (h * bodies_[k].inverse_mass) * vector(step_.given.outside[k].force);
+    moving.angular += h * (moving.inverse_inertia * vector(step_.given.outside[k].torque));
   }
 
   // A body that no force moves. `part`: of the step, from its middle [1].
   void carry(Moving& moving, double part) const {
     auto k = size_t(moving.body);
     const auto& [before, last] = ended_[k];
-    const bc_velocity& given = step_.velocities[k];
+    const bc_velocity& given = step_.given.velocities[k];
     moving.linear = carried_at(part, before.linear, last.linear, vector(given.linear));
     moving.angular = carried_at(part, before.angular, last.angular, vector(given.angular));
   }

@@ -67,7 +67,8 @@ class PatchForces {
     std::vector<uint8_t> is_changed(bodies_.size());
     for (size_t k = 0; k < bodies_.size(); ++k)
       is_changed[k] = k >= bodies.size() || !have_same_bits(bodies[k], bodies_[k]);
-    wake(is_changed);
+    rest_.mark_those(is_changed);
+    wake();
     // What is let go, or gripped, has not ended an advance as what it is now.
     for (size_t k = 0; k < std::min(bodies.size(), bodies_.size()); ++k)
       if (bodies[k].is_free() != bodies_[k].is_free()) ended_[k] = {};
@@ -78,7 +79,7 @@ class PatchForces {
     rest_.change_bodies(bodies_, is_changed);
     is_chosen_ = false;
     auto count = int32_t(bodies_.size());
-    make_room(patches_.size() + rest_.patches().size());
+    make_room(patches_.size());
     drop([this, count](const Patch& patch) {
       return !is_of_boxes(patch) || std::max(patch.a, patch.b) >= count || !moves(patch.a, patch.b);
     });
@@ -103,7 +104,8 @@ class PatchForces {
       is_forgotten[size_t(bodies[k])] = 1;
       ended_[size_t(bodies[k])] = {};
     }
-    wake(is_forgotten);
+    rest_.mark_those(is_forgotten);
+    wake();
     drop([&is_forgotten](const Patch& patch) {
       return is_forgotten[size_t(patch.a)] || is_forgotten[size_t(patch.b)];
     });
@@ -170,14 +172,8 @@ class PatchForces {
                   const InThreads& in_threads) {
     bc_motion all = motion;
     if (!all.poses) all.poses = poses_.data();
-    Advance step{clock_.begin(dt, options_.substeps),
-                 given.poses,
-                 given.velocities,
-                 given.outside,
-                 all,
-                 moves_by_wrenches_,
-                 own_.count() > 0 ? &own_ : nullptr,
-                 solve_pair};
+    Advance step{clock_.begin(dt, options_.substeps), given,     all, moves_by_wrenches_,
+                 own_.count() > 0 ? &own_ : nullptr,  solve_pair};
     if (!is_grouped_) islands_.group(bodies_, rest_.awake(), patches_);
     is_grouped_ = true;
     IslandStep islands(options_, bodies_, step, ended_, fineness_, patches_, loads_, islands_);
@@ -212,9 +208,14 @@ class PatchForces {
     return -1;
   }
   // Keep what an advance changes before its end, for one that fails.
-  void keep() { rollback_.keep(patches_, clock_, fineness_); }
+  void keep() {
+    rollback_.keep(clock_, fineness_);
+    is_taken_ = false;
+    if (own_.count() == 0) rollback_.keep_patches(patches_);
+  }
   // All is as it was then.
   void restore() {
+    if (is_taken_) patches_.swap(next_);
     if (rollback_.restore(patches_, clock_, fineness_, rest_, loads_)) is_chosen_ = false;
     is_grouped_ = false;
   }
@@ -225,6 +226,8 @@ class PatchForces {
     if (rest_.compare(given, changed)) is_chosen_ = false;
     wake();
   }
+  // Whether something has woken since `keep`.
+  bool has_woken() const { return rollback_.has_rest(); }
   // The bodies whose rows an advance reads: all but those at rest.
   template <class Visit>
   void each_read(const Visit& visit) const {
@@ -236,13 +239,9 @@ class PatchForces {
   // Wake the islands that are marked.
   void wake() {
     if (!rest_.is_any_marked()) return;
-    rollback_.keep_rest(rest_, loads_);
+    rollback_.keep_rest(rest_, patches_, loads_);
     rest_.wake(bodies_, window_, clock_.since(), patches_, loads_);
     is_grouped_ = is_chosen_ = false;
-  }
-  void wake(const std::vector<uint8_t>& is_chosen) {  // bodies, and what touches them
-    rest_.mark_those(is_chosen);
-    wake();
   }
   // Islands that a new patch joins to what is awake wake up. Their patches are those of their poses.
   void wake_touched() {
@@ -317,9 +316,9 @@ class PatchForces {
     if (std::adjacent_find(next_.begin(), next_.end(), same) != next_.end())
       return Held::pair_twice;
     if (!is_own && rest_.is_any()) take_at_rest(answer.age, poses);
-    keep_impulses(patches_, next_);
+    if (!keep_impulses(patches_, next_)) is_grouped_ = false;
     patches_.swap(next_);
-    is_grouped_ = false;
+    is_taken_ = true;
     make_room(patches_.size() + rest_.patches().size());
     return Held::all;
   }
@@ -342,6 +341,7 @@ class PatchForces {
   Islands islands_;
   Rollback rollback_;        // for an advance that fails
   size_t room_ = 0;          // for patches
+  bool is_taken_ = false;    // whether patches were taken since `keep`; those before are in `next_`
   bool is_chosen_ = false;   // whether pairs that are solved are those of what is awake
   bool is_grouped_ = false;  // whether islands are those of the patches
 };

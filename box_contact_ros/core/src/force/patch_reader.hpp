@@ -83,13 +83,16 @@ class PatchReader {
 };
 
 // Hand on the impulses of the patches before, and keep the patches of stale pairs. Both are by pair.
-inline void keep_impulses(const std::vector<Patch>& before, std::vector<Patch>& patches) {
+// Returns whether there are the same pairs.
+inline bool keep_impulses(const std::vector<Patch>& before, std::vector<Patch>& patches) {
   auto old = before.begin();
   auto kept = patches.begin();
+  size_t known = 0;
   for (const Patch& patch : patches) {
     while (old != before.end() && old->pair() < patch.pair()) ++old;
     bool is_known = old != before.end() && old->pair() == patch.pair();
     bool is_stale = patch.age < 0.0;
+    known += is_known;
     if (is_stale && !is_known) continue;
     if (is_stale)
       *kept = *old;
@@ -99,6 +102,7 @@ inline void keep_impulses(const std::vector<Patch>& before, std::vector<Patch>& 
     ++kept;
   }
   patches.erase(kept, patches.end());
+  return known == before.size() && known == patches.size();
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET::force

@@ -22,24 +22,31 @@ class Rollback {
     loads_.reserve(patches);
   }
   // Keep what every advance changes.
-  void keep(const std::vector<Patch>& patches, const Clock& clock,
-            const std::vector<Fineness>& fineness) {
-    patches_ = patches;
+  void keep(const Clock& clock, const std::vector<Fineness>& fineness) {
     clock_ = clock;
     fineness_ = fineness;
-    is_rest_kept_ = false;
+    are_patches_kept_ = is_rest_kept_ = false;
   }
-  // Keep what rests, before any of it wakes, and the loads of what does not.
-  void keep_rest(const Rest& rest, const std::vector<Load>& loads) {
+  // Keep the patches, where an advance changes these.
+  void keep_patches(const std::vector<Patch>& patches) {
+    if (are_patches_kept_) return;
+    patches_ = patches;
+    are_patches_kept_ = true;
+  }
+  // Keep what rests, before any of it wakes, and patches and loads of what does not.
+  void keep_rest(const Rest& rest, const std::vector<Patch>& patches,
+                 const std::vector<Load>& loads) {
+    keep_patches(patches);
     if (is_rest_kept_) return;
     rest_ = rest;
     loads_ = loads;
     is_rest_kept_ = true;
   }
-  // Give all back. Returns whether something had woken.
+  bool has_rest() const { return is_rest_kept_; }
+  // Give back what was kept. Returns whether something had woken.
   bool restore(std::vector<Patch>& patches, Clock& clock, std::vector<Fineness>& fineness,
                Rest& rest, std::vector<Load>& loads) {
-    patches.swap(patches_);
+    if (are_patches_kept_) patches.swap(patches_);
     clock = clock_;
     fineness = fineness_;
     if (!is_rest_kept_) return false;
@@ -55,7 +62,7 @@ class Rollback {
   std::vector<Fineness> fineness_;
   Rest rest_;
   std::vector<Load> loads_;
-  bool is_rest_kept_ = false;
+  bool are_patches_kept_ = false, is_rest_kept_ = false;
 };
 
 }  // namespace box_contact::BOX_CONTACT_SET::force

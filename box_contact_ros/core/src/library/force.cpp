@@ -60,6 +60,7 @@ bc_status advance(bc_patch_forces* forces, double dt, const Given& given, const 
   self.rouse(given, changed, all);
   bc_status status = check_given(self, given);
   if (!status) status = solve_own(self, dt, given.poses, given.outside);
+  if (!status && self.has_woken()) status = check_given(self, given);
   if (status) {
     self.restore();
     return status;
