@@ -11,9 +11,12 @@ from __future__ import annotations
 
 import argparse
 import csv
+import dataclasses
 import json
+import math
 import sys
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +26,6 @@ from .inspect_plan import inspect_plan
 from .inspection import Inspection
 from .plan import Plan
 from .read_plan import read_any
-from .report import as_json, rows_of, summary_of
 
 SOUND, NOT_SOUND, NOT_READ = 0, 1, 2
 """Exit statuses."""
@@ -98,13 +100,38 @@ def main(args: Sequence[str] | None = None) -> int:
             print(json.dumps({'file': path, **as_json(found)}))
         elif options.csv:
             writer.writerows((path, row.kind, ' '.join(row.names), row.text)
-                             for row in rows_of(found))
+                             for row in found.rows())
         elif len(options.files) > 1:
-            print(f'{path}: {summary_of(found)}', flush=True)
+            print(f'{path}: {found.summary()}', flush=True)
         else:
-            print('\n'.join([*map(str, rows_of(found)), summary_of(found)]))
+            print(found)
             print(f'To see it in 3D: box_contact_view {path}')
     return worst
+
+
+def as_json(found: Inspection) -> dict[str, Any]:
+    """Return all that was found, as msg_schemas/inspection.json has it; NaN and infinity are null.
+
+    Boxes are named in the pairs, and in the order of `names` elsewhere.
+    """
+    plan = found.plan
+    fields = {field.name: getattr(found, field.name) for field in dataclasses.fields(found)}
+    del fields['plan']
+    for pairs in ('overlaps', 'carried_by'):
+        fields[pairs] = [[plan.names[a], plan.names[b]] for a, b in fields[pairs].tolist()]
+    return {'sound': found.sound, 'names': list(plan.names), 'ground': plan.ground.tolist(),
+            'faults': [row._asdict() for row in found.rows()],
+            **{name: _plain(value) for name, value in fields.items()}}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list):
+        return [_plain(part) for part in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
 
 
 def _with_progress(paths: Sequence[str]) -> Iterable[str]:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,26 @@ UNSOUND_FAULTS = ('gap', 'twice', 'cut')
 CAUSES = ('hangs', 'unsupported', 'tips under its load', 'slides', 'goes with what falls',
           'overloaded')
 """What may be wrong with a box, the worst first."""
+MOST_NAMES = 3
+"""Names that a line shows of a fault with more."""
+LEFT_OUT = ('slot', 'size type', 'pose', 'dimension')
+"""Faults for which a box is not in the plan."""
+
+
+class Row(NamedTuple):
+    """Something that is wrong: its kind, the boxes that are concerned, and what it is."""
+
+    kind: str
+    names: tuple[str, ...]
+    text: str
+
+    def __str__(self) -> str:
+        """Return a line; what no terminal shows is a question mark."""
+        names = '  '.join(self.names[:MOST_NAMES])
+        if len(self.names) > MOST_NAMES:
+            names += f' and {len(self.names) - MOST_NAMES:,} more'
+        return ''.join(mark if mark.isprintable() else '?' for mark in
+                       f'{self.kind:<20}  {names}{"  " if names else ""}{self.text}')
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +94,46 @@ class Inspection:
 
     def __str__(self) -> str:
         """Return a line for each fault, the worst first, and one for the whole plan."""
-        from .report import rows_of, summary_of
-        return '\n'.join((*map(str, rows_of(self)), summary_of(self)))
+        return '\n'.join((*map(str, self.rows()), self.summary()))
+
+    def rows(self) -> list[Row]:
+        """Return what is wrong with a plan, the worst first; a box is in one row, its worst."""
+        plan, names = self.plan, self.plan.names
+        told = [Row(fault.kind, fault.names, fault.text) for fault in plan.faults]
+        rows = [row for kind in UNSOUND_FAULTS for row in told if row.kind == kind]
+        for n in np.argsort(-self.depths, kind='stable').tolist():
+            a, b = self.overlaps[n].tolist()
+            rows.append(Row('overlap', (names[a], names[b]), f'{1e3 * self.depths[n]:.1f} mm deep'))
+        seen = {name for row in rows for name in row.names}
+        on_top = self.load / np.linalg.norm(self.acceleration)
+        for cause in CAUSES:
+            worst = -on_top if cause == 'overloaded' else self.margin
+            boxes = np.flatnonzero(self.cause == cause)
+            for box in boxes[np.argsort(worst[boxes], kind='stable')].tolist():
+                text = (f'{on_top[box]:.0f} kg on top' if cause == 'overloaded' else
+                        f'share {self.share[box]:.2f}, centre {_side(self.margin[box])}')
+                if cause == 'tips under its load':
+                    text += f', under its load {_side(self.loaded_margin[box])}'
+                if names[box] not in seen:
+                    rows.append(Row(cause, (names[box],), text))
+        return rows + [row for row in told if row.kind not in UNSOUND_FAULTS]
+
+    def summary(self) -> str:
+        """Return one line on the whole plan."""
+        plan = self.plan
+        boxes = len(plan) - len(plan.ground)
+        words = [f'{boxes:,} box' if boxes == 1 else f'{boxes:,} boxes']
+        if plan.masses is not None and np.isfinite(self.mass) and self.mass > 0.0:
+            words.append(
+                f'{self.mass / 1e3:,.0f} t' if self.mass >= 1e4 else f'{self.mass:,.1f} kg')
+            if np.isfinite(self.centre_of_mass).all():
+                words.append('centre of mass {:.3f} {:.3f} {:.3f} m'.format(*self.centre_of_mass))
+        lost = {name for fault in plan.faults if fault.kind in LEFT_OUT for name in fault.names}
+        if lost := lost.difference(plan.names):
+            words.append(f'{len(lost):,} left out')
+        if len(plan) < 2 or not boxes:
+            words.append('nothing can touch')
+        return f'{", ".join(words)}: {"sound" if self.sound else "not sound"}'
 
     def plot(self) -> Figure:
         """Return a figure of the plan, coloured by cause, with the load on each box in kN.
@@ -84,3 +142,9 @@ class Inspection:
         """
         from .plot import plot
         return plot(self)
+
+
+def _side(margin: float) -> str:
+    if not np.isfinite(margin):
+        return 'on nothing'
+    return f'{1e3 * abs(margin):.0f} mm {"inside" if margin > 0.0 else "outside"}'

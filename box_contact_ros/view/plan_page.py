@@ -25,7 +25,6 @@ from ..plans.inspect_files import NOT_READ, one_line
 from ..plans.inspect_plan import inspect_plan
 from ..plans.inspection import CAUSES, Inspection
 from ..plans.read_plan import read_any
-from ..plans.report import rows_of, summary_of
 from ..solver.pose import rotation_matrix
 from .style import Colour, unit_poses
 
@@ -130,7 +129,7 @@ def lines_of(found: Inspection, box: int) -> list[str]:
     """Return what is known of a box: its rows, or that nothing is wrong, mass, and load on top."""
     plan = found.plan
     name = plan.names[box]
-    lines = [str(row) for row in rows_of(found) if name in row.names] or [f'{name}: sound']
+    lines = [str(row) for row in found.rows() if name in row.names] or [f'{name}: sound']
     if plan.masses is not None:
         lines.append(f'{plan.masses[box]:,.0f} kg')
     on_top = found.load[box] / np.linalg.norm(found.acceleration)
@@ -146,11 +145,11 @@ def table(title: str, found: Inspection, words: np.ndarray) -> str:
     legend = ' &ensp;'.join(
         f'<span style="white-space:nowrap"><span style="color:rgb{colours[word]}">■</span> {word} '
         f'({np.count_nonzero(words == word):,})</span>' for word in colours if word in words)
-    rows = rows_of(found)
+    rows = found.rows()
     shown = ''.join(f'<div>{html.escape(str(row))}</div>' for row in rows[:MOST_ROWS])
     more = f'<div>and {len(rows) - MOST_ROWS:,} more</div>' if len(rows) > MOST_ROWS else ''
     return (_section('file', html.escape(title)) + _section('verdict', html.escape(
-        summary_of(found)), 'font-weight:600') + _section('legend', legend)
+        found.summary()), 'font-weight:600') + _section('legend', legend)
         + _section('rows', shown + more, 'font-family:monospace;white-space:pre-wrap'))
 
 

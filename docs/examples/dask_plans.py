@@ -28,14 +28,13 @@ def judge(path: Path) -> tuple[bool, str]:
     """Return whether the plan of a file is sound, and what is wrong with it."""
     from box_contact_ros import inspect_plan
     from box_contact_ros.plans.read_plan import read_any
-    from box_contact_ros.plans.report import rows_of
 
     try:
         plan, bears = read_any(path)
         found = inspect_plan(plan, bears=bears)
     except (OSError, ValueError) as error:
         return False, str(error)
-    return found.sound, ', '.join(dict.fromkeys(row.kind for row in rows_of(found))) or 'sound'
+    return found.sound, ', '.join(dict.fromkeys(row.kind for row in found.rows())) or 'sound'
 
 
 def main(folder: Path = FILES, scheduler: str | None = None) -> None:
