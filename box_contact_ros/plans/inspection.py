@@ -92,6 +92,14 @@ class Inspection:
         return not (len(self.overlaps) or (self.cause != '').any()
                     or any(fault.kind in UNSOUND_FAULTS for fault in self.plan.faults))
 
+    @property
+    def verdicts(self) -> np.ndarray:
+        """Return a word (n,) for each box: its cause, 'overlap', 'ground' or 'sound'."""
+        words = np.where(self.cause == '', 'sound', self.cause).astype('U24')
+        words[self.overlaps.ravel()] = 'overlap'
+        words[self.plan.ground] = 'ground'
+        return words
+
     def __str__(self) -> str:
         """Return a line for each fault, the worst first, and one for the whole plan."""
         return '\n'.join((*map(str, self.rows()), self.summary()))
@@ -141,7 +149,7 @@ class Inspection:
         It needs Matplotlib, the extra `report`.
         """
         from .plot import plot
-        return plot(self)
+        return plot(self.plan, self.verdicts, self.load, self.summary())
 
 
 def _side(margin: float) -> str:

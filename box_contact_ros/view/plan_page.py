@@ -23,29 +23,16 @@ from ..arguments import program_parser, within
 from ..extras import MissingExtra, require
 from ..plans.inspect_files import NOT_READ, one_line
 from ..plans.inspect_plan import inspect_plan
-from ..plans.inspection import CAUSES, Inspection
+from ..plans.inspection import Inspection
+from ..plans.plot import COLOURS
 from ..plans.read_plan import read_any
 from ..solver.pose import rotation_matrix
-from .style import Colour, unit_poses
+from .style import unit_poses
 
-SOUND: Colour = (143, 168, 191)
-GROUND: Colour = (217, 217, 217)
-OVERLAP: Colour = (122, 0, 25)
-COLOURS: dict[str, Colour] = dict(zip(CAUSES, (
-    (193, 18, 31), (230, 57, 70), (244, 162, 97), (209, 73, 91), (155, 93, 229), (255, 209, 102))))
-"""By cause."""
 OPACITY = 0.9
 PANEL_WIDTH, MOST_ROWS = 420, 200
 """Width of the panel [pixels], and rows that it shows."""
 CLICK_HINT = 'Click on a box to see its row.'
-
-
-def words_of(found: Inspection) -> np.ndarray:
-    """Return the word (n,) by which each box is coloured: a cause, 'overlap', 'ground', 'sound'."""
-    words = np.where(found.cause == '', 'sound', found.cause).astype('U24')
-    words[found.overlaps.ravel()] = 'overlap'
-    words[found.plan.ground] = 'ground'
-    return words
 
 
 class PlanPage:
@@ -55,7 +42,7 @@ class PlanPage:
         """Serve a plan at a port, or the next that is free. Raises OSError."""
         from .server import Server
 
-        self.found, self.words = found, words_of(found)
+        self.found = found
         self._server = Server(host, port)
         self.url = f'http://{host}:{self._server.get_port()}'
         gui = self._server.gui
@@ -63,7 +50,7 @@ class PlanPage:
         gui.main_panel.dock_right()
         gui.main_panel.set_width(PANEL_WIDTH)
         self._clicked = gui.add_html(_section('clicked', CLICK_HINT), order=0.0)
-        gui.add_html(table(title, found, self.words), order=1.0)
+        gui.add_html(table(title, found), order=1.0)
         self._draw()
 
     def close(self) -> None:
@@ -84,7 +71,8 @@ class PlanPage:
         add_light(scene)
         if not len(plan):
             return
-        colours = {'sound': SOUND, 'ground': GROUND, 'overlap': OVERLAP, **COLOURS}
+        colours = np.array([list(bytes.fromhex(COLOURS[verdict][1:]))
+                            for verdict in self.found.verdicts])
         poses = unit_poses(plan.poses)
         half = 0.5 * np.einsum('nij,nj->ni', np.abs(rotation_matrix(poses[:, 3:])), plan.sizes)
         # A floor that is far larger than what is on it must not be what is in view.
@@ -93,7 +81,7 @@ class PlanPage:
         low = (poses[seen, :3] - half[seen]).min(axis=0)
         high = (poses[seen, :3] + half[seen]).max(axis=0)
         middle, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
-        meshes = add_cubes(scene, np.array([colours[word] for word in self.words]), OPACITY)
+        meshes = add_cubes(scene, colours, OPACITY)
         for mesh in meshes:
             mesh.batched_positions = poses[:, :3] - middle
             mesh.batched_wxyzs = np.roll(poses[:, 3:], 1, axis=1)
@@ -139,12 +127,13 @@ def lines_of(found: Inspection, box: int) -> list[str]:
     return lines
 
 
-def table(title: str, found: Inspection, words: np.ndarray) -> str:
+def table(title: str, found: Inspection) -> str:
     """Return the summary, a legend of the colours that are there, and the rows, as HTML."""
-    colours = {'sound': SOUND, 'overlap': OVERLAP, **COLOURS, 'ground': GROUND}
+    verdicts = found.verdicts
     legend = ' &ensp;'.join(
-        f'<span style="white-space:nowrap"><span style="color:rgb{colours[word]}">■</span> {word} '
-        f'({np.count_nonzero(words == word):,})</span>' for word in colours if word in words)
+        f'<span style="white-space:nowrap"><span style="color:{colour}">■</span> {verdict} '
+        f'({np.count_nonzero(verdicts == verdict):,})</span>'
+        for verdict, colour in COLOURS.items() if verdict in verdicts)
     rows = found.rows()
     shown = ''.join(f'<div>{html.escape(str(row))}</div>' for row in rows[:MOST_ROWS])
     more = f'<div>and {len(rows) - MOST_ROWS:,} more</div>' if len(rows) > MOST_ROWS else ''

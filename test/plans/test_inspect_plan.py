@@ -12,7 +12,9 @@ import pytest
 from patience import PATIENCE
 
 from box_contact_ros import Plan, inspect_plan
+from box_contact_ros.plans.inspection import CAUSES
 from box_contact_ros.plans.plan import Fault
+from box_contact_ros.plans.plot import COLOURS
 
 pytest.importorskip('clarabel')
 G = 9.81
@@ -271,7 +273,13 @@ def test_geometry_alone_needs_no_solver():
     assert "'.[plans]'" in done.stderr and 'Traceback' not in done.stderr
 
 
-def test_the_picture_has_a_colour_for_each_cause():
+def test_each_box_has_a_verdict_and_each_verdict_a_colour():
+    found = inspect_plan(plan_of([box(0, 1), box(0.9, 1), box(5, 6)], [1, 1, 1]))
+    assert found.verdicts.tolist() == ['ground', 'overlap', 'overlap', 'hangs']
+    assert {*CAUSES, 'overlap', 'ground', 'sound'} == set(COLOURS)
+
+
+def test_the_picture_has_the_legend_of_what_it_shows():
     pytest.importorskip('matplotlib')
     found = inspect_plan(plan_of([box(0, 0.5), box(0.6, 1.5)], [10, 10]))
     figure = found.plot()

@@ -22,7 +22,7 @@ from browser import chromium, open_page
 
 from box_contact_ros import inspect_plan, read_plan
 from box_contact_ros.solver.pose import rotation_matrix
-from box_contact_ros.view.plan_page import CLICK_HINT, PlanPage, hit_by, lines_of, words_of
+from box_contact_ros.view.plan_page import CLICK_HINT, PlanPage, hit_by, lines_of
 
 SHIP = Path(__file__).resolve().parents[2] / 'docs' / 'examples' / 'files' / 'ship.edi'
 
@@ -31,12 +31,6 @@ SHIP = Path(__file__).resolve().parents[2] / 'docs' / 'examples' / 'files' / 'sh
 def found():
     """Return what is wrong with a ship."""
     return inspect_plan(read_plan(SHIP), bears='corners')
-
-
-def test_each_box_has_a_word(found):
-    words = words_of(found)
-    assert words[found.plan.names.index('0100304')] == 'unsupported'
-    assert (words == 'ground').sum() == len(found.plan.ground) and 'sound' in words
 
 
 def test_what_is_known_of_a_box(found):
