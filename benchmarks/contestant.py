@@ -32,6 +32,7 @@ from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix
 
+from .mlp_samples import draw_samples, mixture
 from .pose_sets import Pairs
 
 MODELS = ('exact', 'mlp', 'paper', 'soup-1', 'soup-8', 'soup-22')
@@ -171,8 +172,6 @@ def linear_mlp() -> native.Mlp:
 
     A rectified unit and its opposite pass a number on, so the two hidden layers bend nothing.
     """
-    from training.samples import draw_samples, mixture
-
     samples = draw_samples(mixture, [1, 0], LINEAR_PAIRS)
     root = np.linalg.cholesky(samples.covariance)
     wanted = np.column_stack([

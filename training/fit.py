@@ -13,11 +13,10 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from benchmarks.mlp_samples import MlpSamples
 from benchmarks.paper.fit import as_layers
 from box_contact_ros.core import FEATURES, OUTPUTS
 from box_contact_ros.models.weights_file import Layers
-
-from .samples import MlpSamples
 
 LEAST_VOLUME, LEAST_DEVIATION, MOST_DEVIATION = 1e-5, 1e-3, 3.0**-0.5  # as in mlp_model.hpp
 START = (-0.3, -0.3, -0.3, 0.4, 0.45, 0.45, 0.45, 0.0, 0.0, 0.0)  # outputs before the training

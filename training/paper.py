@@ -17,6 +17,7 @@ import numpy as np
 
 from benchmarks import settled
 from benchmarks.errors import point_errors
+from benchmarks.mlp_samples import nearly_settled
 from benchmarks.output import percentiles
 from benchmarks.paper.dataset import INPUTS, OUTPUTS, PAPER_COUNTS, SETS, Patterns, spherical
 from benchmarks.paper.fit import PaperSettings, fit
@@ -29,8 +30,6 @@ from box_contact_ros.models.make_model import make_model
 from box_contact_ros.models.networks import is_cube
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix
-
-from .samples import nearly_settled
 
 
 def cubes_nearly_settled(rng: np.random.Generator, n: int) -> Pairs:

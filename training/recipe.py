@@ -23,6 +23,7 @@ from tqdm import tqdm
 
 from benchmarks import settled
 from benchmarks.errors import contact_errors
+from benchmarks.mlp_samples import MlpSamples, describe, draw_samples, mixture
 from benchmarks.output import percentiles
 from benchmarks.pose_sets import LOADS, SETS, Generator, Pairs
 from benchmarks.timing import usable_cores
@@ -34,7 +35,6 @@ from box_contact_ros.models.networks import KINDS, MLP
 from box_contact_ros.solver.contact_solver import ContactSolver
 
 from .fit import TAIL, UNITS, MlpErrors, PatchNetwork, errors_of, fit, tensors
-from .samples import MlpSamples, describe, draw_samples, mixture
 
 FEATURE_NAMES = ('cuts along x, y, z', 'depths of cuts', 'their squares',
                  'xx, yy, zz, xy, xz, yz of cuts', 'depths at the eight corners')

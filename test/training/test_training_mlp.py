@@ -12,6 +12,7 @@ import pytest
 import torch
 
 from benchmarks.errors import contact_errors
+from benchmarks.mlp_samples import MlpSamples, describe, mixture
 from benchmarks.pose_sets import LOADS, SETS, Pairs
 from benchmarks.weights import save_weights
 from box_contact_ros import ContactSolver, make_model
@@ -20,9 +21,8 @@ from box_contact_ros.models.networks import network_of
 from box_contact_ros.models.weights_file import load_weights
 from box_contact_ros.resources import resource_path
 from training import __main__ as train
-from training import recipe, samples
+from training import recipe
 from training.fit import PatchNetwork, errors_of, fit, loss_of, tensors
-from training.samples import MlpSamples, describe
 
 pytestmark = pytest.mark.training
 PAIRS = 20_000
@@ -31,7 +31,7 @@ SHIPPED = load_weights(resource_path('weights', 'mlp.safetensors'))
 
 @pytest.fixture(scope='module')
 def pairs() -> Pairs:
-    return samples.mixture(np.random.default_rng(5), PAIRS)
+    return mixture(np.random.default_rng(5), PAIRS)
 
 
 @pytest.fixture(scope='module')

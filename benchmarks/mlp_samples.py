@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Training samples of model `mlp`: what its network reads of a contact, and the exact answers."""
+"""Samples of model `mlp`: what its network reads of a contact, and the exact answers."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from benchmarks import probes, settled
-from benchmarks.pose_sets import (
+from . import probes, settled
+from .pose_sets import (
     CONTAINER,
     CUBE,
     Generator,
