@@ -108,15 +108,21 @@ class IslandStep {
     for (size_t k = island.body; k < island.body_end; ++k) begin(moving_[k]);
     island.factor = 0;
     if (island.block == island.block_end) {
-      for (size_t k = island.body; k < island.body_end; ++k) fly(moving_[k]);
+      for (size_t k = island.body; k < island.body_end; ++k)
+        for (int number = 1; number <= step_.steps.count; ++number) {
+          drive(moving_[k], number, step_.steps);
+          move(moving_[k], step_.steps.length);
+        }
       return;
     }
+    island.is_new = true;
     island.is_uneven = false;
     double factor = over_relaxation_of(island), fastest = 0.0;
     each_block(island, [&](Block& block, const Patch& patch, Moving& a, Moving& b) {
       take(patch, factor, block);
       fastest = std::max(fastest, passing_speed(patch, a, b));
       block.normal_sum = block.friction_sum = {};
+      island.is_new = island.is_new && patch.window == 0.0;
       island.is_uneven = island.is_uneven || is_uneven(a.inverse_mass, b.inverse_mass);
     });
     island.takes_more = fineness_of_.sways(island, fastest, fineness_) || island.is_uneven;
@@ -226,14 +232,6 @@ class IslandStep {
     moving.angular_impulse = moving.placed.axes * (transposed_times(moving.placed.axes, calmer) /
                                                    bodies_[k].inverse_inertia);
   }
-  // Move a body that nothing touches.
-  void fly(Moving& moving) const {
-    for (int number = 1; number <= step_.steps.count; ++number) {
-      drive(moving, number, step_.steps);
-      move(moving, step_.steps.length);
-    }
-  }
-
   // Solve the contacts of an island anew, where its bodies are within the advance.
   void ask_again(const Island& island, double time) const {
     double factor = over_relaxation_of(island);

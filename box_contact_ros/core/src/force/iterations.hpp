@@ -22,6 +22,10 @@ constexpr double impact_change = 0.01;
 constexpr double impact_share = 0.2;
 constexpr int impact_iterations = 40;
 constexpr int uneven_impact_iterations = 100;  // with 40, 24 t on four timbers rest a sixth deeper
+// Where something was borne before, it also goes on only by more than this acceleration gives in a sub-step
+// [m/s²]. In 1/240 s, the loads of what rolls in a pile change by 0.01 m/s all the time, and are no impact. A
+// pile of 1,000 at 1/60 s takes a third of the time that it takes with 0, and timbers below 24 t rest earlier.
+constexpr double impact_acceleration = 40.0;
 // With late answers no change of a closing speed is an impact [m/s]. Their patches are soft, and slow what
 // closes over several steps. If it were solved at once, 100 on 1 would never rest.
 constexpr double no_impact = std::numeric_limits<double>::infinity();
@@ -71,6 +75,7 @@ inline double passing_speed(const Patch& patch, const Moving& a, const Moving& b
 struct Island {
   size_t body, body_end;  // among those that move
   size_t block, block_end;
+  bool is_new;      // whether none of its patches gave impulses before
   bool is_uneven;   // whether bodies touch whose masses are
   bool takes_more;  // iterations: it is uneven, or sways
   int factor;       // by which its sub-steps are finer; 0: its advance is over
@@ -78,6 +83,11 @@ struct Island {
   double impact;    // a larger change of a closing speed is an impact [m/s]
   bool is_struck;   // whether the last iteration changed a closing speed as in an impact
 };
+
+// A larger change of a closing speed is an impact in a sub-step of this length [m/s].
+inline double least_impact(const Island& island, double length) {
+  return island.is_new ? impact_change : max(impact_change, impact_acceleration * length);
+}
 
 template <class T>
 BC_INLINE NormalRows<T>& rows_of(Rows<T>& block, bool is_pushing) {

@@ -33,7 +33,7 @@ struct Stages {
   static void push(void* all) {
     const Work& work = work_of(all);
     for (Island* island = work.first; island < work.last; ++island)
-      island->impact = work.steps.is_late ? no_impact : impact_change;
+      island->impact = work.steps.is_late ? no_impact : least_impact(*island, work.steps.length);
     each(work, [&](G& group) { prepare(work, group); });
     each(work, [&](G& group) { warm_start(work, group); });
     iterate_all(work, work.iterations, true);
