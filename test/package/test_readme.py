@@ -428,7 +428,8 @@ LIMITS = {
         f'{constant("force/rectangle.hpp", "torsion_share")} times the mean',
         f'last {constant(CLOCK, "intervals_kept")} intervals',
         f'shrinks to 1 / {constant(CLOCK, "step_shrinkage")} per step',
-        f'by more than {constant("force/iterations.hpp", "impact_change")} m/s, up to '
+        f'{constant("force/iterations.hpp", "impact_change")} m/s and (but at first touch) '
+        f'{constant("force/iterations.hpp", "impact_acceleration")} m/s²·sub-step, up to '
         f'{constant("force/iterations.hpp", "impact_iterations")} times',
         f'no more than {constant("force/gaps.hpp", "gap_share")}·g·dt²',
         f'apart by {1e3 * float(constant("force/gaps.hpp", "pressed_gap")):g} mm',
