@@ -43,8 +43,8 @@ constexpr int parts_of_a_contact = 4;
 // Of a body: its island's, as a patch may be lost for a step.
 struct Fineness {
   int factor = 1;
-  double calm = 0.0;   // for how long less was needed [s]
-  bool sways = false;  // so that it takes more iterations
+  double calm = 0.0;    // for how long less was needed [s]
+  double swayed = 0.0;  // for how long it has swayed [s]
 };
 
 // Chooses the factor of an island, and tells whether it sways. Both are kept with its bodies.
@@ -80,13 +80,13 @@ class FinenessOf {
     });
     return factor;
   }
-  // Whether an island sways, whose bodies pass each other at a speed [m/s].
-  bool sways(const Island& island, double speed, std::vector<Fineness>& all) const {
-    bool has_swayed = false;
-    each_free(island, [&](size_t body) { has_swayed = has_swayed || all[body].sways; });
-    bool sways = is_sway(speed, has_swayed);
-    each_free(island, [&](size_t body) { all[body].sways = sways; });
-    return sways;
+  // For how long an island has swayed at the end of a step, whose bodies pass each other at a speed [s].
+  double swayed(const Island& island, double speed, double dt, std::vector<Fineness>& all) const {
+    double swayed = 0.0;
+    each_free(island, [&](size_t body) { swayed = std::max(swayed, all[body].swayed); });
+    swayed = is_sway(speed, swayed > 0.0) ? swayed + dt : 0.0;
+    each_free(island, [&](size_t body) { all[body].swayed = swayed; });
+    return swayed;
   }
 
  private:

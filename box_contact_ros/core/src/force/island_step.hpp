@@ -68,7 +68,7 @@ class IslandStep {
     for (Island& island : islands_.of(chunk)) begin(island);
     // Those with as many iterations, in sub-steps as fine, are advanced together.
     for (const Island& island : islands_.of(chunk))
-      if (island.factor > 0) advance(chunk, island.factor, island.takes_more);
+      if (island.factor > 0) advance(chunk, island.factor, island.rounds);
   }
 
   // The first body whose numbers are not finite at the end of the islands, or −1.
@@ -125,13 +125,14 @@ class IslandStep {
       island.is_new = island.is_new && patch.window == 0.0;
       island.is_uneven = island.is_uneven || is_uneven(a.inverse_mass, b.inverse_mass);
     });
-    island.takes_more = fineness_of_.sways(island, fastest, fineness_) || island.is_uneven;
+    island.rounds = rounds_of(fineness_of_.swayed(island, fastest, step_.steps.dt, fineness_),
+                              island.is_uneven);
     island.factor = step_.own ? fineness_of_(island, step_.steps, fineness_) : 1;
   }
-  // Advance the islands whose sub-steps are finer by a factor, and which take more iterations or not.
-  void advance(const Chunk& chunk, int factor, bool takes_more) const {
+  // Advance the islands whose sub-steps are finer by a factor, and that take so many times the iterations.
+  void advance(const Chunk& chunk, int factor, int rounds) const {
     SubSteps steps = step_.steps.finer(factor);
-    if (takes_more && !steps.is_late) steps.rounds *= more_rounds;
+    if (!steps.is_late) steps.rounds *= rounds;
     auto advance = [&](Islands::Range range, const detail::ForceKernel& kernel, void* groups,
                        size_t count) {
       bool counts = step_.motion.wrenches;
@@ -141,7 +142,7 @@ class IslandStep {
       advance_by(kernel, factor, work);
     };
     for (Island& island : islands_.of(chunk))
-      island.is_shared = island.factor == factor && island.takes_more == takes_more;
+      island.is_shared = island.factor == factor && island.rounds == rounds;
     size_t groups = islands_.share(chunk);
     if (groups > 0)
       advance(islands_.of(chunk), *islands_.side(), islands_.groups_of(chunk), groups);
