@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
 from . import probes, settled
 from .pose_sets import (
@@ -84,6 +83,8 @@ def draw_samples(make: Generator, seed: Sequence[int], n: int, progress: bool = 
 
     Each piece of PIECE pairs has its own seed.
     """
+    from tqdm import tqdm
+
     starts = tqdm(range(0, n, PIECE), desc='data', unit='piece', disable=not progress)
     return MlpSamples.joined([
         describe(make(np.random.default_rng([*seed, start]), min(PIECE, n - start)))[0]

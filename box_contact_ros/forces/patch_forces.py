@@ -207,9 +207,9 @@ class PatchForces:
         friction: Coulomb's μ of pairs without one of their own.
         substeps: equal parts of the longest step lately, more if 5 ms are exceeded.
         iterations: of sequential impulses in a sub-step, at most.
-        relaxations: further iterations, which remove the speed of pushing out. Where masses that
-        touch differ tenfold, or stacks sway, there are three times as many of both, unless answers
-        are late.
+        relaxations: further iterations, which remove the speed of pushing out. Unless answers are
+        late, there are three times as many of both where masses that touch differ tenfold or
+        stacks sway, and up to twelve times the longer they sway.
         threads: at most. They change no bit.
         most_depth: how deep what rests may be [m], where a load is large for the lighter body.
         With contacts of one's own, its island makes up to 64 times as many sub-steps. `loads`

@@ -94,7 +94,7 @@ class Inspection:
 
     @property
     def verdicts(self) -> np.ndarray:
-        """Return a word (n,) for each box: its cause, 'overlap', 'ground' or 'sound'."""
+        """Return a word (n,) for each box: 'ground', else 'overlap', its cause, or 'sound'."""
         words = np.where(self.cause == '', 'sound', self.cause).astype('U24')
         words[self.overlaps.ravel()] = 'overlap'
         words[self.plan.ground] = 'ground'
@@ -144,7 +144,7 @@ class Inspection:
         return f'{", ".join(words)}: {"sound" if self.sound else "not sound"}'
 
     def plot(self) -> Figure:
-        """Return a figure of the plan, coloured by cause, with the load on each box in kN.
+        """Return a figure of the plan, coloured by verdict, with the load on each box in kN.
 
         It needs Matplotlib, the extra `report`.
         """

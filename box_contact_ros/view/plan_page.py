@@ -3,7 +3,7 @@
 
 """A page in the browser that shows the plan of a file, and what is wrong with it.
 
-Boxes have the colour of their cause. A click on a box shows its row, its mass and what is on it.
+Boxes have the colour of their verdict. A click on a box shows its row, its mass and what is on it.
 """
 from __future__ import annotations
 

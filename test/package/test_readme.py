@@ -429,7 +429,7 @@ LIMITS = {
         f'last {constant(CLOCK, "intervals_kept")} intervals',
         f'shrinks to 1 / {constant(CLOCK, "step_shrinkage")} per step',
         f'after {3.0 * float(constant("force/iterations.hpp", "sway_time")):g} s of sway',
-        f'{constant("force/iterations.hpp", "impact_change")} m/s and (but at first touch) '
+        f'{constant("force/iterations.hpp", "impact_change")} m/s and (in what had patches) '
         f'{constant("force/iterations.hpp", "impact_acceleration")} m/s²·sub-step, up to '
         f'{constant("force/iterations.hpp", "impact_iterations")} times',
         f'no more than {constant("force/gaps.hpp", "gap_share")}·g·dt²',

@@ -274,8 +274,9 @@ def test_geometry_alone_needs_no_solver():
 
 
 def test_each_box_has_a_verdict_and_each_verdict_a_colour():
-    found = inspect_plan(plan_of([box(0, 1), box(0.9, 1), box(5, 6)], [1, 1, 1]))
-    assert found.verdicts.tolist() == ['ground', 'overlap', 'overlap', 'hangs']
+    boxes = [box(0, 1), box(0.9, 1), box(5, 6), box(-5, 0.4)]  # the last one is in the floor
+    found = inspect_plan(plan_of(boxes, [1] * 4))
+    assert found.verdicts.tolist() == ['ground', 'overlap', 'overlap', 'hangs', 'overlap']
     assert {*CAUSES, 'overlap', 'ground', 'sound'} == set(COLOURS)
 
 

@@ -82,8 +82,9 @@ typedef struct bc_force_options {
                       1,000 */
   int iterations;  /* of sequential impulses in a sub-step, at most; 1 to 1,000 */
   int relaxations; /* iterations more, at most, which remove the speed of pushing out; 0 to 1,000.
-                      Where masses that touch differ tenfold, or stacks sway, there are three
-                      times as many of both, unless answers are late */
+                      Unless answers are late, there are three times as many of both where
+                      masses that touch differ tenfold or stacks sway, and up to twelve times
+                      the longer they sway */
   int threads;     /* 1 to 1,024; bodies that patches join are moved by one of them */
   double friction; /* Coulomb's μ [1] */
   double most_depth; /* how deep what rests may be at most [m], where a load is large for the lighter

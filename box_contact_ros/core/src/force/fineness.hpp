@@ -1,8 +1,8 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// How much shorter the sub-steps of an island are, so that no patch is pressed deeper than wanted, and whether
-// it sways.
+// How much shorter the sub-steps of an island are, so that no patch is pressed deeper than wanted, and for how
+// long it has swayed.
 //
 // A patch that bears a force F for long is F·c·w²/f² deep. Here c is what an impulse N alone changes the
 // closing speed by, w is the window, and f is `soft_frequency`. Of boxes alike that is little. Of a heavy
@@ -47,7 +47,7 @@ struct Fineness {
   double swayed = 0.0;  // for how long it has swayed [s]
 };
 
-// Chooses the factor of an island, and tells whether it sways. Both are kept with its bodies.
+// Chooses the factor of an island, and tells for how long it has swayed. Both are kept with its bodies.
 class FinenessOf {
  public:
   FinenessOf(const std::vector<Body>& bodies, const bc_wrench* outside, double most_depth,
@@ -80,7 +80,7 @@ class FinenessOf {
     });
     return factor;
   }
-  // For how long an island has swayed at the end of a step, whose bodies pass each other at a speed [s].
+  // For how long an island has swayed at the end of a step [s]. speed: at which its bodies pass each other [m/s].
   double swayed(const Island& island, double speed, double dt, std::vector<Fineness>& all) const {
     double swayed = 0.0;
     each_free(island, [&](size_t body) { swayed = std::max(swayed, all[body].swayed); });

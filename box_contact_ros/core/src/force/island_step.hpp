@@ -125,14 +125,14 @@ class IslandStep {
       island.is_new = island.is_new && patch.window == 0.0;
       island.is_uneven = island.is_uneven || is_uneven(a.inverse_mass, b.inverse_mass);
     });
-    island.rounds = rounds_of(fineness_of_.swayed(island, fastest, step_.steps.dt, fineness_),
-                              island.is_uneven);
+    double swayed = fineness_of_.swayed(island, fastest, step_.steps.dt, fineness_);
+    island.rounds = step_.steps.is_late ? 1 : rounds_of(swayed, island.is_uneven);
     island.factor = step_.own ? fineness_of_(island, step_.steps, fineness_) : 1;
   }
   // Advance the islands whose sub-steps are finer by a factor, and that take so many times the iterations.
   void advance(const Chunk& chunk, int factor, int rounds) const {
     SubSteps steps = step_.steps.finer(factor);
-    if (!steps.is_late) steps.rounds *= rounds;
+    steps.rounds *= rounds;
     auto advance = [&](Islands::Range range, const detail::ForceKernel& kernel, void* groups,
                        size_t count) {
       bool counts = step_.motion.wrenches;

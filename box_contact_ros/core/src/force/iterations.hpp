@@ -22,7 +22,7 @@ constexpr double impact_change = 0.01;
 constexpr double impact_share = 0.2;
 constexpr int impact_iterations = 40;
 constexpr int uneven_impact_iterations = 100;  // with 40, 24 t on four timbers rest a sixth deeper
-// Where something was borne before, it also goes on only by more than this acceleration gives in a sub-step
+// In an island that had patches before, the change must also exceed this acceleration times the sub-step
 // [m/s²]. In 1/240 s, the loads of what rolls in a pile change by 0.01 m/s all the time, and are no impact. A
 // pile of 1,000 at 1/60 s takes a third of the time that it takes with 0, and timbers below 24 t rest earlier.
 constexpr double impact_acceleration = 40.0;
@@ -63,14 +63,15 @@ constexpr double least_sway = 1e-7, begun_sway = 1e-4, most_sway = 0.1;
 inline bool is_sway(double speed, bool has_swayed) {
   return speed > (has_swayed ? least_sway : begun_sway) && speed < most_sway;
 }
-// Each time that a stack has swayed for so long [s], it takes as many more, up to so many times as many in all.
+// With each such time of sway [s] a stack takes `more_rounds` times more, up to `most_rounds` times in all.
 // With no more than at first, six of six landings of a real order of 19 boxes sway for ever at 1/60 s.
 constexpr double sway_time = 0.5;
 constexpr int most_rounds = 12;
 // How many times as many iterations an island takes that has swayed for a time [s]; 0: it does not sway.
 inline int rounds_of(double swayed, bool is_uneven) {
   if (swayed == 0.0) return is_uneven ? more_rounds : 1;
-  return std::min(more_rounds * (1 + int(swayed / sway_time)), most_rounds);
+  bool is_most = swayed >= sway_time * (most_rounds / more_rounds);
+  return is_most ? most_rounds : more_rounds * (1 + int(swayed / sway_time));
 }
 // How fast the bodies of a patch pass each other, at its rims at most [m/s].
 inline double passing_speed(const Patch& patch, const Moving& a, const Moving& b) {
@@ -84,7 +85,7 @@ inline double passing_speed(const Patch& patch, const Moving& a, const Moving& b
 struct Island {
   size_t body, body_end;  // among those that move
   size_t block, block_end;
-  bool is_new;     // whether none of its patches gave impulses before
+  bool is_new;     // whether it had no patch before this advance
   bool is_uneven;  // whether bodies touch whose masses are
   int rounds;      // how many times as many iterations it takes
   int factor;      // by which its sub-steps are finer; 0: its advance is over
