@@ -403,6 +403,9 @@ SOFT, LATE, PARALLEL = (constant(file, name) for file, name in (
 LENGTHS, QUATERNIONS = (
     ' to '.join(constant('poses.hpp', f'{what}_{end}') for end in ('min', 'max'))
     for what in ('length', 'quaternion'))
+MORE, MOST, SWAY = (float(constant('force/iterations.hpp', name)) for name in (
+    'more_rounds', 'most_rounds', 'sway_time'))
+FOLD = {3.0: 'threefold', 12.0: 'twelvefold'}
 HEADER = 'box_contact_ros/core/include/box_contact/box_contact.hpp'
 CERTIFICATE = 'overlap/certificate.hpp'
 ROUNDING = constant(CERTIFICATE, 'centroid_rounding')
@@ -428,7 +431,7 @@ LIMITS = {
         f'{constant("force/rectangle.hpp", "torsion_share")} times the mean',
         f'last {constant(CLOCK, "intervals_kept")} intervals',
         f'shrinks to 1 / {constant(CLOCK, "step_shrinkage")} per step',
-        f'after {3.0 * float(constant("force/iterations.hpp", "sway_time")):g} s of sway',
+        f'are {FOLD[MORE]}; after {(MOST / MORE - 1.0) * SWAY:g} s of sway, {FOLD[MOST]}',
         f'{constant("force/iterations.hpp", "impact_change")} m/s and (in what had patches) '
         f'{constant("force/iterations.hpp", "impact_acceleration")} m/s²·sub-step, up to '
         f'{constant("force/iterations.hpp", "impact_iterations")} times',

@@ -80,7 +80,7 @@ class FinenessOf {
     });
     return factor;
   }
-  // For how long an island has swayed at the end of a step [s]. speed: at which its bodies pass each other [m/s].
+  // For how long an island has swayed at the end of a step [s]. Its bodies pass each other at `speed` [m/s].
   double swayed(const Island& island, double speed, double dt, std::vector<Fineness>& all) const {
     double swayed = 0.0;
     each_free(island, [&](size_t body) { swayed = std::max(swayed, all[body].swayed); });

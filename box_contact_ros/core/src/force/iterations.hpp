@@ -63,7 +63,8 @@ constexpr double least_sway = 1e-7, begun_sway = 1e-4, most_sway = 0.1;
 inline bool is_sway(double speed, bool has_swayed) {
   return speed > (has_swayed ? least_sway : begun_sway) && speed < most_sway;
 }
-// With each such time of sway [s] a stack takes `more_rounds` times more, up to `most_rounds` times in all.
+// A stack takes `more_rounds` times as many at first, and as many more after each such time of sway [s], up to
+// `most_rounds` times.
 // With no more than at first, six of six landings of a real order of 19 boxes sway for ever at 1/60 s.
 constexpr double sway_time = 0.5;
 constexpr int most_rounds = 12;
