@@ -54,6 +54,19 @@ def test_the_sway_of_a_tower_dies_away(seed: int) -> None:
     assert np.abs(world.velocities).max() < 3e-4
 
 
+def test_what_is_forgotten_has_not_swayed() -> None:
+    """A stack that sways takes more iterations; forgotten, as many as one in a new object."""
+    def stack() -> World:
+        return World(FLOOR, *(((0.4, 0.4, 0.3), 5.0, (0, 0, 0.152 + 0.3 * k),
+                               turned((1.0, 0.0, 0.0), 0.004)) for k in range(8)))
+
+    swaying, new = stack().run(0.9, FRAME), stack()
+    assert 1e-4 < np.abs(swaying.velocities).max() < 0.1
+    new.poses, new.velocities = swaying.poses, swaying.velocities
+    swaying.forces.forget(range(9))
+    assert np.array_equal(swaying.step(FRAME).velocities, new.step(FRAME).velocities)
+
+
 @pytest.mark.parametrize('substeps', [4, 16])
 def test_a_weight_that_falls_on_light_cubes_does_not_jump(substeps: int) -> None:
     """Of 8 t, by 15 m on four cubes of 1 kg: at less than 1 % of its speed."""

@@ -69,9 +69,8 @@ class PatchForces {
       is_changed[k] = k >= bodies.size() || !have_same_bits(bodies[k], bodies_[k]);
     rest_.mark_those(is_changed);
     wake();
-    // What is let go, or gripped, has not ended an advance as what it is now.
     for (size_t k = 0; k < std::min(bodies.size(), bodies_.size()); ++k)
-      if (bodies[k].is_free() != bodies_[k].is_free()) ended_[k] = {};
+      if (bodies[k].is_free() != bodies_[k].is_free()) begin_anew(k);
     bodies_ = std::move(bodies);
     ended_.resize(bodies_.size());
     fineness_.resize(bodies_.size());
@@ -102,7 +101,7 @@ class PatchForces {
     std::vector<uint8_t> is_forgotten(bodies_.size(), 0);
     for (int64_t k = 0; k < count; ++k) {
       is_forgotten[size_t(bodies[k])] = 1;
-      ended_[size_t(bodies[k])] = {};
+      begin_anew(size_t(bodies[k]));
     }
     rest_.mark_those(is_forgotten);
     wake();
@@ -142,10 +141,7 @@ class PatchForces {
     make_room(own_.count());
     rest_.mark_if([this](const Patch& patch) { return !own_.is_asked(patch); });
     wake();
-    if (own_.count() > 0) return Held::all;
-    rest_.mark_all();
-    wake();
-    drop([](const Patch&) { return true; });
+    if (own_.count() == 0) drop([](const Patch&) { return true; });
     return Held::all;
   }
   // Solve the contacts of one's own at the start of a step `dt`, and take them: see OwnContacts::solve.
@@ -262,10 +258,15 @@ class PatchForces {
                                [this](const Patch& patch) { return rest_.rests(patch); }),
                 next_.end());
   }
+  // What is let go, gripped, forgotten or laid down has not ended an advance, nor swayed.
+  void begin_anew(size_t body) {
+    ended_[body] = {};
+    fineness_[body].swayed = 0.0;
+  }
   // Bodies that come to rest end where they began.
   void lay_down() {
     for (int32_t body : rest_.awake())
-      if (rest_.is_at_rest(size_t(body))) ended_[size_t(body)] = {};
+      if (rest_.is_at_rest(size_t(body))) begin_anew(size_t(body));
     rest_.lay_down(bodies_, patches_, loads_);
     is_grouped_ = is_chosen_ = false;
   }
