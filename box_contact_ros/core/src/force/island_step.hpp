@@ -77,10 +77,11 @@ class IslandStep {
       if (!ends_finite(moving)) return moving.body;
     return -1;
   }
-  // Write where the islands end.
-  void write_ends() const {
-    for (const Moving& moving : moving_) write_end(moving);
-    for (const Block& block : blocks_) end(block);
+  // Write where the islands of a chunk end.
+  void write_ends(const Chunk& chunk) const {
+    for (const Island& island : islands_.of(chunk))
+      for (size_t k = island.body; k < island.body_end; ++k) write_end(moving_[k]);
+    for (size_t k = chunk.block; k < chunk.block_end; ++k) end(blocks_[k]);
   }
 
   // A body that no force moves goes on by its velocity. One that rests keeps its pose to the bit.

@@ -80,7 +80,8 @@ class PatchForces {
     auto count = int32_t(bodies_.size());
     make_room(patches_.size());
     drop([this, count](const Patch& patch) {
-      return !is_of_boxes(patch) || std::max(patch.a, patch.b) >= count || !moves(patch.a, patch.b);
+      return !is_of_boxes(patch) || std::max(patch.a, patch.b) >= count ||
+             !(bodies_[size_t(patch.a)].is_free() || bodies_[size_t(patch.b)].is_free());
     });
   }
   // Change which boxes the bodies have. Patches of boxes that stay with their body stay.
@@ -122,8 +123,10 @@ class PatchForces {
 
   // Take an answer, and the poses of its question. Pairs that are missing are forgotten. Nothing
   // changes for a pair that comes twice, and for a patch whose numbers leave float64's range.
-  Held hold(const bc_patches& answer, const bc_pose* poses) {
-    Held held = take(answer, poses, false);
+  // `in_threads`, here and below, shares chunks of work among threads.
+  template <class InThreads>
+  Held hold(const bc_patches& answer, const bc_pose* poses, const InThreads& in_threads) {
+    Held held = take(answer, poses, false, in_threads);
     if (held != Held::all) return held;
     own_.forget();
     clock_.answer(answer.age, answer.period);
@@ -145,9 +148,9 @@ class PatchForces {
     return Held::all;
   }
   // Solve the contacts of one's own at the start of a step `dt`, and take them: see OwnContacts::solve.
-  template <class Solve>
+  template <class Solve, class InThreads>
   long solve_own(double dt, const bc_pose* poses, const bc_wrench* outside, const Solve& solve,
-                 Held& held) {
+                 const InThreads& in_threads, Held& held) {
     held = Held::all;
     if (own_.count() == 0) return -1;
     if (!is_chosen_)
@@ -155,14 +158,13 @@ class PatchForces {
                   [this](size_t box) { return rest_.is_quiet(size_t(body_of(int64_t(box)))); });
     is_chosen_ = true;
     long refused = own_.solve(poses, Gaps(bodies_, boxes(), patches_, dt, outside), solve);
-    if (refused < 0) held = take(own_.answer(), poses, true);
+    if (refused < 0) held = take(own_.answer(), poses, true, in_threads);
     return refused;
   }
 
   // From poses, velocities and outside wrenches at the start of a step `dt` to poses and velocities at
-  // its end. Or to the mean wrenches of contacts, with those that push overlaps out. `in_threads` shares
-  // chunks of work among threads. Returns −1, or a body whose numbers are not finite at the end: then
-  // all is as it was at the last `keep`.
+  // its end. Or to the mean wrenches of contacts, with those that push overlaps out. Returns −1, or a
+  // body whose numbers are not finite at the end: then all is as it was at the last `keep`.
   template <class InThreads>
   int64_t advance(double dt, const Given& given, const bc_motion& motion, SolvePair solve_pair,
                   const InThreads& in_threads) {
@@ -174,10 +176,7 @@ class PatchForces {
     is_grouped_ = true;
     IslandStep islands(options_, bodies_, step, ended_, fineness_, patches_, loads_, islands_);
     const std::vector<Chunk>& chunks = islands_.chunks;
-    long threads = std::min(long(options_.threads), long(chunks.size()));
-    if (threads > 0)  // no bit depends on their number
-      in_threads(threads, long(chunks.size()),
-                 [&](long, long chunk) { islands.advance(chunks[size_t(chunk)]); });
+    each_chunk(in_threads, chunks.size(), [&](size_t k) { islands.advance(chunks[k]); });
     int64_t lost = islands.first_lost();
     if (lost >= 0) {
       restore();
@@ -190,7 +189,7 @@ class PatchForces {
         options_.rest_speed > 0.0 && motion.poses && motion.velocities &&
         rest_.count(islands_, bodies_, patches_, given, step.steps, options_.rest_speed);
     rest_.end(given.poses, dt);
-    islands.write_ends();
+    each_chunk(in_threads, chunks.size(), [&](size_t k) { islands.write_ends(chunks[k]); });
     for (int32_t k : rest_.fixed()) islands.move_alone(size_t(k));
     if (is_resting) rest_.write_new_ends(all);
     if (motion.poses) each_read([&](size_t k) { poses_[k] = motion.poses[k]; });
@@ -285,10 +284,13 @@ class PatchForces {
     rest_.make_room(bodies_.size(), room_);
     rollback_.make_room(bodies_.size(), room_);
     islands_.make_room(bodies_.size(), room_);
-    reader_.make_room(bodies_.size(), size_t(box_count()));
+    reader_.make_room(bodies_.size(), size_t(box_count()), room_);
   }
-  bool moves(int32_t a, int32_t b) const {
-    return bodies_[size_t(a)].is_free() || bodies_[size_t(b)].is_free();
+  // No bit depends on the number of threads.
+  template <class InThreads, class Work>
+  void each_chunk(const InThreads& in_threads, size_t count, const Work& work) const {
+    long threads = std::min(long(options_.threads), long(count));
+    if (count > 0) in_threads(threads, long(count), [&](long, long k) { work(size_t(k)); });
   }
 
   // Loads name boxes, which may be others or none from now on.
@@ -299,17 +301,15 @@ class PatchForces {
     is_grouped_ = false;
   }
 
-  Held take(const bc_patches& answer, const bc_pose* poses, bool is_own) {
-    next_.clear();
-    reader_.begin(bodies_.size(), size_t(box_count()));
-    Answered all{answer, poses, bodies_, boxes(), options_.friction};
-    for (int64_t turn = 0; turn < answer.count; ++turn) {
-      int64_t k = is_own ? int64_t(own_.row(size_t(turn))) : turn;
-      const int64_t* boxes = answer.pairs + 2 * k;
-      if (!all.is_patch(k) || !moves(all.body_of(boxes[0]), all.body_of(boxes[1]))) continue;
-      next_.push_back(reader_.read(all, k));
-      if (!all.is_stale(k) && !next_.back().has_area()) return Held::no_patch;
-    }
+  template <class InThreads>
+  Held take(const bc_patches& answer, const bc_pose* poses, bool is_own,
+            const InThreads& in_threads) {
+    reader_.read(
+        {answer, poses, bodies_, boxes(), options_.friction}, size_t(box_count()),
+        [&](size_t turn) { return is_own ? own_.row(turn) : turn; }, next_,
+        [&](size_t count, const auto& work) { each_chunk(in_threads, count, work); });
+    for (const Patch& patch : next_)
+      if (patch.age >= 0.0 && !patch.has_area()) return Held::no_patch;
     if (is_own) wake_touched();
     auto same = [](const Patch& p, const Patch& q) { return p.pair() == q.pair(); };
     if (!std::is_sorted(next_.begin(), next_.end(), ByPair{}))

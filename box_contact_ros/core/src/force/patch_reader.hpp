@@ -22,25 +22,62 @@ struct Answered {
   double friction;                        // where the answer has none
 
   bool is_stale(int64_t k) const { return answer.separation[k] != answer.separation[k]; }
-  bool is_patch(int64_t k) const { return is_stale(k) || answer.volume[k] > 0.0; }
+  // Of a pair of which something moves.
+  bool is_patch(int64_t k) const {
+    const int64_t* pair = answer.pairs + 2 * k;
+    return (is_stale(k) || answer.volume[k] > 0.0) && (bodies[size_t(body_of(pair[0]))].is_free() ||
+                                                       bodies[size_t(body_of(pair[1]))].is_free());
+  }
   int32_t body_of(int64_t box) const {
     return int32_t(boxes.empty() ? box : boxes[size_t(box)].body);
   }
 };
 
+// So many patches are read at a time: some 50 µs of work for a thread.
+constexpr size_t patches_per_chunk = 256;
+
 // Reads patches, and places each body and box once.
 class PatchReader {
  public:
-  void make_room(size_t bodies, size_t boxes) {
+  void make_room(size_t bodies, size_t boxes, size_t patches) {
     bodies_at_.make_room(bodies);
     boxes_at_.make_room(boxes);
+    rows_.reserve(patches);
   }
-  void begin(size_t bodies, size_t boxes) {
-    bodies_at_.forget(bodies);
-    boxes_at_.forget(boxes);
+  // Read the rows that are patches, `row(turn)` for each turn. `each_chunk(count, work)` shares chunks of
+  // work among threads. The age of a stale patch is below zero, and it knows nothing but its pair.
+  template <class Row, class EachChunk>
+  void read(const Answered& all, size_t box_count, const Row& row, std::vector<Patch>& patches,
+            const EachChunk& each_chunk) {
+    bodies_at_.forget(all.bodies.size());
+    boxes_at_.forget(box_count);
+    rows_.clear();
+    for (int64_t turn = 0; turn < all.answer.count; ++turn) {
+      auto k = int64_t(row(size_t(turn)));
+      if (!all.is_patch(k)) continue;
+      rows_.push_back(k);
+      if (all.is_stale(k)) continue;
+      for (int end = 0; end < 2; ++end) place(all, int32_t(all.answer.pairs[2 * k + end]));
+    }
+    size_t count = rows_.size();
+    patches.resize(count);
+    each_chunk((count + patches_per_chunk - 1) / patches_per_chunk, [&](size_t chunk) {
+      size_t first = chunk * patches_per_chunk;
+      for (size_t turn = first; turn < std::min(first + patches_per_chunk, count); ++turn)
+        patches[turn] = read(all, rows_[turn]);
+    });
   }
-  // Read row k. The age of a stale patch is below zero, and it knows nothing but its pair.
-  Patch read(const Answered& all, int64_t k) {
+
+ private:
+  void place(const Answered& all, int32_t box) {
+    int32_t body = all.body_of(box);
+    const bc_pose& at = all.poses[body];
+    bodies_at_.find(size_t(body), [&] { return placed_at(at, all.bodies[size_t(body)].centre); });
+    boxes_at_.find(size_t(box), [&] {
+      return box_at(all.boxes.empty() ? at : in_common_frame(at, all.boxes[size_t(box)].box.pose));
+    });
+  }
+  Patch read(const Answered& all, int64_t k) const {
     const bc_patches& answer = all.answer;
     auto a = int32_t(answer.pairs[2 * k]), b = int32_t(answer.pairs[2 * k + 1]);
     double sign = a < b ? 1.0 : -1.0;
@@ -51,9 +88,9 @@ class PatchReader {
     patch.b = all.body_of(patch.box_b);
     patch.age = all.is_stale(k) ? -1.0 : 0.0;
     if (all.is_stale(k)) return patch;
-    const Placed &box_at_a = box_placed(all, patch.box_a, patch.a),
-                 &box_at_b = box_placed(all, patch.box_b, patch.b);
-    patch.place(body_placed(all, patch.a), body_placed(all, patch.b),
+    const Placed &box_at_a = boxes_at_[size_t(patch.box_a)],
+                 &box_at_b = boxes_at_[size_t(patch.box_b)];
+    patch.place(bodies_at_[size_t(patch.a)], bodies_at_[size_t(patch.b)],
                 sign * vector_at(answer.normal + 3 * k), answer.point + 3 * k,
                 answer.covariance + 9 * k, answer.volume[k], answer.separation[k],
                 (is_lighter_b(all.bodies, patch) ? box_at_b : box_at_a).axes);
@@ -67,19 +104,8 @@ class PatchReader {
     return patch;
   }
 
- private:
-  const Placed& body_placed(const Answered& all, int32_t body) {
-    return bodies_at_.of(
-        size_t(body), [&] { return placed_at(all.poses[body], all.bodies[size_t(body)].centre); });
-  }
-  const Placed& box_placed(const Answered& all, int32_t box, int32_t body) {
-    return boxes_at_.of(size_t(box), [&] {
-      const bc_pose& at = all.poses[body];
-      return box_at(all.boxes.empty() ? at : in_common_frame(at, all.boxes[size_t(box)].box.pose));
-    });
-  }
-
   PlacedOnce bodies_at_, boxes_at_;
+  std::vector<int64_t> rows_;
 };
 
 // Hand on the impulses of the patches before, and keep the patches of stale pairs. Both are by pair.

@@ -121,11 +121,11 @@ class PlacedOnce {
     is_known_.assign(count, 0);
   }
   template <class Find>
-  const Placed& of(size_t k, const Find& find) {
+  void find(size_t k, const Find& find) {
     if (!is_known_[k]) placed_[k] = find();
     is_known_[k] = 1;
-    return placed_[k];
   }
+  const Placed& operator[](size_t k) const { return placed_[k]; }
 
  private:
   std::vector<Placed> placed_;

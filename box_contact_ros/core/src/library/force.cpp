@@ -33,6 +33,10 @@ bool solve_exactly(const PairNumbers& pair, bc_contact& contact) {
   return solve_pair({chosen_kernel(), Model::exact, nullptr}, pair, BC_COVARIANCE, 0.0, contact);
 }
 
+constexpr auto threaded = [](long threads, long chunks, const auto& work) {
+  in_threads(threads, chunks, work);
+};
+
 // Solve the contacts of one's own, and take them.
 bc_status solve_own(PatchForces& self, double dt, const bc_pose* poses, const bc_wrench* outside) {
   const Kernel* kernel = chosen_kernel();
@@ -41,7 +45,7 @@ bc_status solve_own(PatchForces& self, double dt, const bc_pose* poses, const bc
     return solve_rows({kernel, Model::exact, nullptr}, rows, count, results, self.threads());
   };
   PatchForces::Held held;
-  long refused = self.solve_own(dt, poses, outside, solve, held);
+  long refused = self.solve_own(dt, poses, outside, solve, threaded, held);
   if (refused >= 0) return fail(BC_BAD_POSE, "pairs[%ld]: a box is beyond 1e50 m", refused);
   return explain(held);
 }
@@ -65,9 +69,7 @@ bc_status advance(bc_patch_forces* forces, double dt, const Given& given, const 
     self.restore();
     return status;
   }
-  int64_t lost = self.advance(
-      dt, given, all, solve_exactly,
-      [](long threads, long chunks, const auto& work) { in_threads(threads, chunks, work); });
+  int64_t lost = self.advance(dt, given, all, solve_exactly, threaded);
   if (lost < 0) return BC_OK;
   return fail(
       BC_BAD_ARGUMENT,
@@ -176,7 +178,7 @@ bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches* answer
     if (all.separation && !poses && !self.bodies().empty()) return refuse_null("poses");
     if (!all.separation && self.holds(all)) return BC_OK;
     if (bc_status status = check_answer(all, self, poses)) return status;
-    return explain(all.separation ? self.hold(all, poses) : self.hold(all));
+    return explain(all.separation ? self.hold(all, poses, threaded) : self.hold(all));
   });
 }
 
