@@ -22,7 +22,7 @@ struct Answered {
   double friction;                        // where the answer has none
 
   bool is_stale(int64_t k) const { return answer.separation[k] != answer.separation[k]; }
-  // Of a pair of which something moves.
+  // Whether row k is of a pair that touches, or may still do so, and of which something moves.
   bool is_patch(int64_t k) const {
     const int64_t* pair = answer.pairs + 2 * k;
     return (is_stale(k) || answer.volume[k] > 0.0) && (bodies[size_t(body_of(pair[0]))].is_free() ||

@@ -33,6 +33,7 @@ bool solve_exactly(const PairNumbers& pair, bc_contact& contact) {
   return solve_pair({chosen_kernel(), Model::exact, nullptr}, pair, BC_COVARIANCE, 0.0, contact);
 }
 
+// `in_threads`, to be handed on.
 constexpr auto threaded = [](long threads, long chunks, const auto& work) {
   in_threads(threads, chunks, work);
 };
