@@ -116,13 +116,13 @@ def test_a_step_that_is_refused_makes_no_island_finer() -> None:
 
 
 def test_threads_change_no_bit() -> None:
-    places = [(k % 20 - 10, k // 20 % 10 - 5, 0.26 + 0.52 * (k // 200)) for k in range(400)]
+    places = [(k % 20 - 10, k // 20 % 30 - 15, 0.26 + 0.52 * (k // 600)) for k in range(1200)]
     rows = [FLOOR, *(((0.5, 0.5, 0.5), 50.0, place, turned((1, 1, 0), 0.01 * (k % 7)))
                      for k, place in enumerate(places))]
     found = []
     for threads in (1, 2, 5):
         world = World(*rows, threads=threads)
-        world.forces.hold([(0, k) for k in range(1, 201)] + [(k, k + 200) for k in range(1, 201)])
+        world.forces.hold([(0, k) for k in range(1, 601)] + [(k, k + 600) for k in range(1, 601)])
         found.append(world.run(0.1).poses.tobytes())
     assert len(set(found)) == 1
 

@@ -18,6 +18,8 @@ namespace box_contact::BOX_CONTACT_SET::force {
 // Blocks that are solved side by side, about: so many fill the lanes of islands of one block each, and a
 // core's second cache has room for them. A thread takes as many at a time: some 100 µs of work.
 constexpr size_t blocks_per_chunk = 128;
+// The ends of so many chunks are worth a thread, which takes some 30 µs to begin.
+constexpr size_t ends_per_thread = 8;
 
 // Islands in turn.
 struct Chunk {

@@ -64,8 +64,8 @@ inline bool is_sway(double speed, bool has_swayed) {
   return speed > (has_swayed ? least_sway : begun_sway) && speed < most_sway;
 }
 // A stack takes `more_rounds` times as many at first, and as many more after each such time of sway [s], up to
-// `most_rounds` times.
-// With no more than at first, six of six landings of a real order of 19 boxes sway for ever at 1/60 s.
+// `most_rounds` times. With no more than at first, six of six landings of a real order of 19 boxes sway for
+// ever at 1/60 s.
 constexpr double sway_time = 0.5;
 constexpr int most_rounds = 12;
 // How many times as many iterations an island takes that has swayed for a time [s]; 0: it does not sway.

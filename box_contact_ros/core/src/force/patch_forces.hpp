@@ -121,9 +121,8 @@ class PatchForces {
     is_grouped_ = is_chosen_ = false;
   }
 
-  // Take an answer, and the poses of its question. Pairs that are missing are forgotten. Nothing
-  // changes for a pair that comes twice, and for a patch whose numbers leave float64's range.
-  // `in_threads`, here and below, shares chunks of work among threads.
+  // Take an answer, and the poses of its question. Pairs that are missing are forgotten. Nothing changes
+  // for a pair that comes twice, and for a patch beyond float64's range. `in_threads` shares chunks of work.
   template <class InThreads>
   Held hold(const bc_patches& answer, const bc_pose* poses, const InThreads& in_threads) {
     Held held = take(answer, poses, false, in_threads);
@@ -176,7 +175,7 @@ class PatchForces {
     is_grouped_ = true;
     IslandStep islands(options_, bodies_, step, ended_, fineness_, patches_, loads_, islands_);
     const std::vector<Chunk>& chunks = islands_.chunks;
-    each_chunk(in_threads, chunks.size(), [&](size_t k) { islands.advance(chunks[k]); });
+    each_chunk(in_threads, chunks.size(), 1, [&](size_t k) { islands.advance(chunks[k]); });
     int64_t lost = islands.first_lost();
     if (lost >= 0) {
       restore();
@@ -189,7 +188,8 @@ class PatchForces {
         options_.rest_speed > 0.0 && motion.poses && motion.velocities &&
         rest_.count(islands_, bodies_, patches_, given, step.steps, options_.rest_speed);
     rest_.end(given.poses, dt);
-    each_chunk(in_threads, chunks.size(), [&](size_t k) { islands.write_ends(chunks[k]); });
+    each_chunk(in_threads, chunks.size(), ends_per_thread,
+               [&](size_t k) { islands.write_ends(chunks[k]); });
     for (int32_t k : rest_.fixed()) islands.move_alone(size_t(k));
     if (is_resting) rest_.write_new_ends(all);
     if (motion.poses) each_read([&](size_t k) { poses_[k] = motion.poses[k]; });
@@ -286,10 +286,10 @@ class PatchForces {
     islands_.make_room(bodies_.size(), room_);
     reader_.make_room(bodies_.size(), size_t(box_count()), room_);
   }
-  // No bit depends on the number of threads.
+  // As many chunks are worth a thread. No bit depends on their number.
   template <class InThreads, class Work>
-  void each_chunk(const InThreads& in_threads, size_t count, const Work& work) const {
-    long threads = std::min(long(options_.threads), long(count));
+  void each_chunk(const InThreads& in_threads, size_t count, size_t worth, const Work& work) const {
+    long threads = std::min(long(options_.threads), long((count + worth - 1) / worth));
     if (count > 0) in_threads(threads, long(count), [&](long, long k) { work(size_t(k)); });
   }
 
@@ -307,7 +307,7 @@ class PatchForces {
     reader_.read(
         {answer, poses, bodies_, boxes(), options_.friction}, size_t(box_count()),
         [&](size_t turn) { return is_own ? own_.row(turn) : turn; }, next_,
-        [&](size_t count, const auto& work) { each_chunk(in_threads, count, work); });
+        [&](size_t count, const auto& work) { each_chunk(in_threads, count, 1, work); });
     for (const Patch& patch : next_)
       if (patch.age >= 0.0 && !patch.has_area()) return Held::no_patch;
     if (is_own) wake_touched();
