@@ -301,6 +301,18 @@ def test_a_load_on_a_kilogram_sinks_by_less_than_a_millimetre(mass: float) -> No
     assert world.poses[1, 2] + 0.55 - world.poses[2, 2] < 1e-3
 
 
+def test_what_is_relieved_of_a_load_rests_as_if_it_had_never_borne_it() -> None:
+    """At 1/60 s, 0.4·g·sub-step² deep: within seconds its sub-steps are no shorter any more."""
+    world = World(FLOOR, ((0.5, 0.5, 0.1), 1.0, (0, 0, 0.05)),
+                  ((1.0, 1.0, 1.0), 100.0, (0, 0, 0.6)), rest=False)
+    world.run(2.0, 1 / 60)
+    borne = 0.05 - world.poses[1, 2]
+    world.poses[2, 0] = 3.0
+    world.run(6.0, 1 / 60)
+    assert borne > 1e-4
+    assert 0.05 - world.poses[1, 2] == pytest.approx(GRAVITY / (1.57 * 240)**2, rel=1e-3)
+
+
 def test_a_cube_of_8000_times_the_mass_rests_on_four() -> None:
     """Of 20 m, on four of 1 m: less than 2 mm deep."""
     corners = [(x, y, 0.5) for x in (-9.0, 9.0) for y in (-9.0, 9.0)]

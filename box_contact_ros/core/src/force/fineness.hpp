@@ -61,18 +61,21 @@ class FinenessOf {
         by_height_(islands.by_height) {}
 
   int operator()(const Island& island, const SubSteps& steps, std::vector<Fineness>& all) const {
-    int needed = needed_by(island, steps), held = 1;
+    double needed = needed_by(island, steps);
+    int held = 1;
     double calm = calm_time;
     each_free(island, [&](size_t body) {
       held = std::max(held, all[body].factor);
       calm = std::min(calm, all[body].calm);
     });
-    if (held == 1 && needed == 1) return 1;
+    if (held == 1 && needed <= 1.0) return 1;
     bool is_spare = spare_factor * needed <= held;
-    bool is_short = held == 1 ? needed > 1 : needed > growth * held;
-    int factor = is_short                        ? std::min(finest, int(std::ceil(growth * needed)))
-                 : is_spare && calm >= calm_time ? held / 2
-                                                 : held;
+    bool is_short = needed > (held == 1 ? 1.0 : growth * held);
+    int factor = held;
+    if (is_short)
+      factor = int(std::ceil(std::min(growth * needed, double(finest))));
+    else if (is_spare && calm >= calm_time)
+      factor = held / 2;
     each_free(island, [&](size_t body) {
       Fineness& fineness = all[body];
       fineness.factor = factor;
@@ -96,7 +99,8 @@ class FinenessOf {
       if (moving_[k].inverse_mass > 0.0) visit(size_t(moving_[k].body));
   }
 
-  int needed_by(const Island& island, const SubSteps& steps) const {
+  // The factor that is needed; where less than 1 is, the load is lighter by as much.
+  double needed_by(const Island& island, const SubSteps& steps) const {
     Vec<double> total{0.0, 0.0, 0.0};
     double lightest = 0.0;
     each_free(island, [&](size_t body) {
@@ -115,10 +119,9 @@ class FinenessOf {
           moving_[size_t(blocks_[k].a)].inverse_mass + moving_[size_t(blocks_[k].b)].inverse_mass;
       push = std::max(push, std::max(patch.lasting, above) * closing);
     }
-    if (!(push > least_push)) return 1;
     double ratio = steps.window * std::sqrt(push / (aimed_depth * most_depth_)) / soft_frequency;
-    double most = island.is_uneven ? double(finest) : push / least_push;
-    return int(std::ceil(std::min({ratio, most, double(finest)})));
+    double beyond = push / least_push;
+    return island.is_uneven && beyond > 1.0 ? std::ceil(ratio) : std::min(ratio, beyond);
   }
 
   // Weights from the top: each body hands what it bears to its patches below, in equal parts.
