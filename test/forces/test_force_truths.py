@@ -313,6 +313,18 @@ def test_what_is_relieved_of_a_load_rests_as_if_it_had_never_borne_it() -> None:
     assert 0.05 - world.poses[1, 2] == pytest.approx(GRAVITY / (1.57 * 240)**2, rel=1e-3)
 
 
+def test_what_is_forgotten_takes_long_sub_steps_at_once() -> None:
+    """A box that bore 100 times its mass: elsewhere, after 0.5 s, it is as deep as one alone."""
+    world = World(FLOOR, ((0.5, 0.5, 0.1), 1.0, (0, 0, 0.05)),
+                  ((1.0, 1.0, 1.0), 100.0, (0, 0, 0.6)), rest=False)
+    world.run(2.0, 1 / 60)
+    world.poses[1] = (3.0, 0, 0.05, 0, 0, 0, 1)
+    world.velocities[1] = 0.0
+    world.forces.forget([1])
+    world.run(0.5, 1 / 60)
+    assert 0.05 - world.poses[1, 2] == pytest.approx(GRAVITY / (1.57 * 240)**2, rel=1e-2)
+
+
 def test_a_cube_of_8000_times_the_mass_rests_on_four() -> None:
     """Of 20 m, on four of 1 m: less than 2 mm deep."""
     corners = [(x, y, 0.5) for x in (-9.0, 9.0) for y in (-9.0, 9.0)]

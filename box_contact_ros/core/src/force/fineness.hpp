@@ -45,6 +45,9 @@ struct Fineness {
   int factor = 1;
   double calm = 0.0;    // for how long less was needed [s]
   double swayed = 0.0;  // for how long it has swayed [s]
+
+  // What rests has not swayed, and still bears its load.
+  Fineness at_rest() const { return {factor, calm}; }
 };
 
 // Chooses the factor of an island, and tells for how long it has swayed. Both are kept with its bodies.

@@ -257,15 +257,15 @@ class PatchForces {
                                [this](const Patch& patch) { return rest_.rests(patch); }),
                 next_.end());
   }
-  // What is let go, gripped, forgotten or laid down has not ended an advance, nor swayed.
-  void begin_anew(size_t body) {
+  // What is let go, gripped or forgotten has not ended an advance, and needs no shorter sub-steps yet.
+  void begin_anew(size_t body, const Fineness& fineness = {}) {
     ended_[body] = {};
-    fineness_[body].swayed = 0.0;
+    fineness_[body] = fineness;
   }
   // Bodies that come to rest end where they began.
   void lay_down() {
-    for (int32_t body : rest_.awake())
-      if (rest_.is_at_rest(size_t(body))) begin_anew(size_t(body));
+    for (int32_t k : rest_.awake())
+      if (rest_.is_at_rest(size_t(k))) begin_anew(size_t(k), fineness_[size_t(k)].at_rest());
     rest_.lay_down(bodies_, patches_, loads_);
     is_grouped_ = is_chosen_ = false;
   }
