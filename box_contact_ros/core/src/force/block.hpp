@@ -141,11 +141,12 @@ inline void take(const Patch& patch, double over_relaxation, Block& block) {
   auto local = [&](const Placed& asked) {
     return transposed_times(asked.axes, patch.point - asked.position);
   };
-  static_cast<Asked<double>&>(block) = {patch.normal,         patch.point,          patch.surface,
-                                        patch.shape,          patch.friction,       patch.depth,
-                                        patch.stiffness,      patch.late,           patch.age,
-                                        local(patch.asked_a), local(patch.asked_b), {},
-                                        over_relaxation};
+  // The zeros are written out: `{}` would clear the whole of it first.
+  static_cast<Asked<double>&>(block) = {
+      patch.normal,   patch.point,          patch.surface,        patch.shape,
+      patch.friction, patch.depth,          patch.stiffness,      patch.late,
+      patch.age,      local(patch.asked_a), local(patch.asked_b), Vec<double>{0.0, 0.0, 0.0},
+      over_relaxation};
   static_cast<Kept<double>&>(block) = {patch.window,          patch.normal_impulse,
                                        patch.torsion_impulse, patch.friction_impulse,
                                        patch.rocking_impulse, patch.impulse_arm};
@@ -293,6 +294,14 @@ BC_INLINE Vec<T> pressing_speeds(const Rows<T>& block, const NormalRows<T>& rows
          rows.bias;
 }
 
+// Written out, as a copy of a matrix of lanes is a call.
+template <class T>
+BC_INLINE Mat<T> softened(const Mat<T>& m, const Vec<T>& softness) {
+  return {{{m[0][0] + softness[0], m[0][1], m[0][2]},
+           {m[1][0], m[1][1] + softness[1], m[1][2]},
+           {m[2][0], m[2][1], m[2][2] + softness[2]}}};
+}
+
 // Solve pressing and rocking of those. Returns by how much the closing speed changed.
 template <class T, class Body>
 BC_INLINE T solve_normal(Rows<T>& block, const NormalRows<T>& rows, Mask<T> due, Body& a, Body& b) {
@@ -313,8 +322,7 @@ BC_INLINE T solve_normal(Rows<T>& block, const NormalRows<T>& rows, Mask<T> due,
   }
   if (bits(due) & ~bits(within)) {
     // The pressure would be negative at a rim.
-    Mat<T> soft = block.across;
-    for (int i = 0; i < 3; ++i) soft[i][i] += rows.softness[i];
+    Mat<T> soft = softened(block.across, rows.softness);
     next = select(within, next, OnTheRim<T>(block.shape, soft, v - soft * before).impulses());
   }
   apply_normal(block, next - before, a, b);

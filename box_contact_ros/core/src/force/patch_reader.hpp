@@ -64,7 +64,7 @@ class PatchReader {
     each_chunk((count + patches_per_chunk - 1) / patches_per_chunk, [&](size_t chunk) {
       size_t first = chunk * patches_per_chunk;
       for (size_t turn = first; turn < std::min(first + patches_per_chunk, count); ++turn)
-        patches[turn] = read(all, rows_[turn]);
+        read(all, rows_[turn], patches[turn]);
     });
   }
 
@@ -77,17 +77,17 @@ class PatchReader {
       return box_at(all.boxes.empty() ? at : in_common_frame(at, all.boxes[size_t(box)].box.pose));
     });
   }
-  Patch read(const Answered& all, int64_t k) const {
+  void read(const Answered& all, int64_t k, Patch& patch) const {
     const bc_patches& answer = all.answer;
     auto a = int32_t(answer.pairs[2 * k]), b = int32_t(answer.pairs[2 * k + 1]);
     double sign = a < b ? 1.0 : -1.0;
-    Patch patch{};
+    patch = {};
     patch.box_a = std::min(a, b);
     patch.box_b = std::max(a, b);
     patch.a = all.body_of(patch.box_a);
     patch.b = all.body_of(patch.box_b);
     patch.age = all.is_stale(k) ? -1.0 : 0.0;
-    if (all.is_stale(k)) return patch;
+    if (all.is_stale(k)) return;
     const Placed &box_at_a = boxes_at_[size_t(patch.box_a)],
                  &box_at_b = boxes_at_[size_t(patch.box_b)];
     patch.place(bodies_at_[size_t(patch.a)], bodies_at_[size_t(patch.b)],
@@ -101,7 +101,6 @@ class PatchReader {
     patch.stiffness = answer.stiffness ? answer.stiffness[k] : 0.0;
     if (answer.surface) patch.surface = sign * vector_at(answer.surface + 3 * k);
     patch.late = answer.age;
-    return patch;
   }
 
   PlacedOnce bodies_at_, boxes_at_;

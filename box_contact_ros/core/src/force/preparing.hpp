@@ -47,12 +47,6 @@ BC_INLINE Mat<T> compliance(const Body& a, const Body& b, const Vec<T> (&turn_a)
   return m;
 }
 
-template <class T>
-BC_INLINE Mat<T> softened(Mat<T> compliance, const Vec<T>& softness) {
-  for (int i = 0; i < 3; ++i) compliance[i][i] += softness[i];
-  return inverse(compliance);
-}
-
 // Catto's soft step: a spring and a damper, implicit in time. Relaxation is without them, but for a
 // stiffness of the patch's own. Rocking is soft where answers are late: the wedge of the overlap,
 // which levels a body, is late then. `turned()`: by how much B has turned more than A since.
@@ -62,11 +56,17 @@ BC_INLINE void soften(const SubSteps& step, const Turned& turned, Rows<T>& block
   T depth = block.depth, none{};
   double h = step.length;
   T apart = select<T>(depth < 0.0, -depth / h, none);
-  block.relaxed = {{none, none, none}, block.closing, inverse(compliance)};
-  block.relaxed.bias[0] += apart;
-  block.pushing = block.relaxed;
+  NormalRows<T>&pushing = block.pushing, &relaxed = block.relaxed;
+  relaxed.softness = pushing.softness = {none, none, none};
+  relaxed.bias = block.closing;
+  relaxed.bias[0] += apart;
+  relaxed.mass = inverse(compliance);
+  pushing.bias = relaxed.bias;
   Mask<T> pushes = (depth >= 0.0) & (block.age <= step.overdue);
-  if (!any(pushes)) return;
+  if (!any(pushes)) {
+    pushing.mass = relaxed.mass;
+    return;
+  }
   T frequency = splat<T>(soft_frequency / step.window);
   T bearable = frequency_of(block.late, step.period);
   Mask<T> is_late = pushes & (bearable < frequency * step.share);
@@ -78,25 +78,23 @@ BC_INLINE void soften(const SubSteps& step, const Turned& turned, Rows<T>& block
       select<T>(is_late | is_spring, splat<T>(slow_damping_ratio), splat<T>(soft_damping_ratio));
   T rate = frequency / (2.0 * damping + h * frequency);
   T softness = rate / (h * frequency * frequency);
-  NormalRows<T> rows = block.pushing;
   if (any(is_late)) {
     Vec<T> turn = turned(), soft = softness * Vec<T>{none, compliance[1][1], compliance[2][2]};
     put<T>(
         is_late,
         NormalRows<T>{
             soft, rate * Vec<T>{none, dot(turn, block.shape.axis_1), dot(turn, block.shape.axis_2)},
-            softened(compliance, soft)},
-        rows);
-    put<T>(is_late, rows, block.relaxed);
+            inverse(softened(compliance, soft))},
+        relaxed);
+    put<T>(is_late, relaxed, pushing);
   }
   T limit = select<T>(is_late, splat<T>(late_push_out_limit), splat<T>(push_out_limit));
   T slowed = min(limit / (rate * depth), splat<T>(1.0));
   slowed = select<T>(is_spring, splat<T>(1.0), slowed);
-  rows.softness[0] = slowed * softness * compliance[0][0];
-  rows.bias[0] = block.closing[0] - slowed * rate * depth;
-  rows.mass = softened(compliance, rows.softness);
-  put<T>(pushes, rows, block.pushing);
-  if (any(is_spring)) put<T>(is_spring, rows, block.relaxed);
+  pushing.softness[0] = select<T>(pushes, slowed * softness * compliance[0][0], none);
+  pushing.bias[0] = select<T>(pushes, block.closing[0] - slowed * rate * depth, pushing.bias[0]);
+  pushing.mass = inverse(softened(compliance, pushing.softness));
+  if (any(is_spring)) put<T>(is_spring, pushing, relaxed);
 }
 
 template <class T>
@@ -123,7 +121,7 @@ BC_INLINE Place<T> place(const Body& a, const Body& b, const Where<T>& at_a, con
 
 // The masses of friction and torsion, and how pressing and rocking comply.
 template <class T, class Body>
-BC_INLINE Masses<T> weigh(const Body& a, const Body& b, const Rows<T>& block) {
+BC_INLINE void weigh(const Body& a, const Body& b, const Rows<T>& block, Masses<T>& masses) {
   const RectangleOf<T>& shape = block.shape;
   const Vec<T>&arm_a = block.arm_a, &arm_b = block.arm_b, &normal = block.normal;
   Vec<T> about = shape.radius * normal;
@@ -131,9 +129,10 @@ BC_INLINE Masses<T> weigh(const Body& a, const Body& b, const Rows<T>& block) {
       compliance<2, T>(a, b, {cross(arm_a, shape.axis_1), cross(arm_a, shape.axis_2), about},
                        {cross(arm_b, shape.axis_1), cross(arm_b, shape.axis_2), about},
                        {shape.axis_1, shape.axis_2});
-  return {compliance<1, T>(a, b, {cross(arm_a, normal), shape.axis_1, shape.axis_2},
-                           {cross(arm_b, normal), shape.axis_1, shape.axis_2}, {normal}),
-          inverse(along), 1.0 / max(along[2][2], max(along[1][1], along[0][0]))};
+  masses.across = compliance<1, T>(a, b, {cross(arm_a, normal), shape.axis_1, shape.axis_2},
+                                   {cross(arm_b, normal), shape.axis_1, shape.axis_2}, {normal});
+  masses.friction_mass = inverse(along);
+  masses.least_friction_mass = 1.0 / max(along[2][2], max(along[1][1], along[0][0]));
 }
 
 // Make the rows of a patch, where its bodies are now.
@@ -144,7 +143,7 @@ BC_INLINE void prepare(const SubSteps& step, const Body& a, const Body& b, const
   auto [arms, depth] = place(a, b, at_a, at_b, step.length, block);
   static_cast<Arms<T>&>(block) = arms;
   block.depth = depth;
-  static_cast<Masses<T>&>(block) = weigh(a, b, block);
+  weigh<T>(a, b, block, block);
   soften(step, turned, block);
 }
 
@@ -165,8 +164,10 @@ BC_INLINE void follow(const Body& a, const Body& b, const Where<T>& at_a, const 
   put<T>(goes, place(a, b, at_a, at_b, -h, block).arms, static_cast<Arms<T>&>(block));
   Mask<T> weighs = moved > alike;
   if (!any(weighs)) return;
-  put<T>(weighs, weigh(a, b, block), static_cast<Masses<T>&>(block));
-  put<T>(weighs, softened(block.across, block.relaxed.softness), block.relaxed.mass);
+  Masses<T> masses;
+  weigh(a, b, block, masses);
+  put<T>(weighs, masses, static_cast<Masses<T>&>(block));
+  put<T>(weighs, inverse(softened(block.across, block.relaxed.softness)), block.relaxed.mass);
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET::force
