@@ -291,11 +291,16 @@ def test_two_boxes_land_as_one() -> None:
 # --- heavy on light -------------------------------------------------------------------------------
 
 
+def on_a_kilogram(mass: float, **options) -> World:
+    """Return a cube of a mass on a plate of 1 kg on the floor."""
+    return World(FLOOR, ((0.5, 0.5, 0.1), 1.0, (0, 0, 0.05)),
+                 ((1.0, 1.0, 1.0), mass, (0, 0, 0.6)), **options)
+
+
 @pytest.mark.parametrize('mass', [70.0, 100.0, 300.0, 3000.0])
 def test_a_load_on_a_kilogram_sinks_by_less_than_a_millimetre(mass: float) -> None:
     """At 1/60 s, `most_depth`, of each of both patches; from 61 kg on sub-steps are shorter."""
-    world = World(FLOOR, ((0.5, 0.5, 0.1), 1.0, (0, 0, 0.05)),
-                  ((1.0, 1.0, 1.0), mass, (0, 0, 0.6)))
+    world = on_a_kilogram(mass)
     world.run(3.0, 1 / 60)
     assert 0.05 - world.poses[1, 2] < 1e-3
     assert world.poses[1, 2] + 0.55 - world.poses[2, 2] < 1e-3
@@ -303,8 +308,7 @@ def test_a_load_on_a_kilogram_sinks_by_less_than_a_millimetre(mass: float) -> No
 
 def test_what_is_relieved_of_a_load_rests_as_if_it_had_never_borne_it() -> None:
     """At 1/60 s, 0.4·g·sub-step² deep: within seconds its sub-steps are no shorter any more."""
-    world = World(FLOOR, ((0.5, 0.5, 0.1), 1.0, (0, 0, 0.05)),
-                  ((1.0, 1.0, 1.0), 100.0, (0, 0, 0.6)), rest=False)
+    world = on_a_kilogram(100.0, rest=False)
     world.run(2.0, 1 / 60)
     borne = 0.05 - world.poses[1, 2]
     world.poses[2, 0] = 3.0
@@ -315,8 +319,7 @@ def test_what_is_relieved_of_a_load_rests_as_if_it_had_never_borne_it() -> None:
 
 def test_what_is_forgotten_takes_long_sub_steps_at_once() -> None:
     """A box that bore 100 times its mass: elsewhere, after 0.5 s, it is as deep as one alone."""
-    world = World(FLOOR, ((0.5, 0.5, 0.1), 1.0, (0, 0, 0.05)),
-                  ((1.0, 1.0, 1.0), 100.0, (0, 0, 0.6)), rest=False)
+    world = on_a_kilogram(100.0, rest=False)
     world.run(2.0, 1 / 60)
     world.poses[1] = (3.0, 0, 0.05, 0, 0, 0, 1)
     world.velocities[1] = 0.0
