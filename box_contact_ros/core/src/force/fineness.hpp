@@ -102,7 +102,7 @@ class FinenessOf {
       if (moving_[k].inverse_mass > 0.0) visit(size_t(moving_[k].body));
   }
 
-  // The factor that is needed; where less than 1 is, the load is lighter by as much.
+  // The factor that is needed [1]. Below 1, the load could grow by its inverse without one.
   double needed_by(const Island& island, const SubSteps& steps) const {
     Vec<double> total{0.0, 0.0, 0.0};
     double lightest = 0.0;

@@ -249,7 +249,7 @@ class PatchForces {
     for (size_t k = found; k < next_.size(); ++k) next_[k].age = 0.0;
     wake();
   }
-  // Take what an answer says of patches at rest. Those of which it says something new wake.
+  // Take what an answer says of patches at rest. A patch wakes where the answer says something new.
   void take_at_rest(double age, const bc_pose* asked) {
     rest_.take(next_, age, asked);
     wake();

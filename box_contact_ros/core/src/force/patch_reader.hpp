@@ -13,7 +13,7 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// An answer, and what was asked.
+// An answer to a question, with the poses, bodies and boxes of that question.
 struct Answered {
   const bc_patches& answer;
   const bc_pose* poses;
@@ -22,7 +22,7 @@ struct Answered {
   double friction;                        // where the answer has none
 
   bool is_stale(int64_t k) const { return answer.separation[k] != answer.separation[k]; }
-  // Whether row k is of a pair that touches, or may still do so, and of which something moves.
+  // Whether something moves of the pair of row k, which touches, or has a stale contact.
   bool is_patch(int64_t k) const {
     const int64_t* pair = answer.pairs + 2 * k;
     return (is_stale(k) || answer.volume[k] > 0.0) && (bodies[size_t(body_of(pair[0]))].is_free() ||
