@@ -109,5 +109,27 @@ def test_threads_have_the_same_bits() -> None:
     assert pile(1) == pile(3)
 
 
+def advance_here_and_in_a_fork() -> None:
+    """Advance boxes beside each other, and in a process that forks between two steps."""
+    rows = [((0.5, 0.5, 0.5), 1.0, (k % 20, k // 20, 0.25 + 0.001 * (k % 7))) for k in range(300)]
+    world = World(FLOOR, *rows, threads=3).step(0.01)
+    ours, theirs = os.pipe()
+    child = os.fork()
+    found = world.step(0.01).poses.tobytes()
+    if not child:
+        os.write(theirs, hashlib.sha256(found).digest())
+        os._exit(0)
+    assert os.waitpid(child, 0)[1] == 0
+    assert os.read(ours, 100) == hashlib.sha256(found).digest()
+
+
+def test_a_process_that_forks_has_the_same_bits() -> None:
+    subprocess.run([sys.executable, '-W', 'ignore', __file__, 'fork'], check=True,
+                   timeout=PATIENCE, env={**os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)})
+
+
 if __name__ == '__main__':
-    print_hash()
+    if sys.argv[1:] == ['fork']:
+        advance_here_and_in_a_fork()
+    else:
+        print_hash()

@@ -124,7 +124,7 @@ class PatchForces {
   // Take an answer, and the poses of its question. Pairs that are missing are forgotten. Nothing changes
   // for a pair that comes twice, and for a patch beyond float64's range. `in_threads` shares chunks of work.
   template <class InThreads>
-  Held hold(const bc_patches& answer, const bc_pose* poses, const InThreads& in_threads) {
+  Held hold(const bc_patches& answer, const bc_pose* poses, InThreads& in_threads) {
     Held held = take(answer, poses, false, in_threads);
     if (held != Held::all) return held;
     own_.forget();
@@ -149,7 +149,7 @@ class PatchForces {
   // Solve the contacts of one's own at the start of a step `dt`, and take them: see OwnContacts::solve.
   template <class Solve, class InThreads>
   long solve_own(double dt, const bc_pose* poses, const bc_wrench* outside, const Solve& solve,
-                 const InThreads& in_threads, Held& held) {
+                 InThreads& in_threads, Held& held) {
     held = Held::all;
     if (own_.count() == 0) return -1;
     if (!is_chosen_)
@@ -166,7 +166,7 @@ class PatchForces {
   // body whose numbers are not finite at the end: then all is as it was at the last `keep`.
   template <class InThreads>
   int64_t advance(double dt, const Given& given, const bc_motion& motion, SolvePair solve_pair,
-                  const InThreads& in_threads) {
+                  InThreads& in_threads) {
     bc_motion all = motion;
     if (!all.poses) all.poses = poses_.data();
     Advance step{clock_.begin(dt, options_.substeps), given,     all, moves_by_wrenches_,
@@ -288,7 +288,7 @@ class PatchForces {
   }
   // As many chunks are worth a thread. No bit depends on their number.
   template <class InThreads, class Work>
-  void each_chunk(const InThreads& in_threads, size_t count, size_t worth, const Work& work) const {
+  void each_chunk(InThreads& in_threads, size_t count, size_t worth, const Work& work) const {
     long threads = std::min(long(options_.threads), long((count + worth - 1) / worth));
     if (count > 0) in_threads(threads, long(count), [&](long, long k) { work(size_t(k)); });
   }
@@ -302,8 +302,7 @@ class PatchForces {
   }
 
   template <class InThreads>
-  Held take(const bc_patches& answer, const bc_pose* poses, bool is_own,
-            const InThreads& in_threads) {
+  Held take(const bc_patches& answer, const bc_pose* poses, bool is_own, InThreads& in_threads) {
     reader_.read(
         {answer, poses, bodies_, boxes(), options_.friction}, size_t(box_count()),
         [&](size_t turn) { return is_own ? own_.row(turn) : turn; }, next_,

@@ -58,14 +58,16 @@ constexpr long rows_per_chunk = 512;
 
 // Call solve(begin, end), which returns the first row that is refused, or −1, for chunks of `count`
 // rows, in as many threads as are asked for and worth it. Rows are independent, so no bit depends on
-// the number of threads. Returns the first row that is refused, or −1.
+// the number of threads. `kept`: threads to take; null: those of this call. Returns the first row that is
+// refused, or −1.
 template <class Solve>
-long in_chunks(long count, long threads, const Solve& solve) {
+long in_chunks(long count, long threads, const Solve& solve, Threads* kept = nullptr) {
   long chunks = (count + rows_per_chunk - 1) / rows_per_chunk;
   threads = std::min(threads, chunks);
   if (threads <= 1) return solve(0, count);
   std::vector<long> refused_of(threads, count);
-  in_threads(threads, chunks, [&](long thread, long chunk) {
+  Threads own;
+  (kept ? *kept : own)(threads, chunks, [&](long thread, long chunk) {
     long begin = chunk * rows_per_chunk, end = std::min(begin + rows_per_chunk, count);
     long refused = solve(begin, end);
     if (refused >= 0) refused_of[thread] = std::min(refused_of[thread], refused);
@@ -76,10 +78,9 @@ long in_chunks(long count, long threads, const Solve& solve) {
 
 // Solve `count` rows. Returns the first row that is refused, or −1.
 inline long solve_rows(const Solver& solver, const Rows& rows, long count, const Results& results,
-                       long threads) {
-  return in_chunks(count, threads, [&](long begin, long end) {
-    return solver.solve(rows, begin, end, results);
-  });
+                       long threads, Threads* kept = nullptr) {
+  auto solve = [&](long begin, long end) { return solver.solve(rows, begin, end, results); };
+  return in_chunks(count, threads, solve, kept);
 }
 
 // The same of distances.

@@ -11,11 +11,17 @@
 namespace box_contact::detail {
 namespace {
 
-PatchForces& forces_of(bc_patch_forces* forces) { return *reinterpret_cast<PatchForces*>(forces); }
+// What a handle stands for.
+struct Handled {
+  PatchForces forces;
+  Threads threads{};
+};
+Handled& handled(bc_patch_forces* forces) { return *reinterpret_cast<Handled*>(forces); }
+PatchForces& forces_of(bc_patch_forces* forces) { return handled(forces).forces; }
 const PatchForces& forces_of(const bc_patch_forces* forces) {
-  return *reinterpret_cast<const PatchForces*>(forces);
+  return reinterpret_cast<const Handled*>(forces)->forces;
 }
-bc_patch_forces* handle(PatchForces* forces) { return reinterpret_cast<bc_patch_forces*>(forces); }
+bc_patch_forces* handle(Handled* forces) { return reinterpret_cast<bc_patch_forces*>(forces); }
 
 bc_status explain(PatchForces::Held held) {
   switch (held) {
@@ -33,20 +39,16 @@ bool solve_exactly(const PairNumbers& pair, bc_contact& contact) {
   return solve_pair({chosen_kernel(), Model::exact, nullptr}, pair, BC_COVARIANCE, 0.0, contact);
 }
 
-// `in_threads`, to be handed on.
-constexpr auto threaded = [](long threads, long chunks, const auto& work) {
-  in_threads(threads, chunks, work);
-};
-
 // Solve the contacts of one's own, and take them.
-bc_status solve_own(PatchForces& self, double dt, const bc_pose* poses, const bc_wrench* outside) {
+bc_status solve_own(Handled& all, double dt, const bc_pose* poses, const bc_wrench* outside) {
   const Kernel* kernel = chosen_kernel();
   if (!kernel) return fail(BC_BAD_ENVIRONMENT, "BOX_CONTACT_INSTRUCTION_SET is unknown");
   auto solve = [&](const Rows& rows, long count, const Results& results) {
-    return solve_rows({kernel, Model::exact, nullptr}, rows, count, results, self.threads());
+    return solve_rows({kernel, Model::exact, nullptr}, rows, count, results, all.forces.threads(),
+                      &all.threads);
   };
   PatchForces::Held held;
-  long refused = self.solve_own(dt, poses, outside, solve, threaded, held);
+  long refused = all.forces.solve_own(dt, poses, outside, solve, all.threads, held);
   if (refused >= 0) return fail(BC_BAD_POSE, "pairs[%ld]: a box is beyond 1e50 m", refused);
   return explain(held);
 }
@@ -64,13 +66,13 @@ bc_status advance(bc_patch_forces* forces, double dt, const Given& given, const 
   self.keep();
   self.rouse(given, changed, all);
   bc_status status = check_given(self, given);
-  if (!status) status = solve_own(self, dt, given.poses, given.outside);
+  if (!status) status = solve_own(handled(forces), dt, given.poses, given.outside);
   if (!status && self.has_woken()) status = check_given(self, given);
   if (status) {
     self.restore();
     return status;
   }
-  int64_t lost = self.advance(dt, given, all, solve_exactly, threaded);
+  int64_t lost = self.advance(dt, given, all, solve_exactly, handled(forces).threads);
   if (lost < 0) return BC_OK;
   return fail(
       BC_BAD_ARGUMENT,
@@ -97,11 +99,11 @@ bc_status bc_patch_forces_create(const bc_body* bodies, int64_t count,
     std::vector<Body> read;
     if (bc_status status = read_bodies(bodies, count, read)) return status;
     const Kernel* kernel = chosen_kernel();
-    *forces =
-        handle(new PatchForces(std::move(read),
-                               {all.substeps, all.iterations, all.relaxations, all.threads,
-                                all.friction, all.most_depth, all.rest ? all.rest_speed : 0.0},
-                               kernel ? &kernel->side : nullptr));
+    *forces = handle(
+        new Handled{PatchForces(std::move(read),
+                                {all.substeps, all.iterations, all.relaxations, all.threads,
+                                 all.friction, all.most_depth, all.rest ? all.rest_speed : 0.0},
+                                kernel ? &kernel->side : nullptr)});
     return BC_OK;
   });
 }
@@ -111,14 +113,12 @@ bc_status bc_patch_forces_copy(const bc_patch_forces* forces, bc_patch_forces** 
     if (!copy) return refuse_null("copy");
     *copy = nullptr;
     if (!forces) return refuse_null("forces");
-    *copy = handle(new PatchForces(forces_of(forces).copy()));
+    *copy = handle(new Handled{forces_of(forces).copy()});
     return BC_OK;
   });
 }
 
-void bc_patch_forces_destroy(bc_patch_forces* forces) {
-  delete reinterpret_cast<PatchForces*>(forces);
-}
+void bc_patch_forces_destroy(bc_patch_forces* forces) { delete reinterpret_cast<Handled*>(forces); }
 
 int64_t bc_patch_forces_bodies(const bc_patch_forces* forces) {
   return forces ? int64_t(forces_of(forces).bodies().size()) : 0;
@@ -179,7 +179,8 @@ bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches* answer
     if (all.separation && !poses && !self.bodies().empty()) return refuse_null("poses");
     if (!all.separation && self.holds(all)) return BC_OK;
     if (bc_status status = check_answer(all, self, poses)) return status;
-    return explain(all.separation ? self.hold(all, poses, threaded) : self.hold(all));
+    return explain(all.separation ? self.hold(all, poses, handled(forces).threads)
+                                  : self.hold(all));
   });
 }
 
