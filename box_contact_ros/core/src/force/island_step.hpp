@@ -64,19 +64,14 @@ class IslandStep {
         fineness_(fineness),
         fineness_of_(bodies, step.given.outside, options.most_depth, patches, islands) {}
 
-  void advance(const Chunk& chunk) const {
+  void advance(Chunk& chunk) const {
     for (Island& island : islands_.of(chunk)) begin(island);
     // Those with as many iterations, in sub-steps as fine, are advanced together.
     for (const Island& island : islands_.of(chunk))
       if (island.factor > 0) advance(chunk, island.factor, island.rounds);
+    chunk.lost = first_lost(chunk);
   }
 
-  // The first body whose numbers are not finite at the end of the islands, or −1.
-  int64_t first_lost() const {
-    for (const Moving& moving : moving_)
-      if (!ends_finite(moving)) return moving.body;
-    return -1;
-  }
   // Write where the islands of a chunk end.
   void write_ends(const Chunk& chunk) const {
     for (const Island& island : islands_.of(chunk))
@@ -104,6 +99,13 @@ class IslandStep {
   }
 
  private:
+  // The first body of a chunk whose numbers are not finite at the end, or −1.
+  int64_t first_lost(const Chunk& chunk) const {
+    for (const Island& island : islands_.of(chunk))
+      for (size_t k = island.body; k < island.body_end; ++k)
+        if (!ends_finite(moving_[k])) return moving_[k].body;
+    return -1;
+  }
   // Begin an island. One without contacts ends the advance, too.
   void begin(Island& island) const {
     for (size_t k = island.body; k < island.body_end; ++k) begin(moving_[k]);

@@ -25,6 +25,7 @@ constexpr size_t ends_per_thread = 8;
 struct Chunk {
   size_t island, island_end;
   size_t block, block_end;
+  int64_t lost;  // the first body whose numbers are not finite at the end of an advance, or −1
 };
 
 // Memory for a time. A copy has none of it.
@@ -167,7 +168,7 @@ class Islands {
       auto size = [&] { return all[island].block_end - all[first].block + (island - first); };
       do ++island;
       while (island < all.size() && size() <= blocks_per_chunk);
-      chunks.push_back({first, island, all[first].block, all[island - 1].block_end});
+      chunks.push_back({first, island, all[first].block, all[island - 1].block_end, -1});
     }
   }
 

@@ -174,12 +174,12 @@ class PatchForces {
     if (!is_grouped_) islands_.group(bodies_, rest_.awake(), patches_);
     is_grouped_ = true;
     IslandStep islands(options_, bodies_, step, ended_, fineness_, patches_, loads_, islands_);
-    const std::vector<Chunk>& chunks = islands_.chunks;
+    std::vector<Chunk>& chunks = islands_.chunks;
     each_chunk(in_threads, chunks.size(), 1, [&](size_t k) { islands.advance(chunks[k]); });
-    int64_t lost = islands.first_lost();
-    if (lost >= 0) {
+    for (const Chunk& chunk : chunks) {
+      if (chunk.lost < 0) continue;
       restore();
-      return lost;
+      return chunk.lost;
     }
     loads_.resize(patches_.size());
     are_loads_known_ = true;

@@ -109,27 +109,35 @@ inline bc_pose pose_at(const Placed& placed, const double (&quaternion)[4],
   return pose;
 }
 
-// Where bodies or boxes are: each is found once, when it is asked for.
+// Where bodies or boxes are that are asked for: each is found once.
 class PlacedOnce {
  public:
   void make_room(size_t count) {
     placed_.reserve(count);
-    is_known_.reserve(count);
+    asked_.reserve(count);
+    is_asked_.reserve(count);
   }
   void forget(size_t count) {
     placed_.resize(count);
-    is_known_.assign(count, 0);
+    asked_.clear();
+    is_asked_.assign(count, 0);
   }
+  void ask(size_t k) {
+    if (!is_asked_[k]) asked_.push_back(k);
+    is_asked_[k] = 1;
+  }
+  size_t count() const { return asked_.size(); }
+  // Find those from one that was asked for to another, or to the last one.
   template <class Find>
-  void find(size_t k, const Find& find) {
-    if (!is_known_[k]) placed_[k] = find();
-    is_known_[k] = 1;
+  void find(size_t first, size_t last, const Find& find) {
+    for (size_t i = first; i < std::min(last, count()); ++i) placed_[asked_[i]] = find(asked_[i]);
   }
   const Placed& operator[](size_t k) const { return placed_[k]; }
 
  private:
   std::vector<Placed> placed_;
-  std::vector<uint8_t> is_known_;
+  std::vector<size_t> asked_;
+  std::vector<uint8_t> is_asked_;
 };
 
 // Turn a quaternion x y z w by an angular velocity ω, in the common frame, for a time h. Its tan(θ/4) is
@@ -147,7 +155,7 @@ inline void spin(double (&q)[4], const Vec<double>& angular, double h) {
 // The pose of a box in the common frame, of a pose in the frame of a body at `body`.
 inline bc_pose in_common_frame(const bc_pose& body, const bc_pose& box) {
   auto read = [](const bc_pose& pose) -> Pose<double> {
-    const double (&q)[4] = pose.quaternion;
+    const double(&q)[4] = pose.quaternion;
     return {vector(pose.position), {q[0], q[1], q[2], q[3]}};
   };
   auto [at, turned] = pose_in_common_frame(read(body), read(box));
