@@ -6,13 +6,10 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <vector>
 
-#include "advance_inputs.hpp"
-#include "carriers.hpp"
-#include "clock.hpp"
+#include "body_step.hpp"
 #include "closing.hpp"
 #include "fineness.hpp"
 #include "islands.hpp"
@@ -31,18 +28,11 @@ struct Options {
   double rest_speed;  // below which an island comes to rest [m/s]; 0: none does
 };
 
-// The velocities with which a body ended the last advance: before relaxation, and after it. Of a body
-// that no force moves: in the last advance but one, and in the last.
-struct Ended {
-  Motion pushed, relaxed;
-};
-
 // What an advance begins with, and where its end goes.
 struct Advance {
   SubSteps steps;
   Given given;
   const bc_motion& motion;
-  bool came_by_wrenches;   // whether those of the last advance moved the bodies
   const OwnContacts* own;  // none: contacts are those of an answer
   SolvePair solve_pair;
 };
@@ -50,12 +40,12 @@ struct Advance {
 class IslandStep {
  public:
   IslandStep(const Options& options, const std::vector<Body>& bodies, const Advance& step,
-             std::vector<Ended>& ended, std::vector<Fineness>& fineness,
+             const BodyStep& body_step, std::vector<Fineness>& fineness,
              std::vector<Patch>& patches, std::vector<Load>& loads, Islands& islands)
       : options_(options),
         bodies_(bodies),
         step_(step),
-        ended_(ended),
+        body_step_(body_step),
         patches_(patches),
         loads_(loads),
         islands_(islands),
@@ -75,27 +65,8 @@ class IslandStep {
   // Write where the islands of a chunk end.
   void write_ends(const Chunk& chunk) const {
     for (const Island& island : islands_.of(chunk))
-      for (size_t k = island.body; k < island.body_end; ++k) write_end(moving_[k]);
+      for (size_t k = island.body; k < island.body_end; ++k) body_step_.write_end(moving_[k]);
     for (size_t k = chunk.block; k < chunk.block_end; ++k) end(blocks_[k]);
-  }
-
-  // A body that no force moves goes on by its velocity. One that rests keeps its pose to the bit.
-  void move_alone(size_t k) const {
-    const bc_velocity velocity = step_.given.velocities[k];
-    const bc_motion& motion = step_.motion;
-    ended_[k] = {ended_[k].relaxed, {vector(velocity.linear), vector(velocity.angular)}};
-    if (motion.velocities) motion.velocities[k] = velocity;
-    if (motion.wrenches) motion.wrenches[k] = {};
-    if (!motion.poses) return;
-    if (are_within(velocity.linear, 3, 0.0) && are_within(velocity.angular, 3, 0.0)) {
-      motion.poses[k] = step_.given.poses[k];
-      return;
-    }
-    Moving moving{};
-    moving.body = int32_t(k);
-    begin(moving);
-    for (int number = 0; number < step_.steps.count; ++number) move(moving, step_.steps.length);
-    write_pose(moving);
   }
 
  private:
@@ -103,19 +74,15 @@ class IslandStep {
   int64_t first_lost(const Chunk& chunk) const {
     for (const Island& island : islands_.of(chunk))
       for (size_t k = island.body; k < island.body_end; ++k)
-        if (!ends_finite(moving_[k])) return moving_[k].body;
+        if (!body_step_.ends_finite(moving_[k])) return moving_[k].body;
     return -1;
   }
   // Begin an island. One without contacts ends the advance, too.
   void begin(Island& island) const {
-    for (size_t k = island.body; k < island.body_end; ++k) begin(moving_[k]);
+    for (size_t k = island.body; k < island.body_end; ++k) body_step_.begin(moving_[k]);
     island.factor = 0;
     if (island.block == island.block_end) {
-      for (size_t k = island.body; k < island.body_end; ++k)
-        for (int number = 1; number <= step_.steps.count; ++number) {
-          drive(moving_[k], number, step_.steps);
-          move(moving_[k], step_.steps.length);
-        }
+      for (size_t k = island.body; k < island.body_end; ++k) body_step_.advance(moving_[k]);
       return;
     }
     island.is_new = true;
@@ -208,40 +175,20 @@ class IslandStep {
         kernel.load(&work);
       }
       work.is_last = number == steps.count;
-      each_body([&](Moving& moving) { drive(moving, number, steps); });
+      each_body([&](Moving& moving) { body_step_.drive(moving, number, steps); });
       kernel.push(&work);
-      each_body([&](Moving& moving) { move(moving, steps.length); });
+      each_body([&](Moving& moving) { body_step_.move(moving, steps.length); });
       kernel.relax(&work);
     }
     end();
   }
 
-  void begin(Moving& moving) const {
-    auto k = size_t(moving.body);
-    moving.placed = placed_at(step_.given.poses[k], bodies_[k].centre);
-    moving.linear = vector(step_.given.velocities[k].linear);
-    moving.angular = vector(step_.given.velocities[k].angular);
-    double scale = 1.0 / std::sqrt(squared_norm(step_.given.poses[k].quaternion));
-    for (int i = 0; i < 4; ++i) moving.quaternion[i] = scale * step_.given.poses[k].quaternion[i];
-    moving.impulse = moving.angular_impulse = {};
-    if (!bodies_[k].is_free()) return;
-    moving.inverse_inertia = inverse_inertia_of(bodies_[k], moving.placed);
-    // A caller who moves by the wrenches comes back with the speed of pushing out.
-    if (!step_.came_by_wrenches) return;
-    const auto& [pushed, relaxed] = ended_[k];
-    Vec<double> slower = relaxed.linear - pushed.linear, calmer = relaxed.angular - pushed.angular;
-    moving.linear += slower;
-    moving.angular += calmer;
-    moving.impulse = (1.0 / bodies_[k].inverse_mass) * slower;
-    moving.angular_impulse = moving.placed.axes * (transposed_times(moving.placed.axes, calmer) /
-                                                   bodies_[k].inverse_inertia);
-  }
   // Solve the contacts of an island anew, where its bodies are within the advance.
   void ask_again(const Island& island, double time) const {
     double factor = over_relaxation_of(island);
     each_block(island, [&](Block& block, Patch& patch, Moving& a, Moving& b) {
-      step_.own->solve_again(step_.solve_pair, pose_of(a), pose_of(b), a.placed, b.placed,
-                             is_lighter_b(bodies_, patch), patch);
+      step_.own->solve_again(step_.solve_pair, body_step_.pose_of(a), body_step_.pose_of(b),
+                             a.placed, b.placed, is_lighter_b(bodies_, patch), patch);
       take(patch, factor, block);
       close(patch, a, b, time, block);
     });
@@ -260,65 +207,6 @@ class IslandStep {
     close_faces(patch, a, b, time, std::max(pull(a), pull(b)), block);
   }
 
-  // Move a body by its velocities for a time.
-  void move(Moving& moving, double h) const {
-    const Body& body = bodies_[size_t(moving.body)];
-    moving.placed.position += h * moving.linear;
-    turn_freely(body, h, moving.quaternion, moving.placed, moving.angular);
-    if (body.is_free()) moving.inverse_inertia = inverse_inertia_of(body, moving.placed);
-    moving.pushed = {moving.linear, moving.angular};
-  }
-
-  // Change velocities by all but contacts, for sub-step `number`.
-  void drive(Moving& moving, int number, const SubSteps& steps) const {
-    auto k = size_t(moving.body);
-    double h = steps.length;
-    if (!bodies_[k].is_free()) {
-      carry(moving, (number - 0.5) / steps.count - 0.5);
-      return;
-    }
-    if (!step_.given.outside) return;
-    moving.linear += (h * bodies_[k].inverse_mass) * vector(step_.given.outside[k].force);
-    moving.angular += h * (moving.inverse_inertia * vector(step_.given.outside[k].torque));
-  }
-
-  // A body that no force moves. `part`: of the step, from its middle [1].
-  void carry(Moving& moving, double part) const {
-    auto k = size_t(moving.body);
-    const auto& [before, last] = ended_[k];
-    const bc_velocity& given = step_.given.velocities[k];
-    moving.linear = carried_at(part, before.linear, last.linear, vector(given.linear));
-    moving.angular = carried_at(part, before.angular, last.angular, vector(given.angular));
-  }
-
-  // A sum is finite only if all its numbers are.
-  bool ends_finite(const Moving& moving) const {
-    double rate = 1.0 / step_.steps.dt, norm2 = squared_norm(moving.quaternion), sum = norm2;
-    for (const Vec<double>& v : {moving.placed.position, moving.linear, moving.angular,
-                                 rate * moving.impulse, rate * moving.angular_impulse})
-      sum += std::fabs(v[0]) + std::fabs(v[1]) + std::fabs(v[2]);
-    return std::isfinite(sum) && norm2 > 0.0;
-  }
-  // The wrenches lead to the speeds of pushing out if they are constant over the advance.
-  void write_end(const Moving& moving) const {
-    auto k = size_t(moving.body);
-    if (!bodies_[k].is_free()) return;
-    double rate = 1.0 / step_.steps.dt;
-    ended_[k] = {moving.pushed, {moving.linear, moving.angular}};
-    write_pose(moving);
-    if (step_.motion.wrenches)
-      write(rate * moving.impulse, rate * moving.angular_impulse, step_.motion.wrenches[k].force,
-            step_.motion.wrenches[k].torque);
-    if (step_.motion.velocities)
-      write(moving.linear, moving.angular, step_.motion.velocities[k].linear,
-            step_.motion.velocities[k].angular);
-  }
-  bc_pose pose_of(const Moving& moving) const {
-    return pose_at(moving.placed, moving.quaternion, bodies_[size_t(moving.body)].centre);
-  }
-  void write_pose(const Moving& moving) const {
-    if (step_.motion.poses) step_.motion.poses[size_t(moving.body)] = pose_of(moving);
-  }
   void end(const Block& block) const {
     Patch& patch = patches_[size_t(block.patch)];
     const Moving& a = moving_[size_t(block.a)];
@@ -330,15 +218,10 @@ class IslandStep {
                                    block.shape,      block.depth > options_.most_depth,
                                    step_.steps.dt};
   }
-  static void write(const Vec<double>& v, const Vec<double>& w, double* linear, double* angular) {
-    std::copy_n(v.v, 3, linear);
-    std::copy_n(w.v, 3, angular);
-  }
-
   const Options& options_;
   const std::vector<Body>& bodies_;
   const Advance& step_;
-  std::vector<Ended>& ended_;  // of the bodies
+  const BodyStep& body_step_;
   std::vector<Patch>& patches_;
   std::vector<Load>& loads_;
   Islands& islands_;

@@ -169,11 +169,12 @@ class PatchForces {
                   InThreads& in_threads) {
     bc_motion all = motion;
     if (!all.poses) all.poses = poses_.data();
-    Advance step{clock_.begin(dt, options_.substeps), given,     all, moves_by_wrenches_,
-                 own_.count() > 0 ? &own_ : nullptr,  solve_pair};
+    Advance step{clock_.begin(dt, options_.substeps), given, all,
+                 own_.count() > 0 ? &own_ : nullptr, solve_pair};
+    BodyStep body_step(bodies_, step.steps, given, all, moves_by_wrenches_, ended_);
     if (!is_grouped_) islands_.group(bodies_, rest_.awake(), patches_);
     is_grouped_ = true;
-    IslandStep islands(options_, bodies_, step, ended_, fineness_, patches_, loads_, islands_);
+    IslandStep islands(options_, bodies_, step, body_step, fineness_, patches_, loads_, islands_);
     std::vector<Chunk>& chunks = islands_.chunks;
     each_chunk(in_threads, chunks.size(), 1, [&](size_t k) { islands.advance(chunks[k]); });
     for (const Chunk& chunk : chunks) {
@@ -190,7 +191,7 @@ class PatchForces {
     rest_.end(given.poses, dt);
     each_chunk(in_threads, chunks.size(), ends_per_thread,
                [&](size_t k) { islands.write_ends(chunks[k]); });
-    for (int32_t k : rest_.fixed()) islands.move_alone(size_t(k));
+    for (int32_t k : rest_.fixed()) body_step.move_alone(size_t(k));
     if (is_resting) rest_.write_new_ends(all);
     if (motion.poses) each_read([&](size_t k) { poses_[k] = motion.poses[k]; });
     if (is_resting) lay_down();

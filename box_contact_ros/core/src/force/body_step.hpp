@@ -1,0 +1,153 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// One body, from the start of an advance to its end, beside what its contacts do.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "advance_inputs.hpp"
+#include "block.hpp"
+#include "carriers.hpp"
+#include "clock.hpp"
+
+namespace box_contact::BOX_CONTACT_SET::force {
+
+// The velocities with which a body ended the last advance: before relaxation, and after it. Of a body
+// that no force moves: in the last advance but one, and in the last.
+struct Ended {
+  Motion pushed, relaxed;
+};
+
+class BodyStep {
+ public:
+  BodyStep(const std::vector<Body>& bodies, const SubSteps& steps, const Given& given,
+           const bc_motion& motion, bool came_by_wrenches, std::vector<Ended>& ended)
+      : bodies_(bodies),
+        steps_(steps),
+        given_(given),
+        motion_(motion),
+        came_by_wrenches_(came_by_wrenches),
+        ended_(ended) {}
+
+  void begin(Moving& moving) const {
+    auto k = size_t(moving.body);
+    moving.placed = placed_at(given_.poses[k], bodies_[k].centre);
+    moving.linear = vector(given_.velocities[k].linear);
+    moving.angular = vector(given_.velocities[k].angular);
+    double scale = 1.0 / std::sqrt(squared_norm(given_.poses[k].quaternion));
+    for (int i = 0; i < 4; ++i) moving.quaternion[i] = scale * given_.poses[k].quaternion[i];
+    moving.impulse = moving.angular_impulse = {};
+    if (!bodies_[k].is_free()) return;
+    moving.inverse_inertia = inverse_inertia_of(bodies_[k], moving.placed);
+    // A caller who moves by the wrenches comes back with the speed of pushing out.
+    if (!came_by_wrenches_) return;
+    const auto& [pushed, relaxed] = ended_[k];
+    Vec<double> slower = relaxed.linear - pushed.linear, calmer = relaxed.angular - pushed.angular;
+    moving.linear += slower;
+    moving.angular += calmer;
+    moving.impulse = (1.0 / bodies_[k].inverse_mass) * slower;
+    moving.angular_impulse = moving.placed.axes * (transposed_times(moving.placed.axes, calmer) /
+                                                   bodies_[k].inverse_inertia);
+  }
+  // Advance a body without contacts.
+  void advance(Moving& moving) const {
+    for (int number = 1; number <= steps_.count; ++number) {
+      drive(moving, number, steps_);
+      move(moving, steps_.length);
+    }
+  }
+  // Change velocities by all but contacts, for sub-step `number`.
+  void drive(Moving& moving, int number, const SubSteps& steps) const {
+    auto k = size_t(moving.body);
+    double h = steps.length;
+    if (!bodies_[k].is_free()) {
+      carry(moving, (number - 0.5) / steps.count - 0.5);
+      return;
+    }
+    if (!given_.outside) return;
+    moving.linear += (h * bodies_[k].inverse_mass) * vector(given_.outside[k].force);
+    moving.angular += h * (moving.inverse_inertia * vector(given_.outside[k].torque));
+  }
+
+  // Move a body by its velocities for a time.
+  void move(Moving& moving, double h) const {
+    const Body& body = bodies_[size_t(moving.body)];
+    moving.placed.position += h * moving.linear;
+    turn_freely(body, h, moving.quaternion, moving.placed, moving.angular);
+    if (body.is_free()) moving.inverse_inertia = inverse_inertia_of(body, moving.placed);
+    moving.pushed = {moving.linear, moving.angular};
+  }
+
+  // A sum is finite only if all its numbers are.
+  bool ends_finite(const Moving& moving) const {
+    double rate = 1.0 / steps_.dt, norm2 = squared_norm(moving.quaternion), sum = norm2;
+    for (const Vec<double>& v : {moving.placed.position, moving.linear, moving.angular,
+                                 rate * moving.impulse, rate * moving.angular_impulse})
+      sum += std::fabs(v[0]) + std::fabs(v[1]) + std::fabs(v[2]);
+    return std::isfinite(sum) && norm2 > 0.0;
+  }
+  // The wrenches lead to the speeds of pushing out if they are constant over the advance.
+  void write_end(const Moving& moving) const {
+    auto k = size_t(moving.body);
+    if (!bodies_[k].is_free()) return;
+    double rate = 1.0 / steps_.dt;
+    ended_[k] = {moving.pushed, {moving.linear, moving.angular}};
+    write_pose(moving);
+    if (motion_.wrenches)
+      write(rate * moving.impulse, rate * moving.angular_impulse, motion_.wrenches[k].force,
+            motion_.wrenches[k].torque);
+    if (motion_.velocities)
+      write(moving.linear, moving.angular, motion_.velocities[k].linear,
+            motion_.velocities[k].angular);
+  }
+  bc_pose pose_of(const Moving& moving) const {
+    return pose_at(moving.placed, moving.quaternion, bodies_[size_t(moving.body)].centre);
+  }
+  // A body that no force moves goes on by its velocity. One that rests keeps its pose to the bit.
+  void move_alone(size_t k) const {
+    const bc_velocity velocity = given_.velocities[k];
+    ended_[k] = {ended_[k].relaxed, {vector(velocity.linear), vector(velocity.angular)}};
+    if (motion_.velocities) motion_.velocities[k] = velocity;
+    if (motion_.wrenches) motion_.wrenches[k] = {};
+    if (!motion_.poses) return;
+    if (are_within(velocity.linear, 3, 0.0) && are_within(velocity.angular, 3, 0.0)) {
+      motion_.poses[k] = given_.poses[k];
+      return;
+    }
+    Moving moving{};
+    moving.body = int32_t(k);
+    begin(moving);
+    for (int number = 0; number < steps_.count; ++number) move(moving, steps_.length);
+    write_pose(moving);
+  }
+
+ private:
+  // A body that no force moves. `part`: of the step, from its middle [1].
+  void carry(Moving& moving, double part) const {
+    auto k = size_t(moving.body);
+    const auto& [before, last] = ended_[k];
+    const bc_velocity& given = given_.velocities[k];
+    moving.linear = carried_at(part, before.linear, last.linear, vector(given.linear));
+    moving.angular = carried_at(part, before.angular, last.angular, vector(given.angular));
+  }
+  void write_pose(const Moving& moving) const {
+    if (motion_.poses) motion_.poses[size_t(moving.body)] = pose_of(moving);
+  }
+  static void write(const Vec<double>& v, const Vec<double>& w, double* linear, double* angular) {
+    std::copy_n(v.v, 3, linear);
+    std::copy_n(w.v, 3, angular);
+  }
+
+  const std::vector<Body>& bodies_;
+  const SubSteps& steps_;
+  const Given& given_;
+  const bc_motion& motion_;
+  bool came_by_wrenches_;  // whether those of the last advance moved the bodies
+  std::vector<Ended>& ended_;
+};
+
+}  // namespace box_contact::BOX_CONTACT_SET::force
