@@ -109,6 +109,34 @@ def test_threads_have_the_same_bits() -> None:
     assert pile(1) == pile(3)
 
 
+def block_of_boxes(kind: str, threads: int) -> bytes:
+    """Return all that moves of 216 boxes that overlap: an island that threads advance in parts."""
+    random = np.random.default_rng(6)
+    rows = [((0.5, 0.5, 0.5), 10.0 ** (random.integers(2) if kind == 'finer' else 0),
+             (0.5 * np.array((k % 6, k // 6 % 6, k // 36)) + (0, 0, 0.25)) * 0.998,
+             turned((0, 0, 1), 1e-3 * random.normal())) for k in range(216)]
+    pairs = [(0, 1 + k) for k in range(36)] + [
+        (1 + k, 1 + k + step) for k in range(216)
+        for step, is_in in ((1, k % 6 < 5), (6, k // 6 % 6 < 5), (36, k < 180)) if is_in]
+    world = World(FLOOR, *rows, pairs=[] if kind == 'late' else pairs, threads=threads)
+    if kind == 'impacts':
+        world.velocities[1::6, 2] = -3.0  # of one part alone
+    solver, found = ContactSolver(), []
+    for k in range(6 if kind == 'finer' else 40):
+        if kind == 'late' and k % 5 == 0:
+            contacts = solver.batch(world.poses, sizes=world.size, pairs=pairs)
+            world.forces.hold(pairs, contacts, world.poses, age=0.01, period=0.025)
+        world.step(0.01)
+        found += [world.poses.tobytes(), world.velocities.tobytes(), world.wrenches.tobytes()]
+    return b''.join(found)
+
+
+@pytest.mark.parametrize('kind', ['steady', 'impacts', 'finer', 'late'])
+def test_parts_of_an_island_have_the_bits_of_the_whole(kind: str) -> None:
+    whole = block_of_boxes(kind, 1)
+    assert all(block_of_boxes(kind, threads) == whole for threads in (2, 3))
+
+
 def advance_here_and_in_a_fork() -> None:
     """Advance boxes beside each other, and in a process that forks between two steps."""
     rows = [((0.5, 0.5, 0.5), 1.0, (k % 20, k // 20, 0.25 + 0.001 * (k % 7))) for k in range(300)]

@@ -49,7 +49,7 @@ struct Sums {
 };
 
 // A body in a step.
-struct Moving : Speeds<double>, Where<double>, Sums<double> {
+struct alignas(64) Moving : Speeds<double>, Where<double>, Sums<double> {
   int32_t body;
   int32_t side;          // the first group side by side that may have its next block
   double quaternion[4];  // of length 1

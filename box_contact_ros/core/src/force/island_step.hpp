@@ -54,6 +54,38 @@ class IslandStep {
         fineness_(fineness),
         fineness_of_(bodies, step.given.outside, options.most_depth, patches, islands) {}
 
+  // Advance all islands. Returns the first body whose numbers are not finite at the end, or −1. No bit depends
+  // on the number of threads.
+  template <class InThreads>
+  int64_t advance(InThreads& in_threads, TeamsPay& teams_pay) const {
+    std::vector<Chunk>& chunks = islands_.chunks;
+    for (Chunk& chunk : chunks) {
+      if (chunk.parts() == 0) continue;
+      Team team(int(chunk.parts()));
+      in_threads.together(team.parts(), [&](long part) { advance(chunk, int(part), team); });
+      teams_pay.end(team);
+    }
+    in_threads(options_.threads, long(chunks.size()), [&](long, long k) {
+      if (chunks[size_t(k)].parts() == 0) advance(chunks[size_t(k)]);
+    });
+    for (const Chunk& chunk : chunks)
+      if (chunk.lost >= 0) return chunk.lost;
+    return -1;
+  }
+  // Write where they end.
+  template <class InThreads>
+  void write_ends(InThreads& in_threads) const {
+    size_t count = std::max(moving_.size(), blocks_.size());
+    in_threads(options_.threads, long((count + ends_per_chunk - 1) / ends_per_chunk),
+               [&](long, long chunk) {
+                 size_t first = size_t(chunk) * ends_per_chunk, last = first + ends_per_chunk;
+                 for (size_t k = first; k < std::min(last, moving_.size()); ++k)
+                   body_step_.write_end(moving_[k]);
+                 for (size_t k = first; k < std::min(last, blocks_.size()); ++k) end(blocks_[k]);
+               });
+  }
+
+ private:
   void advance(Chunk& chunk) const {
     for (Island& island : islands_.of(chunk)) begin(island);
     // Those with as many iterations, in sub-steps as fine, are advanced together.
@@ -61,15 +93,35 @@ class IslandStep {
       if (island.factor > 0) advance(chunk, island.factor, island.rounds);
     chunk.lost = first_lost(chunk);
   }
-
-  // Write where the islands of a chunk end.
-  void write_ends(const Chunk& chunk) const {
-    for (const Island& island : islands_.of(chunk))
-      for (size_t k = island.body; k < island.body_end; ++k) body_step_.write_end(moving_[k]);
-    for (size_t k = chunk.block; k < chunk.block_end; ++k) end(blocks_[k]);
+  // The same of a large island, by threads that have a part of it each.
+  void advance(Chunk& chunk, int part, Team& team) const {
+    Island &whole = *islands_.of(chunk).first, *parts = islands_.parts_of(chunk);
+    Island& mine = parts[part];
+    begin_bodies(mine);
+    team.meet(part);
+    begin_blocks(mine, whole.block_end - whole.block);
+    team.meet(part);
+    if (part == 0) {
+      join(parts, team.parts(), whole);
+      choose(whole);
+    }
+    team.meet(part);
+    mine.is_new = whole.is_new;
+    mine.is_uneven = whole.is_uneven;
+    mine.is_shared = true;
+    SubSteps steps = steps_of(whole.factor, whole.rounds);
+    Work work =
+        work_of({&mine, &mine + 1}, steps, islands_.groups_of(chunk), mine.group, mine.group_end);
+    work.team = &team;
+    work.part = part;
+    work.parts = parts;
+    work.whole = &whole;
+    work.turns = islands_.turns_of(chunk);
+    advance_by(*islands_.side(), whole.factor, work);
+    team.meet(part);
+    if (part == 0) chunk.lost = first_lost(chunk);
   }
 
- private:
   // The first body of a chunk whose numbers are not finite at the end, or −1.
   int64_t first_lost(const Chunk& chunk) const {
     for (const Island& island : islands_.of(chunk))
@@ -79,36 +131,54 @@ class IslandStep {
   }
   // Begin an island. One without contacts ends the advance, too.
   void begin(Island& island) const {
-    for (size_t k = island.body; k < island.body_end; ++k) body_step_.begin(moving_[k]);
+    begin_bodies(island);
     island.factor = 0;
     if (island.block == island.block_end) {
       for (size_t k = island.body; k < island.body_end; ++k) body_step_.advance(moving_[k]);
       return;
     }
+    begin_blocks(island, island.block_end - island.block);
+    choose(island);
+  }
+  void begin_bodies(const Island& island) const {
+    each_body(island, [&](size_t k) { body_step_.begin(moving_[k]); });
+  }
+  // Begin the blocks of an island, or of a part of one that has so many.
+  void begin_blocks(Island& island, size_t count) const {
     island.is_new = true;
     island.is_uneven = false;
-    double factor = over_relaxation_of(island), fastest = 0.0;
-    each_block(island, [&](Block& block, const Patch& patch, Moving& a, Moving& b) {
-      take(patch, factor, block);
-      fastest = std::max(fastest, passing_speed(patch, a, b));
+    island.fastest = 0.0;
+    island.over_relaxation = step_.steps.is_late ? 1.0 : over_relaxation(count);
+    each(island, [&](Block& block, const Patch& patch, Moving& a, Moving& b) {
+      take(patch, island.over_relaxation, block);
+      island.fastest = std::max(island.fastest, passing_speed(patch, a, b));
       block.normal_sum = block.friction_sum = {};
       island.is_new = island.is_new && patch.window == 0.0;
       island.is_uneven = island.is_uneven || is_uneven(a.inverse_mass, b.inverse_mass);
     });
-    double swayed = fineness_of_.swayed(island, fastest, step_.steps.dt, fineness_);
+  }
+  static void join(const Island* parts, int count, Island& whole) {
+    whole.is_new = true;
+    whole.is_uneven = false;
+    whole.fastest = 0.0;
+    for (const Island* part = parts; part < parts + count; ++part) {
+      whole.is_new = whole.is_new && part->is_new;
+      whole.is_uneven = whole.is_uneven || part->is_uneven;
+      whole.fastest = std::max(whole.fastest, part->fastest);
+    }
+  }
+  // Choose how fine its sub-steps are, and how many iterations they take.
+  void choose(Island& island) const {
+    double swayed = fineness_of_.swayed(island, island.fastest, step_.steps.dt, fineness_);
     island.rounds = step_.steps.is_late ? 1 : rounds_of(swayed, island.is_uneven);
     island.factor = step_.own ? fineness_of_(island, step_.steps, fineness_) : 1;
   }
   // Advance the islands whose sub-steps are finer by a factor, and that take so many times the iterations.
   void advance(const Chunk& chunk, int factor, int rounds) const {
-    SubSteps steps = step_.steps.finer(factor);
-    steps.rounds *= rounds;
+    SubSteps steps = steps_of(factor, rounds);
     auto advance = [&](Islands::Range range, const detail::ForceKernel& kernel, void* groups,
                        size_t count) {
-      bool counts = step_.motion.wrenches;
-      Work work{range.first, range.last, moving_.data(), blocks_.data(),      patches_.data(),
-                groups,      count,      steps,          options_.iterations, options_.relaxations,
-                counts};
+      Work work = work_of(range, steps, groups, 0, count);
       advance_by(kernel, factor, work);
     };
     for (Island& island : islands_.of(chunk))
@@ -124,6 +194,18 @@ class IslandStep {
                 island.block_end - island.block);
     }
   }
+  SubSteps steps_of(int factor, int rounds) const {
+    SubSteps steps = step_.steps.finer(factor);
+    steps.rounds *= rounds;
+    return steps;
+  }
+  Work work_of(Islands::Range range, const SubSteps& steps, void* groups, size_t group,
+               size_t group_end) const {
+    bool counts = step_.motion.wrenches;
+    return {
+        range.first, range.last, moving_.data(), blocks_.data(),      patches_.data(),      groups,
+        group,       group_end,  steps,          options_.iterations, options_.relaxations, counts};
+  }
   static constexpr detail::ForceKernel alone = {1,
                                                 sizeof(Block),
                                                 Stages<Block>::load,
@@ -132,12 +214,12 @@ class IslandStep {
                                                 Stages<Block>::end};
 
   template <class Visit>
-  void each_block(const Island& island, const Visit& visit) const {
-    for (size_t k = island.block; k < island.block_end; ++k) {
+  void each(const Island& island, const Visit& visit) const {
+    each_block(island, [&](size_t k) {
       Block& block = blocks_[k];
       visit(block, patches_[size_t(block.patch)], moving_[size_t(block.a)],
             moving_[size_t(block.b)]);
-    }
+    });
   }
 
   void advance_by(const detail::ForceKernel& kernel, int factor, Work& work) const {
@@ -145,39 +227,40 @@ class IslandStep {
       for (const Island* island = work.first; island < work.last; ++island)
         if (island->is_shared) visit(*island);
     };
-    auto each_body = [&](const auto& visit) {
-      each_island([&](const Island& island) {
-        for (size_t k = island.body; k < island.body_end; ++k) visit(moving_[k]);
-      });
+    auto each_moving = [&](const auto& visit) {
+      each_island(
+          [&](const Island& island) { each_body(island, [&](size_t k) { visit(moving_[k]); }); });
     };
     auto end = [&] {
       kernel.end(&work);
       each_island([&](const Island& island) {
-        each_block(island, [](const Block& block, Patch& patch, Moving&, Moving&) {
-          give_back(block, patch);
-        });
+        each(island,
+             [](const Block& block, Patch& patch, Moving&, Moving&) { give_back(block, patch); });
       });
     };
     const SubSteps& steps = work.steps;
     // From one answer to the next.
     double time = factor > 1 ? std::min(parts_of_a_contact * steps.length, steps.dt) : steps.dt;
     each_island([&](const Island& island) {
-      each_block(island, [&](Block& block, const Patch& patch, Moving& a, Moving& b) {
+      each(island, [&](Block& block, const Patch& patch, Moving& a, Moving& b) {
         close(patch, a, b, time, block);
         if (steps.is_late) block.closing = {};  // rocking is soft
       });
     });
+    work.meet();
     kernel.load(&work);
     for (int number = 1; number <= steps.count; ++number) {
       if (factor > 1 && number > 1 && number % parts_of_a_contact == 1) {
         end();
+        work.meet();
         each_island([&](const Island& island) { ask_again(island, time); });
+        work.meet();
         kernel.load(&work);
       }
       work.is_last = number == steps.count;
-      each_body([&](Moving& moving) { body_step_.drive(moving, number, steps); });
+      each_moving([&](Moving& moving) { body_step_.drive(moving, number, steps); });
       kernel.push(&work);
-      each_body([&](Moving& moving) { body_step_.move(moving, steps.length); });
+      each_moving([&](Moving& moving) { body_step_.move(moving, steps.length); });
       kernel.relax(&work);
     }
     end();
@@ -185,16 +268,12 @@ class IslandStep {
 
   // Solve the contacts of an island anew, where its bodies are within the advance.
   void ask_again(const Island& island, double time) const {
-    double factor = over_relaxation_of(island);
-    each_block(island, [&](Block& block, Patch& patch, Moving& a, Moving& b) {
+    each(island, [&](Block& block, Patch& patch, Moving& a, Moving& b) {
       step_.own->solve_again(step_.solve_pair, body_step_.pose_of(a), body_step_.pose_of(b),
                              a.placed, b.placed, is_lighter_b(bodies_, patch), patch);
-      take(patch, factor, block);
+      take(patch, island.over_relaxation, block);
       close(patch, a, b, time, block);
     });
-  }
-  double over_relaxation_of(const Island& island) const {
-    return step_.steps.is_late ? 1.0 : over_relaxation(island.block_end - island.block);
   }
   // Let faces close that do so within a time.
   void close(const Patch& patch, const Moving& a, const Moving& b, double time,

@@ -172,15 +172,14 @@ class PatchForces {
     Advance step{clock_.begin(dt, options_.substeps), given, all,
                  own_.count() > 0 ? &own_ : nullptr, solve_pair};
     BodyStep body_step(bodies_, step.steps, given, all, moves_by_wrenches_, ended_);
-    if (!is_grouped_) islands_.group(bodies_, rest_.awake(), patches_);
+    size_t threads = threads_within_islands(in_threads);
+    if (!is_grouped_ || threads != islands_.threads())
+      islands_.group(bodies_, rest_.awake(), patches_, given.poses, threads);
     is_grouped_ = true;
     IslandStep islands(options_, bodies_, step, body_step, fineness_, patches_, loads_, islands_);
-    std::vector<Chunk>& chunks = islands_.chunks;
-    each_chunk(in_threads, chunks.size(), 1, [&](size_t k) { islands.advance(chunks[k]); });
-    for (const Chunk& chunk : chunks) {
-      if (chunk.lost < 0) continue;
+    if (int64_t lost = islands.advance(in_threads, teams_pay_); lost >= 0) {
       restore();
-      return chunk.lost;
+      return lost;
     }
     loads_.resize(patches_.size());
     are_loads_known_ = true;
@@ -189,8 +188,7 @@ class PatchForces {
         options_.rest_speed > 0.0 && motion.poses && motion.velocities &&
         rest_.count(islands_, bodies_, patches_, given, step.steps, options_.rest_speed);
     rest_.end(given.poses, dt);
-    each_chunk(in_threads, chunks.size(), ends_per_thread,
-               [&](size_t k) { islands.write_ends(chunks[k]); });
+    islands.write_ends(in_threads);
     for (int32_t k : rest_.fixed()) body_step.move_alone(size_t(k));
     if (is_resting) rest_.write_new_ends(all);
     if (motion.poses) each_read([&](size_t k) { poses_[k] = motion.poses[k]; });
@@ -287,13 +285,12 @@ class PatchForces {
     islands_.make_room(bodies_.size(), room_);
     reader_.make_room(bodies_.size(), size_t(box_count()), room_);
   }
-  // As many chunks are worth a thread. No bit depends on their number.
-  template <class InThreads, class Work>
-  void each_chunk(InThreads& in_threads, size_t count, size_t worth, const Work& work) const {
-    long threads = std::min(long(options_.threads), long((count + worth - 1) / worth));
-    if (count > 0) in_threads(threads, long(count), [&](long, long k) { work(size_t(k)); });
+  // How many threads may wait for each other.
+  template <class InThreads>
+  size_t threads_within_islands(InThreads& in_threads) {
+    bool is_any = options_.threads > 1 && patches_.size() >= 2 * blocks_per_part;
+    return is_any && teams_pay_() ? size_t(in_threads.begin(options_.threads)) : 1;
   }
-
   // Loads name boxes, which may be others or none from now on.
   template <class Condition>
   void drop(Condition condition) {
@@ -307,7 +304,9 @@ class PatchForces {
     reader_.read(
         {answer, poses, bodies_, boxes(), options_.friction}, size_t(box_count()),
         [&](size_t turn) { return is_own ? own_.row(turn) : turn; }, next_,
-        [&](size_t count, const auto& work) { each_chunk(in_threads, count, 1, work); });
+        [&](size_t count, const auto& work) {
+          in_threads(options_.threads, long(count), [&](long, long k) { work(size_t(k)); });
+        });
     for (const Patch& patch : next_)
       if (patch.age >= 0.0 && !patch.has_area()) return Held::no_patch;
     if (is_own) wake_touched();
@@ -340,6 +339,7 @@ class PatchForces {
   // Memory that calls use again.
   PatchReader reader_;
   Islands islands_;
+  TeamsPay teams_pay_;
   Rollback rollback_;        // for an advance that fails
   size_t room_ = 0;          // for patches
   bool is_taken_ = false;    // whether patches were taken since `keep`; those before are in `next_`

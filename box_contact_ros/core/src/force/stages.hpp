@@ -34,19 +34,22 @@ struct Stages {
     const Work& work = work_of(all);
     for (Island* island = work.first; island < work.last; ++island)
       island->impact = work.steps.is_late ? no_impact : least_impact(*island, work.steps.length);
+    work.meet();
     each(work, [&](G& group) { prepare(work, group); });
-    each(work, [&](G& group) { warm_start(work, group); });
+    agree_on_impact(work);
+    each_in_turn(work, [&](G& group) { warm_start(work, group); });
     iterate_all(work, work.iterations, true);
-    if (work.counts) each(work, [&](G& group) { count(work, group); });
+    if (work.counts) each_in_turn(work, [&](G& group) { count(work, group); });
   }
   // Relax, and end the sub-step.
   static void relax(void* all) {
     const Work& work = work_of(all);
+    work.meet();
     if (work.relaxations > 0) {
       each(work, [&](G& group) { follow(work, group); });
       iterate_all(work, work.relaxations, false);
     }
-    if (work.counts && !work.is_last) each(work, [&](G& group) { count(work, group); });
+    if (work.counts && !work.is_last) each_in_turn(work, [&](G& group) { count(work, group); });
     each(work, [&](G& group) { store(work.steps, group); });
   }
   // Give blocks what is known.
@@ -63,13 +66,24 @@ struct Stages {
   static G* groups(const Work& work) { return static_cast<G*>(work.groups); }
   template <class Visit>
   static void each(const Work& work, const Visit& visit) {
-    for (size_t k = 0; k < work.group_count; ++k) visit(groups(work)[k]);
+    for (size_t k = work.group; k < work.group_end; ++k) visit(groups(work)[k]);
+  }
+  // The same, where bodies see their blocks in turn.
+  template <class Visit>
+  static void each_in_turn(const Work& work, const Visit& visit) {
+    if (!work.team) return each(work, visit);
+    work.team->begin_round(work.part);
+    for (size_t k = work.group; k < work.group_end; ++k) {
+      work.team->reach(work.part, work.turns[k].level);
+      work.team->await(work.part, work.turns[k]);
+      visit(groups(work)[k]);
+    }
+    work.team->reach(work.part, last_level);
   }
   template <class Visit>
   static void each_shared(const Work& work, const Visit& visit) {
     for (Island* island = work.first; island < work.last; ++island)
-      for (size_t k = island->block; island->is_shared && k < island->block_end; ++k)
-        visit(*island, k);
+      if (island->is_shared) each_block(*island, [&](size_t k) { visit(*island, k); });
   }
 
   static void join(const Work& work, Island& island, size_t k) {
@@ -86,17 +100,37 @@ struct Stages {
     if (work.moving[block.b].inverse_mass > 0.0) group.is_free_b |= bit;
   }
 
+  // The largest impact of any part is that of its island.
+  static void agree_on_impact(const Work& work) {
+    if (!work.team) return;
+    work.meet();
+    double most = 0.0;
+    for (int part = 0; part < work.team->parts(); ++part) most = max(most, work.parts[part].impact);
+    work.meet();
+    work.first->impact = most;
+  }
+
   static void iterate_all(const Work& work, int iterations, bool is_pushing) {
+    iterations *= work.steps.rounds;
     auto solve_all = [&](int iteration, bool is_beyond) {
       bool is_changed = false;
-      each(work,
-           [&](G& group) { is_changed |= solve(work, {is_pushing, iteration, is_beyond}, group); });
-      return is_changed;
+      if (iteration == 1) work.meet();
+      each_in_turn(work, [&](G& group) {
+        is_changed |= solve(work, {is_pushing, iteration, is_beyond}, group);
+      });
+      if (!work.team) return is_changed;
+      if (iteration < iterations && iteration % agreed_every != 0) return true;
+      unsigned brought = work.meet(unsigned(is_changed) + 2 * unsigned(work.first->is_struck));
+      work.first->is_struck = brought & 2;
+      return bool(brought & 1);
     };
-    iterate(work.first, work.last, work.steps.rounds * iterations, work.moving, solve_all,
-            [&](const Island& island, int iteration) {
-              scale_one(work, island, is_pushing, iteration);
-            });
+    auto scale_all = [&](const Island& island, int iteration) {
+      if (!work.team) return scale_one(work, island, is_pushing, iteration);
+      work.meet();
+      if (work.part == 0) scale_one(work, *work.whole, is_pushing, iteration);
+      work.meet();
+    };
+    iterate(work.first, work.last, iterations, work.moving, solve_all, scale_all);
   }
   // Its blocks are in all groups, so they come out for it.
   static void scale_one(const Work& work, const Island& island, bool is_pushing, int iteration) {

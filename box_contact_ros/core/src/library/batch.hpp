@@ -53,8 +53,8 @@ inline bool solve_pair(const Solver& solver, const PairNumbers& pair, bc_patch p
   return true;
 }
 
-// Rows that a thread takes at a time: some 100 µs of work, and whole blocks.
-constexpr long rows_per_chunk = 512;
+// Rows that a thread takes at a time: some 50 µs of work, and whole blocks. Twice as many are worth a thread.
+constexpr long rows_per_chunk = 256;
 
 // Call solve(begin, end), which returns the first row that is refused, or −1, for chunks of `count`
 // rows, in as many threads as are asked for and worth it. Rows are independent, so no bit depends on
@@ -63,7 +63,7 @@ constexpr long rows_per_chunk = 512;
 template <class Solve>
 long in_chunks(long count, long threads, const Solve& solve, Threads* kept = nullptr) {
   long chunks = (count + rows_per_chunk - 1) / rows_per_chunk;
-  threads = std::min(threads, chunks);
+  threads = std::min(threads, (chunks + 1) / 2);
   if (threads <= 1) return solve(0, count);
   std::vector<long> refused_of(threads, count);
   Threads own;

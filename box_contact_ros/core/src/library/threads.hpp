@@ -6,6 +6,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <condition_variable>
 #include <exception>
@@ -42,7 +43,7 @@ class Threads {
   template <class Work>
   void operator()(long threads, long chunks, const Work& work) {
     std::atomic<long> next{0};
-    together(begin(threads), [&](long thread) {
+    together(begin(std::min(threads, chunks)), [&](long thread) {
       for (long chunk = next++; chunk < chunks; chunk = next++) work(thread, chunk);
     });
   }
@@ -56,8 +57,11 @@ class Threads {
     work(0L);
     if (threads > 1) await_end();
   }
-  // Begin threads, with the caller's. Returns how many there are: fewer where the machine has no more.
+  // Begin threads, with the caller's. Returns how many there are: no more than cores, and fewer where the
+  // machine has no memory for them.
   long begin(long threads) {
+    static const long cores = std::max(1L, long(std::thread::hardware_concurrency()));
+    threads = std::min(threads, cores);
     if (threads <= 1) return 1;
     if (!is_of_this_process()) {
       leave();
