@@ -1,11 +1,12 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Program `speed`: calls with cold caches, threads and the first contact, from Python.
+"""Program `speed`: calls with cold caches, threads, forces in threads and the first contact.
 
 `python -m benchmarks.speed` writes speed.md and speed_cold.csv. The contestants of the cold calls
 take turns on one pinned core, so a disturbance hits all of them, and the figures to read are ratios
-to MuJoCo's signed distance. Two threads and the start of a new process follow. `frontier` has the
+to MuJoCo's signed distance. Two threads and the start of a new process follow; forces by one thread
+and by two advance the same boxes in turn, step by step. `frontier` has the
 calls one after another, and the batches, of each instruction set.
 """
 from __future__ import annotations
@@ -13,18 +14,22 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from box_contact_ros import Body, PatchForces, contacts_of
 from box_contact_ros.extras import require
+from box_contact_ros.forces.patch_forces import GRAVITY
 
 from . import output
 from .contestant import CORE_MODELS, Contestant, ours
 from .engines import installed
+from .loops import FRAME, Scene
 from .output import markdown_table, number
 from .pose_sets import SETS, drawn
+from .rivals import FRICTION, SUBSTEPS, pile, yard
 from .timing import (
     after_warm_up,
     by_round,
@@ -43,6 +48,11 @@ STARTS, QUICK_STARTS = 20, 2  # new processes
 TOUCHED = (0.0, 0.5, 2.0, 8.0, 48.0)
 """Memory that other work reads and writes between two calls [MB]; 0: the same call right before."""
 COLD_SET, COLD_CALLS, QUICK_COLD_CALLS = 'containers', 300, 10
+SHARED: Mapping[Callable[[], Scene], Mapping[str, tuple[int, int]]] = {
+    pile: {'moving': (60, 240), 'awake': (480, 600)},
+    yard: {'moving': (10, 60), 'awake': (60, 180)}}
+"""Boxes that threads share, and the steps that are timed. The yard begins almost at rest."""
+QUICK_STEPS = 3
 FIRST_CONTACT = """\
 from box_contact_ros import ContactSolver
 cube = (2, 2, 2)
@@ -107,6 +117,57 @@ def measure_threads(model: str, pairs: int, rounds: int) -> tuple[list[float], l
     return alone, shared
 
 
+@dataclass(frozen=True, kw_only=True)
+class SharedRow:
+    """Steps of boxes by one thread and by two."""
+
+    scene: str
+    state: str
+    one: float  # the median step [ns]
+    ratio: float  # the median of two threads by one, step by step
+
+
+def measure_forces(make: Callable[[], Scene], spans: Mapping[str, tuple[int, int]]
+                   ) -> list[SharedRow]:
+    """Return the steps of a scene by one thread and by two, which advance it in turn.
+
+    Raises `RuntimeError` where their poses differ by a bit.
+    """
+    scene = make()
+    boxes, weights = scene.boxes, np.zeros((len(scene.boxes.mass), 6))
+    weights[:, 2] = -GRAVITY * boxes.mass
+    bodies = [Body.of_box(size, mass) if mass else Body(mass=0.0, inertia=np.zeros(3))
+              for size, mass in zip(boxes.size, boxes.mass)]
+    both = []
+    for threads in (1, 2):
+        forces = PatchForces(bodies, friction=FRICTION, substeps=SUBSTEPS, threads=threads,
+                             rest=False)
+        forces.set_boxes(boxes.size)
+        both.append((forces, boxes.pose.copy(), np.zeros((len(bodies), 6))))
+    times = []
+    with pinned(usable_cores()[-2:]), no_garbage_collection():
+        for _ in range(max(last for _, last in spans.values())):
+            pairs, _ = contacts_of(boxes.size, both[0][1], margin=2.0 * GRAVITY * FRAME**2)
+            took = []
+            for k, (forces, poses, velocities) in enumerate(both):
+                def step() -> tuple[np.ndarray, np.ndarray]:
+                    forces.hold(pairs)  # noqa: B023
+                    return forces.advance(FRAME, poses, velocities, weights)[:2]  # noqa: B023
+
+                time, after = nanoseconds(step)
+                both[k] = forces, *after
+                took.append(time)
+            times.append(took)
+            if both[0][1].tobytes() != both[1][1].tobytes():
+                raise RuntimeError(f'{scene.name}: poses by two threads differ')
+    rows = []
+    for state, (first, last) in spans.items():
+        one, two = np.array(times[first:last], float).T
+        rows.append(SharedRow(scene=scene.name, state=state, one=float(np.median(one)),
+                              ratio=float(by_round(two, one))))
+    return rows
+
+
 def measure_starts(count: int) -> list[float]:
     """Return the times from the start of a process to its first contact [ns], after a warm-up."""
     def first_contact() -> tuple[subprocess.Popen[bytes], bytes]:
@@ -134,6 +195,12 @@ def threads_table(threads: Mapping[str, tuple[list[float], list[float]]]) -> str
         for model, (alone, shared) in p50.items()])
 
 
+def shared_table(rows: Sequence[SharedRow]) -> str:
+    """Return the steps of boxes by one thread in ms, and what two take of it."""
+    return markdown_table(['', 'one thread [ms]', 'two threads / one'], [
+        [f'{row.scene}, {row.state}', number(1e-6 * row.one), f'{row.ratio:.2f}'] for row in rows])
+
+
 def cold_table(rows: Sequence[ColdRow]) -> str:
     """Return the calls with other work in between, in µs and relative to the unit."""
     by = {(row.name, row.megabytes): row for row in rows}
@@ -156,9 +223,12 @@ def main(args: Sequence[str] | None = None) -> int:
     cold = measure_cold(options.seed, calls)
     print('speed: threads and starts', file=sys.stderr)
     threads = {model: measure_threads(model, pairs, rounds) for model in CORE_MODELS}
+    shared = [row for make, spans in SHARED.items() for row in measure_forces(make, {
+        'moving': (0, QUICK_STEPS)} if options.quick else spans)]
     print(output.write_page(
         folder, 'speed', args, machine=machine, cold=cold_table(cold), cold_set=COLD_SET,
-        shared_batch=pairs, threads=threads_table(threads), starts=count,
+        shared_batch=pairs, threads=threads_table(threads), shared=shared_table(shared),
+        starts=count,
         start=1e-9 * float(np.median(measure_starts(count)))))
     output.write_csv(folder / 'speed_cold.csv', map(asdict, cold), about=machine)
     return 0

@@ -19,6 +19,13 @@ def test_the_gain_of_threads_is_the_ratio_of_medians() -> None:
     assert gains.endswith('| exact | 10.0 | 5.00 | 2.00 |')
 
 
+def test_forces_by_two_threads_have_the_poses_of_one() -> None:
+    rows = speed.measure_forces(lambda: speed.pile(40), {'moving': (0, 2), 'later': (2, 5)})
+    assert [row.state for row in rows] == ['moving', 'later']
+    assert all(row.one > 0.0 and row.ratio > 0.0 for row in rows)
+    assert speed.shared_table(rows).startswith('|  | one thread [ms] | two threads / one |')
+
+
 def test_quick_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip('mujoco')
     assert speed.main(['--quick', '--out', str(tmp_path)]) == 0

@@ -48,7 +48,7 @@ struct Sums {
   Vec<T> impulse, angular_impulse;  // of contacts, since the advance began [N s], [N m s]
 };
 
-// A body in a step.
+// A body in a step, on lines of a cache of its own: other threads may move its neighbours.
 struct alignas(64) Moving : Speeds<double>, Where<double>, Sums<double> {
   int32_t body;
   int32_t side;          // the first group side by side that may have its next block

@@ -71,7 +71,7 @@ struct Stages {
   // The same, where bodies see their blocks in turn.
   template <class Visit>
   static void each_in_turn(const Work& work, const Visit& visit) {
-    if (!work.team) return each(work, visit);
+    if (is_alone || !work.team) return each(work, visit);
     work.team->begin_round(work.part);
     for (size_t k = work.group; k < work.group_end; ++k) {
       work.team->reach(work.part, work.turns[k].level);
