@@ -40,6 +40,7 @@ class PatchForces {
   // A copy, whose advance takes no memory either.
   PatchForces copy() const {
     PatchForces twin = *this;
+    twin.is_grouped_ = false;
     twin.own_.make_room();
     twin.make_room(0);
     return twin;
@@ -304,9 +305,7 @@ class PatchForces {
     reader_.read(
         {answer, poses, bodies_, boxes(), options_.friction}, size_t(box_count()),
         [&](size_t turn) { return is_own ? own_.row(turn) : turn; }, next_,
-        [&](size_t count, const auto& work) {
-          in_threads(options_.threads, long(count), [&](long, long k) { work(size_t(k)); });
-        });
+        [&](long count, const auto& work) { in_threads(options_.threads, count, work); });
     for (const Patch& patch : next_)
       if (patch.age >= 0.0 && !patch.has_area()) return Held::no_patch;
     if (is_own) wake_touched();

@@ -75,8 +75,10 @@ class PatchReader {
  private:
   template <class EachChunk, class Work>
   static void in_chunks(size_t count, const EachChunk& each_chunk, const Work& work) {
-    each_chunk((count + read_per_chunk - 1) / read_per_chunk,
-               [&](size_t chunk) { work(chunk * read_per_chunk, (chunk + 1) * read_per_chunk); });
+    each_chunk(long((count + read_per_chunk - 1) / read_per_chunk), [&](long, long chunk) {
+      size_t first = size_t(chunk) * read_per_chunk;
+      work(first, first + read_per_chunk);
+    });
   }
   void place(const Answered& all, size_t first, size_t last) {
     bodies_at_.find(first, last,

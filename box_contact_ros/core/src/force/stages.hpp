@@ -106,7 +106,7 @@ struct Stages {
     work.meet();
     double most = 0.0;
     for (int part = 0; part < work.team->parts(); ++part) most = max(most, work.parts[part].impact);
-    work.meet();
+    work.meet();  // all have read it
     work.first->impact = most;
   }
 

@@ -4,12 +4,11 @@
 // Threads that advance an island together, each a part of it.
 #pragma once
 
+#include <sched.h>
 #include <time.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cstdint>
-#include <thread>
 
 #include "../lanes/target.hpp"
 #include "../waiting.hpp"
@@ -54,12 +53,12 @@ class Team {
   // Wait until all parts are here. Returns all bits that they bring.
   unsigned meet(int part, unsigned bits = 0) {
     Meetings& mine = at_[part].meetings;
-    int64_t count = mine.count.load(std::memory_order_relaxed);
+    int64_t count = mine.count;
     mine.brought[count % 2] = bits;
-    mine.count.store(count + 1, std::memory_order_release);
+    release(mine.count, count + 1);
     for (int other = 0; other < parts_; ++other) {
       const Meetings& its = at_[other].meetings;
-      wait(part, [&] { return its.count.load(std::memory_order_acquire) > count; });
+      wait(part, [&] { return acquire(its.count) > count; });
       bits |= its.brought[count % 2];
     }
     return bits;
@@ -68,9 +67,7 @@ class Team {
   // Begin a round of turns. All parts have as many.
   void begin_round(int part) { at_[part].round += one_round; }
   // A part has solved its groups below a level.
-  void reach(int part, int32_t level) {
-    at_[part].reached.store(at_[part].round + level, std::memory_order_release);
-  }
+  void reach(int part, int32_t level) { release(at_[part].reached, at_[part].round + level); }
   // Wait for the groups of other parts that come before one.
   void await(int part, const GroupTurn& turn) {
     await(part, turn.parts_last, at_[part].round - one_round + turn.after_last);
@@ -79,18 +76,26 @@ class Team {
 
  private:
   struct Meetings {
-    std::atomic<int64_t> count{0};
+    int64_t count = 0;
     unsigned brought[2] = {};  // a part is ahead of others by one meeting at most
   };
   // Where a part is, on lines of a cache of its own.
   struct At {
     alignas(64) Meetings meetings;
-    alignas(64) std::atomic<int64_t> reached{last_level};  // its round, and the level in it
-    alignas(64) double waited = 0.0;                       // beyond a moment [s]
+    alignas(64) int64_t reached = last_level;  // its round, and the level in it
+    alignas(64) double waited = 0.0;           // beyond a moment [s]
     int64_t round = 0;
     int64_t seen[most] = {};  // where others were when it looked last
   };
   static constexpr int64_t one_round = int64_t(1) << 32;
+
+  // What a part writes for others. Kernels must not share functions, as those of std::atomic would be.
+  static void release(int64_t& number, int64_t value) {
+    __atomic_store_n(&number, value, __ATOMIC_RELEASE);
+  }
+  static int64_t acquire(const int64_t& number) {
+    return __atomic_load_n(&number, __ATOMIC_ACQUIRE);
+  }
 
   static double now() {
     timespec time;
@@ -101,7 +106,7 @@ class Team {
   void wait(int part, const Condition& holds) {
     if (detail::holds_soon(holds)) return;
     double begun = now();
-    do std::this_thread::yield();
+    do sched_yield();
     while (!detail::holds_soon(holds));
     at_[part].waited += now() - begun;
   }
@@ -110,9 +115,8 @@ class Team {
       int other = __builtin_ctz(parts);
       int64_t& seen = at_[part].seen[other];
       if (seen >= wanted) continue;
-      const std::atomic<int64_t>& reached = at_[other].reached;
       wait(part, [&] {
-        seen = reached.load(std::memory_order_acquire);
+        seen = acquire(at_[other].reached);
         return seen >= wanted;
       });
     }
