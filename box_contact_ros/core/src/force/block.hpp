@@ -323,7 +323,7 @@ BC_INLINE T solve_normal(Rows<T>& block, const NormalRows<T>& rows, Mask<T> due,
   if (bits(due) & ~bits(within)) {
     // The pressure would be negative at a rim.
     Mat<T> soft = softened(block.across, rows.softness);
-    next = select(within, next, OnTheRim<T>(block.shape, soft, v - soft * before).impulses());
+    next = select(within, next, OnTheRim<T>(block.shape, soft, v - soft * before, next).impulses());
   }
   apply_normal(block, next - before, a, b);
   block.normal_impulses = select(due, next, before);

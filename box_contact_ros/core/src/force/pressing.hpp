@@ -24,34 +24,42 @@ BC_INLINE SpanOf<T> rocking_2(const RectangleOf<T>& shape) {
   return {-shape.span_1.high, -shape.span_1.low};
 }
 
-// The impulses of least energy on the rims.
+// The impulses of least energy on the rims. One of the faces that the impulses without bounds are beyond bears
+// them: from within all of these, a step toward those would leave less.
 template <class T>
 class OnTheRim {
  public:
-  BC_INLINE OnTheRim(const RectangleOf<T>& shape, const Mat<T>& a, const Vec<T>& b)
+  BC_INLINE OnTheRim(const RectangleOf<T>& shape, const Mat<T>& a, const Vec<T>& b,
+                     const Vec<T>& unbounded)
       : a_(a), b_(b), spans_{rocking_1(shape), rocking_2(shape)} {
     T one = splat<T>(1.0), none{};
     const T firsts[] = {spans_[0].low, spans_[0].high}, seconds[] = {spans_[1].low, spans_[1].high};
-    for (const T& first : firsts) {
-      for (const T& second : seconds) take_edge({one, first, second});
-      take_face({one, first, none}, 2);
+    const T &n = unbounded[0], &x = unbounded[1], &y = unbounded[2];
+    const Mask<T> beyond_firsts[] = {(x < n * firsts[0]), (x > n * firsts[1])};
+    const Mask<T> beyond_seconds[] = {(y < n * seconds[0]), (y > n * seconds[1])};
+    for (int i = 0; i < 2; ++i) {
+      for (int j = 0; j < 2; ++j)
+        take_edge(beyond_firsts[i] | beyond_seconds[j], {one, firsts[i], seconds[j]});
+      take_face(beyond_firsts[i], {one, firsts[i], none}, 2);
     }
-    for (const T& second : seconds) take_face({one, none, second}, 1);
+    for (int j = 0; j < 2; ++j) take_face(beyond_seconds[j], {one, none, seconds[j]}, 1);
   }
   BC_INLINE const Vec<T>& impulses() const { return best_; }
 
  private:
-  BC_INLINE void take_edge(const Vec<T>& edge) {
+  BC_INLINE void take_edge(Mask<T> may_bear, const Vec<T>& edge) {
+    if (!any(may_bear)) return;
     T along = dot(edge, b_);
-    Mask<T> presses = along < 0.0;
+    Mask<T> presses = may_bear & (along < 0.0);
     if (any(presses)) take(presses, (-along / dot(edge, a_ * edge)) * edge);
   }
   // The face along an edge, whose rocking `row` is free.
-  BC_INLINE void take_face(const Vec<T>& edge, int row) {
+  BC_INLINE void take_face(Mask<T> may_bear, const Vec<T>& edge, int row) {
+    if (!any(may_bear)) return;
     Vec<T> pushed = a_ * edge;
     T ee = dot(edge, pushed), er = pushed[row], rr = a_[row][row];
     T determinant = ee * rr - er * er, along = dot(edge, b_);
-    Mask<T> is_face = determinant > 0.0;
+    Mask<T> is_face = may_bear & (determinant > 0.0);
     if (!any(is_face)) return;
     T pressing = (er * b_[row] - rr * along) / determinant;
     T rocking = (er * along - ee * b_[row]) / determinant;
