@@ -5,9 +5,8 @@
 
 `python -m benchmarks.speed` writes speed.md and speed_cold.csv. The contestants of the cold calls
 take turns on one pinned core, so a disturbance hits all of them, and the figures to read are ratios
-to MuJoCo's signed distance. Two threads and the start of a new process follow; forces by one thread
-and by two advance the same boxes in turn, step by step. `frontier` has the
-calls one after another, and the batches, of each instruction set.
+to MuJoCo's signed distance. Two threads, forces in two threads and the start of a new process
+follow. `frontier` has the calls one after another, and the batches, of each instruction set.
 """
 from __future__ import annotations
 
@@ -136,8 +135,7 @@ def measure_forces(make: Callable[[], Scene], spans: Mapping[str, tuple[int, int
     scene = make()
     boxes, weights = scene.boxes, np.zeros((len(scene.boxes.mass), 6))
     weights[:, 2] = -GRAVITY * boxes.mass
-    bodies = [Body.of_box(size, mass) if mass else Body(mass=0.0, inertia=np.zeros(3))
-              for size, mass in zip(boxes.size, boxes.mass)]
+    bodies = [Body(mass=m, inertia=i) for m, i in zip(boxes.mass, boxes.inertia)]
     both = []
     for threads in (1, 2):
         forces = PatchForces(bodies, friction=FRICTION, substeps=SUBSTEPS, threads=threads,

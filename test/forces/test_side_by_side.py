@@ -141,7 +141,7 @@ def test_parts_of_an_island_have_the_bits_of_the_whole(kind: str) -> None:
 
 
 def advance_here_and_in_a_fork() -> None:
-    """Advance boxes beside each other, and in a process that forks between two steps."""
+    """Fork between two steps of separate boxes; both processes end at the same poses."""
     rows = [((0.5, 0.5, 0.5), 1.0, (k % 20, k // 20, 0.25 + 0.001 * (k % 7))) for k in range(300)]
     world = World(FLOOR, *rows, threads=3).step(0.01)
     ours, theirs = os.pipe()

@@ -22,6 +22,9 @@ namespace box_contact::BOX_CONTACT_SET::force {
 // Most sub-steps, iterations or relaxations: their product is a number of 32 bits.
 constexpr int iterations_max = 1000;
 
+// The ends of so many bodies and blocks are written at a time: some 20 µs of work for a thread.
+constexpr size_t ends_per_chunk = 256;
+
 struct Options {
   int substeps, iterations, relaxations, threads;
   double friction, most_depth;

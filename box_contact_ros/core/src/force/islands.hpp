@@ -19,8 +19,6 @@ namespace box_contact::BOX_CONTACT_SET::force {
 // Blocks that are solved side by side, about: so many fill the lanes of islands of one block each, and a
 // core's second cache has room for them. A thread takes as many at a time: some 100 µs of work.
 constexpr size_t blocks_per_chunk = 128;
-// So many bodies and blocks end at a time: some 20 µs of work.
-constexpr size_t ends_per_chunk = 256;
 
 // Islands in turn.
 struct Chunk {
@@ -165,10 +163,6 @@ class Islands {
   struct Room {
     int32_t next, filled;
   };
-  static int32_t first_room(Room* rooms, int32_t group) {
-    while (rooms[group].next != group) group = rooms[group].next = rooms[rooms[group].next].next;
-    return group;
-  }
 
   void cut(const bc_pose* poses) {
     chunks.clear();

@@ -17,6 +17,13 @@ namespace box_contact::BOX_CONTACT_SET::force {
 // A part of an island has about so many blocks, at least: some 400 µs of work for a thread.
 constexpr size_t blocks_per_part = 128;
 
+// The first of some groups, from one on, that has room. `next` of each: the first from it on that may have.
+template <class Group>
+int32_t first_room(Group* groups, int32_t group) {
+  while (groups[group].next != group) group = groups[group].next = groups[groups[group].next].next;
+  return group;
+}
+
 class Parts {
  public:
   std::vector<Island> all;       // of large islands, in turn
@@ -204,9 +211,7 @@ class Parts {
     Open* from =
         std::lower_bound(groups, groups + count, level,
                          [](const Open& group, int32_t level) { return group.turn.level < level; });
-    auto group = int32_t(from - groups);
-    while (groups[group].next != group)
-      group = groups[group].next = groups[groups[group].next].next;
+    int32_t group = first_room(groups, int32_t(from - groups));
     if (group == count)
       groups[group].turn = {group > 0 ? std::max(level, groups[group - 1].turn.level + 1) : level};
     return group;

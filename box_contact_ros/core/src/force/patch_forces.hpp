@@ -40,7 +40,7 @@ class PatchForces {
   // A copy, whose advance takes no memory either.
   PatchForces copy() const {
     PatchForces twin = *this;
-    twin.is_grouped_ = false;
+    twin.is_grouped_ = false;  // parts of islands point into memory of this one
     twin.own_.make_room();
     twin.make_room(0);
     return twin;

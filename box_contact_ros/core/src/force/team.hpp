@@ -127,8 +127,8 @@ class Team {
   At at_[most];
 };
 
-// Whether teams pay. On cores that others use, parts wait for one that does not run: then no team is formed
-// for some advances, for twice as many each time that it happens again.
+// Whether teams pay. Where other work takes a core, parts wait for the one that has lost it. Then no team is
+// formed for some advances. Each further time, they are twice as many.
 class TeamsPay {
  public:
   bool operator()() { return left_ == 0 || --left_ == 0; }
@@ -142,7 +142,7 @@ class TeamsPay {
   }
 
  private:
-  // On cores of their own, parts wait for 5 % of their time; beside a loop that fills one of two, for most.
+  // On cores of their own, parts wait for 5 % of their time. Where a loop takes one of two, they wait for most.
   static constexpr double most_waited = 0.25;
   static constexpr int least_pause = 8, most_pause = 256;  // advances
 
