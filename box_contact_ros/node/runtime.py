@@ -168,16 +168,23 @@ def keep_events_from_interrupting() -> None:
         pass
 
 
-def _note_interrupts() -> list[int]:
-    """Let Ctrl-C raise nothing any more; return a list that each one is noted in.
+def _note_signals() -> list[int]:
+    """Let Ctrl-C and SIGTERM do nothing any more but be noted; return the list they are noted in.
 
     KeyboardInterrupt may fall anywhere in rclpy: where a lock is held that the clean end needs, or
-    in EventsExecutor, which then aborts the process.
+    in EventsExecutor, which then aborts the process. rclpy gives the handlers that it found back
+    as the process ends: the default one of SIGTERM would kill it.
     """
-    interrupts: list[int] = []
-    signal.signal(signal.SIGINT, lambda number, _: interrupts.append(number))
+    noted: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda number, _: noted.append(number))
     atexit.register(_ignore_signals)
-    return interrupts
+    return noted
+
+
+def _asked_to_end(noted: Sequence[int]) -> BaseException:
+    """Return what says by which signal: SIGHUP comes as SIGTERM."""
+    return KeyboardInterrupt() if signal.SIGINT in noted else ExternalShutdownException()
 
 
 def _hang_up_as_terminated() -> None:
@@ -202,12 +209,12 @@ def _hang_up_as_terminated() -> None:
 def _ignore_signals() -> None:
     """Let no signal disturb the interpreter's end.
 
-    It takes its handlers back, and so does rclpy: the next signal would kill the process. rclpy's
-    thread for signals would use what the end destroys.
+    It takes its handlers back: the next signal would kill the process. rclpy's thread for signals
+    would use what the end destroys.
     """
+    rclpy.signals.uninstall_signal_handlers()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
-    rclpy.signals.uninstall_signal_handlers()
 
 
 @contextlib.contextmanager
@@ -219,14 +226,14 @@ def running_node(make_node: Callable[[Context], NodeKind], args: Sequence[str] |
     signals: which handlers of rclpy's are installed; none where the caller has its own. They shut
     the context down. Whatever then fails is raised as KeyboardInterrupt after Ctrl-C, and as
     ExternalShutdownException after SIGTERM or SIGHUP. Ctrl-C itself raises nothing any more in this
-    process.
+    process, and SIGTERM no longer kills it.
     """
     context = Context()
     node = executor = None
     # Handlers have to be asked for where the context is not the default one.
-    interrupts: list[int] = []
+    noted: list[int] = []
     if signals is not SignalHandlerOptions.NO:
-        interrupts = _note_interrupts()
+        noted = _note_signals()
         _hang_up_as_terminated()
     try:
         rclpy.init(args=None if args is None else list(args), context=context,
@@ -240,8 +247,8 @@ def running_node(make_node: Callable[[Context], NodeKind], args: Sequence[str] |
         raise ValueError(f'after --ros-args, ROS does not know {error}: a parameter is '
                          '-p NAME:=VALUE, a name is remapped by -r FROM:=TO') from error
     try:
-        if interrupts:  # before rclpy's handlers were installed
-            raise KeyboardInterrupt
+        if noted:  # before rclpy's handlers were installed
+            raise _asked_to_end(noted)
         node = make_node(context)
         executor = EventsExecutor(context=context)
         executor.add_node(node)
@@ -249,7 +256,7 @@ def running_node(make_node: Callable[[Context], NodeKind], args: Sequence[str] |
     except Exception as error:
         if context.ok():
             raise
-        raise (KeyboardInterrupt if interrupts else ExternalShutdownException) from error
+        raise _asked_to_end(noted) from error
     finally:
         with ends_within(END_SECONDS), contextlib.ExitStack() as last_first:
             last_first.callback(shut_down, context)

@@ -186,7 +186,8 @@ signal.raise_signal(number)
     (signal.SIGINT, 'within', 'not here\nKeyboardInterrupt\n'),
     (signal.SIGTERM, 'within', 'not here\nExternalShutdownException\n'),
     (signal.SIGHUP, 'within', 'not here\nExternalShutdownException\n'),
-    (signal.SIGINT, 'before', 'KeyboardInterrupt\n')])
+    (signal.SIGINT, 'before', 'KeyboardInterrupt\n'),
+    (signal.SIGTERM, 'before', 'ExternalShutdownException\n')])
 def test_a_signal_falls_nowhere(number, when, words):
     """It shuts the context down, and what fails at that tells which signal it was."""
     done = subprocess.run([sys.executable, '-c', SIGNALLED, str(int(number)), when],
