@@ -13,6 +13,7 @@
 #include "block.hpp"
 #include "carriers.hpp"
 #include "clock.hpp"
+#include "turning.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
