@@ -19,7 +19,8 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.core import instruction_sets
 
 TOWERS, HEIGHT = 11, 3
-KINDS = ('steady', 'uneven', 'impacts', 'springs', 'belts', 'turntable', 'late', 'finer')
+KINDS = ('steady', 'uneven', 'impacts', 'springs', 'belts', 'turntable', 'spins', 'late', 'finer')
+SPINS = np.array([300.0, 1e-10, 30.0])  # of a tower's boxes by their sizes beyond 0.4 m [rad/s/m]
 
 
 def towers(kind: str) -> list[list[tuple]]:
@@ -63,6 +64,9 @@ def motion(kind: str, chosen: list[list[tuple]]) -> np.ndarray:
                 world.forces.hold(pairs, contacts, asked, age=0.01, period=0.025)
         if kind == 'turntable':
             world.velocities[0, 5] = 0.5
+        if kind == 'spins' and k % 20 == 0:
+            spins = np.tile(SPINS, len(chosen))[:, None]
+            world.velocities[1:, 3:] = spins * (world.size[1:] - 0.4)
         world.step(random.uniform(1e-6, 0.02) if kind == 'uneven' else 0.005)
         moved = np.hstack([world.poses, world.velocities, world.wrenches])[1:]
         found.append(moved.reshape(len(chosen), -1))

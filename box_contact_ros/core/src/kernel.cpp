@@ -62,26 +62,22 @@ long nearest_rows(const Rows& rows, long begin, long end, const NearestResults& 
   return solve_nearest_rows<Lanes<double, lanes>>(rows, begin, end, results);
 }
 
-using Side = Lanes<double, lanes>;
-using Stages = force::Stages<force::Group<Side>>;
-
 }  // namespace
 }  // namespace box_contact::BOX_CONTACT_SET
 
 namespace box_contact::detail {
 
-const Kernel KERNEL = {
-    name,
-    title,
-    lanes,
-    {{pair_by<ExactPointModel>, pair_by<ExactModel>},
-     {pair_by<MlpPointModel>, pair_by<MlpModel>},
-     {pair_by<PaperModel>, pair_by<PaperModel>}},
-    {{rows_by<ExactPointModel>, rows_by<ExactModel>},
-     {rows_by<MlpPointModel>, rows_by<MlpModel>},
-     {rows_by<PaperModel>, rows_by<PaperModel>}},
-    nearest_pair,
-    nearest_rows,
-    {lanes, sizeof(force::Group<Side>), Stages::load, Stages::push, Stages::relax, Stages::end}};
+const Kernel KERNEL = {name,
+                       title,
+                       lanes,
+                       {{pair_by<ExactPointModel>, pair_by<ExactModel>},
+                        {pair_by<MlpPointModel>, pair_by<MlpModel>},
+                        {pair_by<PaperModel>, pair_by<PaperModel>}},
+                       {{rows_by<ExactPointModel>, rows_by<ExactModel>},
+                        {rows_by<MlpPointModel>, rows_by<MlpModel>},
+                        {rows_by<PaperModel>, rows_by<PaperModel>}},
+                       nearest_pair,
+                       nearest_rows,
+                       force::Stages<force::Group<Lanes<double, lanes>>>::kernel};
 
 }  // namespace box_contact::detail

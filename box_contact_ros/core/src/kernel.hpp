@@ -53,6 +53,7 @@ struct ForceKernel {
   size_t group_size;  // [bytes]
   void (*load)(void*);
   void (*push)(void*);
+  void (*move)(void*);
   void (*relax)(void*);
   void (*end)(void*);
 };

@@ -43,7 +43,7 @@ class BodyStep {
     for (int i = 0; i < 4; ++i) moving.quaternion[i] = scale * given_.poses[k].quaternion[i];
     moving.impulse = moving.angular_impulse = {};
     if (!bodies_[k].is_free()) return;
-    moving.inverse_inertia = inverse_inertia_of(bodies_[k], moving.placed);
+    moving.inverse_inertia = inverse_inertia_of(bodies_[k].inverse_inertia, moving.placed.axes);
     // A caller who moves by the wrenches comes back with the speed of pushing out.
     if (!came_by_wrenches_) return;
     const auto& [pushed, relaxed] = ended_[k];
@@ -58,7 +58,7 @@ class BodyStep {
   void advance(Moving& moving) const {
     for (int number = 1; number <= steps_.count; ++number) {
       drive(moving, number, steps_);
-      move(moving, steps_.length);
+      move(bodies_[size_t(moving.body)], steps_.length, moving);
     }
   }
   // Change velocities by all but contacts, for sub-step `number`.
@@ -72,15 +72,6 @@ class BodyStep {
     if (!given_.outside) return;
     moving.linear += (h * bodies_[k].inverse_mass) * vector(given_.outside[k].force);
     moving.angular += h * (moving.inverse_inertia * vector(given_.outside[k].torque));
-  }
-
-  // Move a body by its velocities for a time.
-  void move(Moving& moving, double h) const {
-    const Body& body = bodies_[size_t(moving.body)];
-    moving.placed.position += h * moving.linear;
-    turn_freely(body, h, moving.quaternion, moving.placed, moving.angular);
-    if (body.is_free()) moving.inverse_inertia = inverse_inertia_of(body, moving.placed);
-    moving.pushed = {moving.linear, moving.angular};
   }
 
   // A sum is finite only if all its numbers are.
@@ -122,7 +113,7 @@ class BodyStep {
     Moving moving{};
     moving.body = int32_t(k);
     begin(moving);
-    for (int number = 0; number < steps_.count; ++number) move(moving, steps_.length);
+    for (int number = 0; number < steps_.count; ++number) move(bodies_[k], steps_.length, moving);
     write_pose(moving);
   }
 

@@ -193,7 +193,7 @@ class IslandStep {
       if (!island.is_shared) continue;
       island.factor = 0;
       if (groups == 0)
-        advance({&island, &island + 1}, alone, &blocks_[island.block],
+        advance({&island, &island + 1}, Stages<Block>::kernel, &blocks_[island.block],
                 island.block_end - island.block);
     }
   }
@@ -205,17 +205,20 @@ class IslandStep {
   Work work_of(Islands::Range range, const SubSteps& steps, void* groups, size_t group,
                size_t group_end) const {
     bool counts = step_.motion.wrenches;
-    return {
-        range.first, range.last, moving_.data(), blocks_.data(),      patches_.data(),      groups,
-        group,       group_end,  steps,          options_.iterations, options_.relaxations, counts};
+    return {range.first,
+            range.last,
+            bodies_.data(),
+            moving_.data(),
+            blocks_.data(),
+            patches_.data(),
+            groups,
+            group,
+            group_end,
+            steps,
+            options_.iterations,
+            options_.relaxations,
+            counts};
   }
-  static constexpr detail::ForceKernel alone = {1,
-                                                sizeof(Block),
-                                                Stages<Block>::load,
-                                                Stages<Block>::push,
-                                                Stages<Block>::relax,
-                                                Stages<Block>::end};
-
   template <class Visit>
   void each(const Island& island, const Visit& visit) const {
     each_block(island, [&](size_t k) {
@@ -241,6 +244,8 @@ class IslandStep {
              [](const Block& block, Patch& patch, Moving&, Moving&) { give_back(block, patch); });
       });
     };
+    // Bodies move side by side where their blocks are solved alone, too.
+    const detail::ForceKernel& moves = islands_.side() ? *islands_.side() : Stages<Block>::kernel;
     const SubSteps& steps = work.steps;
     // From one answer to the next.
     double time = factor > 1 ? std::min(parts_of_a_contact * steps.length, steps.dt) : steps.dt;
@@ -263,7 +268,7 @@ class IslandStep {
       work.is_last = number == steps.count;
       each_moving([&](Moving& moving) { body_step_.drive(moving, number, steps); });
       kernel.push(&work);
-      each_moving([&](Moving& moving) { body_step_.move(moving, steps.length); });
+      moves.move(&work);
       kernel.relax(&work);
     }
     end();

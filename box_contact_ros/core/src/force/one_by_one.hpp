@@ -1,12 +1,13 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// What an advance does with a block.
+// What an advance does with a block, or a body.
 #pragma once
 
 #include "iterations.hpp"
 #include "preparing.hpp"
 #include "team.hpp"
+#include "turning.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
@@ -14,6 +15,7 @@ namespace box_contact::BOX_CONTACT_SET::force {
 // Kernels of all instruction sets have it alike.
 struct Work {
   Island *first, *last;
+  const Body* bodies;
   Moving* moving;
   Block* blocks;
   const Patch* patches;
@@ -71,6 +73,9 @@ inline bool solve(const Work& work, const Turn& turn, Block& block) {
   if (a.inverse_mass > 0.0) a.changed = turn.iteration;
   if (b.inverse_mass > 0.0) b.changed = turn.iteration;
   return true;
+}
+inline void move(const Work& work, Moving& moving) {
+  move(work.bodies[moving.body], work.steps.length, moving);
 }
 inline void count(const Work& work, Block& block) {
   count<double>(block, work.moving[block.a], work.moving[block.b]);

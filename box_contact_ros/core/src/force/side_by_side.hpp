@@ -12,6 +12,7 @@ namespace box_contact::BOX_CONTACT_SET::force {
 // Blocks side by side. Lanes that are not filled repeat the first one, and are not written.
 template <class T>
 struct alignas(64) Group : Rows<T> {
+  using Type = T;
   static constexpr int lanes = width<T>;
 
   int32_t a[lanes], b[lanes], block[lanes];
@@ -183,6 +184,30 @@ template <class T>
   write_speeds<T>(work.moving, group.a, solved & group.is_free_a, a);
   write_speeds<T>(work.moving, group.b, solved & group.is_free_b, b);
   return (solved & ~bits(calm)) != 0;
+}
+
+// Move the bodies at some places: those of the lanes that are filled.
+template <class T>
+[[gnu::noinline]] inline void move(const Work& work, Lane<T> places, unsigned filled) {
+  Moving* moving = work.moving;
+  Speeds<T> speeds = speeds_of<T>(moving, places);
+  Where<T> at{};
+  read_rows<T>([&](int i) { return &moving[places[i]].placed; }, at.placed);
+  T quaternion[4];
+  Vec<T> inverse_inertia;
+  load_rows([&](int i) { return moving[places[i]].quaternion; }, quaternion);
+  load_rows([&](int i) { return work.bodies[moving[places[i]].body].inverse_inertia.v; },
+            inverse_inertia.v);
+  move<T>(inverse_inertia, work.steps.length, quaternion, speeds, at);
+  write_speeds<T>(moving, places, filled, speeds);
+  write_rows<T>([&](int i) { return static_cast<Where<double>*>(moving + places[i]); }, filled, at);
+  double* quaternions[width<T>];
+  for (int i = 0; i < width<T>; ++i) quaternions[i] = moving[places[i]].quaternion;
+  store_rows<4, T>(quaternions, filled, quaternion);
+  for (int i = 0; i < width<T>; ++i) {
+    Moving& moved = moving[places[i]];
+    moved.pushed = {moved.linear, moved.angular};
+  }
 }
 
 template <class T>

@@ -4,19 +4,23 @@
 // The stages of an advance of islands, with their blocks one by one or side by side.
 #pragma once
 
+#include "../kernel.hpp"
 #include "side_by_side.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
 // G: a block, or a group of them. `all`: a Work.
 template <class G>
-struct Stages {
+class Stages {
+ public:
   // Take what blocks know.
   static void load(void* all) {
     if constexpr (!is_alone) {
       const Work& work = work_of(all);
       each(work, [](G& group) { group.filled = group.is_free_a = group.is_free_b = 0; });
-      each_shared(work, [&](Island& island, size_t k) { join(work, island, k); });
+      each_shared(work, [&](Island& island) {
+        each_block(island, [&](size_t k) { join(work, island, k); });
+      });
       each(work, [&](G& group) {
         for (int i = 0; i < G::lanes; ++i)
           if (!(group.filled >> i & 1)) {
@@ -41,6 +45,26 @@ struct Stages {
     iterate_all(work, work.iterations, true);
     if (work.counts) each_in_turn(work, [&](G& group) { count(work, group); });
   }
+  // Move bodies by their velocities.
+  static void move(void* all) {
+    const Work& work = work_of(all);
+    if constexpr (is_alone) {
+      each_shared_body(work, [&](size_t k) { force::move(work, work.moving[k]); });
+    } else {
+      int32_t places[G::lanes];
+      int filled = 0;
+      auto move_them = [&] {
+        for (int i = filled; i < G::lanes; ++i) places[i] = places[0];
+        force::move<typename G::Type>(work, places, (1u << filled) - 1);
+        filled = 0;
+      };
+      each_shared_body(work, [&](size_t k) {
+        places[filled++] = int32_t(k);
+        if (filled == G::lanes) move_them();
+      });
+      if (filled > 0) move_them();
+    }
+  }
   // Relax, and end the sub-step.
   static void relax(void* all) {
     const Work& work = work_of(all);
@@ -59,6 +83,15 @@ struct Stages {
       each(work, [&](G& group) { force::end(work, group); });
     }
   }
+
+  static constexpr int lanes() {
+    if constexpr (is_alone) {
+      return 1;
+    } else {
+      return G::lanes;
+    }
+  }
+  static constexpr detail::ForceKernel kernel = {lanes(), sizeof(G), load, push, move, relax, end};
 
  private:
   static constexpr bool is_alone = std::is_same_v<G, Block>;
@@ -83,7 +116,12 @@ struct Stages {
   template <class Visit>
   static void each_shared(const Work& work, const Visit& visit) {
     for (Island* island = work.first; island < work.last; ++island)
-      if (island->is_shared) each_block(*island, [&](size_t k) { visit(*island, k); });
+      if (island->is_shared) visit(*island);
+  }
+
+  template <class Visit>
+  static void each_shared_body(const Work& work, const Visit& visit) {
+    each_shared(work, [&](const Island& island) { each_body(island, visit); });
   }
 
   static void join(const Work& work, Island& island, size_t k) {

@@ -1,34 +1,33 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// How bodies turn by their angular velocities, and these as they do.
+// How bodies move by their velocities, and turn: one by one, or side by side. Each lane has the bits of a body
+// alone.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-
-#include "rigid_body.hpp"
+#include "block.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
 // Turn a quaternion x y z w by an angular velocity ω, in the common frame, for a time h. Its tan(θ/4) is
 // t + t³/3 with t = h·ω/4, so the angle is short of h·ω by (h·ω)⁵/1920.
-inline void spin(double (&q)[4], const Vec<double>& angular, double h) {
-  Vec<double> t = (0.25 * h) * angular;
+template <class T>
+BC_INLINE void spin(T (&q)[4], const Vec<T>& angular, double h) {
+  Vec<T> t = (0.25 * h) * angular;
   t = (1.0 + dot(t, t) / 3.0) * t;
-  double squared = dot(t, t), share = 1.0 / (1.0 + squared), w = share * (1.0 - squared);
-  Vec<double> v = (2.0 * share) * t, u = vector_at(q);
-  Vec<double> turned = (w * u + q[3] * v) + cross(v, u);
+  T squared = dot(t, t), share = 1.0 / (1.0 + squared), w = share * (1.0 - squared);
+  Vec<T> v = (2.0 * share) * t, u{q[0], q[1], q[2]};
+  Vec<T> turned = (w * u + q[3] * v) + cross(v, u);
   q[3] = w * q[3] - dot(v, u);
-  std::copy_n(turned.v, 3, q);
+  for (int k = 0; k < 3; ++k) q[k] = turned[k];
 }
 
-// I⁻¹ in the common frame.
-inline Mat<double> inverse_inertia_of(const Body& body, const Placed& placed) {
-  Mat<double> m;
+// I⁻¹ in the common frame, of that about a body's own axes.
+template <class T>
+BC_INLINE Mat<T> inverse_inertia_of(const Vec<T>& inverse_inertia, const Mat<T>& axes) {
+  Mat<T> m;
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      m[i][j] = dot(row(placed.axes, i), body.inverse_inertia * row(placed.axes, j));
+    for (int j = 0; j < 3; ++j) m[i][j] = dot(row(axes, i), inverse_inertia * row(axes, j));
   return m;
 }
 
@@ -41,9 +40,10 @@ constexpr double turn_limit = 0.05;
 constexpr int turns_max = 1000;
 
 // Turn a body with the quaternion q by t = tan(θ / 2) about its own axis x.
-inline void turn_about(int x, double t, double (&q)[4]) {
+template <class T>
+BC_INLINE void turn_about(int x, T t, T (&q)[4]) {
   int y = (x + 1) % 3, z = (x + 2) % 3;
-  double w = q[3], at_x = q[x], at_y = q[y], at_z = q[z], norm = 1.0 / std::sqrt(1.0 + t * t);
+  T w = q[3], at_x = q[x], at_y = q[y], at_z = q[z], norm = 1.0 / sqrt(1.0 + t * t);
   q[x] = norm * (at_x + t * w);
   q[3] = norm * (w - t * at_x);
   q[y] = norm * (at_y + t * at_z);
@@ -55,65 +55,95 @@ constexpr double least_angle = 0x1p-20;
 
 // Put twice the kinetic energy right. The body turns a little under its angular momentum, which stays: by
 // `most` [rad]. Of a cube, and about a principal axis, there is nothing to put right.
-inline void keep_energy(const Body& body, double energy, double most, double (&q)[4],
-                        Vec<double>& momentum) {
-  Vec<double> speed = momentum * body.inverse_inertia;
-  double squared = dot(momentum, momentum), found = dot(momentum, speed);
-  Vec<double> across = speed - (found / squared) * momentum;
-  double slope = 2.0 * dot(across, across), amount = (found - energy) / slope;
-  if (!(slope > least_angle * least_angle * dot(speed, speed))) return;
-  if (!(amount * amount * slope <= most * most * squared)) return;
-  Vec<double> turned = momentum - amount * across;
-  turned = std::sqrt(squared / dot(turned, turned)) * turned;
-  Vec<double> half = (0.5 / squared) * cross(turned, momentum);
-  double w = q[3], norm = 1.0 / std::sqrt(1.0 + dot(half, half));
-  Vec<double> v = vector_at(q), after = norm * ((v + w * half) + cross(v, half));
-  q[3] = norm * (w - dot(v, half));
-  std::copy_n(after.v, 3, q);
-  momentum = turned;
+template <class T>
+BC_INLINE void keep_energy(const Vec<T>& inverse_inertia, T energy, T most, T (&q)[4],
+                           Vec<T>& momentum) {
+  Vec<T> speed = momentum * inverse_inertia;
+  T squared = dot(momentum, momentum), found = dot(momentum, speed);
+  Vec<T> across = speed - (found / squared) * momentum;
+  T slope = 2.0 * dot(across, across), amount = (found - energy) / slope;
+  Mask<T> turns = (slope > least_angle * least_angle * dot(speed, speed)) &
+                  (amount * amount * slope <= most * most * squared);
+  if (!any(turns)) return;
+  Vec<T> turned = momentum - amount * across;
+  turned = sqrt(squared / dot(turned, turned)) * turned;
+  Vec<T> half = (0.5 / squared) * cross(turned, momentum), v{q[0], q[1], q[2]};
+  T w = q[3], norm = 1.0 / sqrt(1.0 + dot(half, half));
+  Vec<T> after = norm * ((v + w * half) + cross(v, half));
+  for (int k = 0; k < 3; ++k) q[k] = select<T>(turns, after[k], q[k]);
+  q[3] = select<T>(turns, norm * (w - dot(v, half)), w);
+  momentum = select(turns, turned, momentum);
 }
 
-// Turn a body on which nothing acts for a time h: about each of its own axes in turn, there and back
+// Turn those bodies, on which nothing acts, for a time h: about each of their own axes in turn, there and back
 // (Dullweber, Leimkuhler and McLachlan, "Symplectic splitting methods for rigid body molecular dynamics",
-// 1997). Its angular momentum in the common frame stays the same to rounding, and so does its energy.
-// `momentum`: in its own frame.
-inline void tumble(const Body& body, double h, double (&q)[4], Vec<double>& momentum) {
-  Vec<double> speed = momentum * body.inverse_inertia;
-  double energy = dot(momentum, speed);
-  double angle = length(speed) * h;
-  double turns = std::ceil(std::min(double(turns_max), angle / turn_limit));
-  constexpr int axes[] = {0, 1, 2, 1, 0};
-  for (int k = int(turns); k-- > 0;)
-    for (int step = 0; step < 5; ++step) {
-      int x = axes[step], y = (x + 1) % 3, z = (x + 2) % 3;
-      double part = (step == 2 ? 1.0 : 0.5) * (h / turns);
-      double half = 0.5 * part * momentum[x] * body.inverse_inertia[x],
-             t = half + half * half * half / 3.0;  // tan(angle / 2)
-      double scale = 1.0 / (1.0 + t * t), cosine = scale * (1.0 - t * t), sine = 2.0 * scale * t;
-      double along_y = momentum[y], along_z = momentum[z];
-      momentum[y] = cosine * along_y + sine * along_z;
-      momentum[z] = cosine * along_z - sine * along_y;
-      turn_about(x, t, q);
-    }
+// 1997). Their angular momenta in the common frame stay the same to rounding, and so do their energies.
+// `momentum`: in their own frames.
+template <class T>
+BC_INLINE void tumble(const Vec<T>& inverse_inertia, Mask<T> chosen, double h, T (&q)[4],
+                      Vec<T>& momentum) {
+  Vec<T> speed = momentum * inverse_inertia;
+  T energy = dot(momentum, speed), angle = length(speed) * h;
+  T turns = select<T>(chosen, ceil(min<T>(angle / turn_limit, splat<T>(turns_max))), T{});
+  for (int done = 0; any(turns > double(done)); ++done) {
+    T turned[4] = {q[0], q[1], q[2], q[3]};
+    Vec<T> after = momentum;
+    auto about = [&](int x, double share) __attribute__((always_inline)) {
+      int y = (x + 1) % 3, z = (x + 2) % 3;
+      T part = share * (h / turns), half = 0.5 * part * after[x] * inverse_inertia[x],
+        t = half + half * half * half / 3.0;  // tan(angle / 2)
+      T scale = 1.0 / (1.0 + t * t), cosine = scale * (1.0 - t * t), sine = 2.0 * scale * t;
+      T along_y = after[y], along_z = after[z];
+      after[y] = cosine * along_y + sine * along_z;
+      after[z] = cosine * along_z - sine * along_y;
+      turn_about(x, t, turned);
+    };
+    about(0, 0.5);
+    about(1, 0.5);
+    about(2, 1.0);
+    about(1, 0.5);
+    about(0, 0.5);
+    Mask<T> goes_on = turns > double(done);
+    for (int k = 0; k < 4; ++k) q[k] = select<T>(goes_on, turned[k], q[k]);
+    momentum = select(goes_on, after, momentum);
+  }
   for (int newton = 0; newton < 2; ++newton)
-    keep_energy(body, energy, turn_limit * std::min(angle, 1.0), q, momentum);
+    keep_energy<T>(inverse_inertia, energy, turn_limit * min<T>(angle, splat<T>(1.0)), q, momentum);
 }
 
-// Turn a body for a time h, and change its angular velocity in the common frame as it does by itself.
-inline void turn_freely(const Body& body, double h, double (&q)[4], Placed& placed,
-                        Vec<double>& angular) {
-  double most = largest(abs(angular));
-  if (most == 0.0) return;
-  if (!body.is_free() || h * most < least_turn) {
-    spin(q, angular, h);
-    placed.axes = rotation_matrix(q);
-    return;
+// Turn bodies for a time h, and change their angular velocities in the common frame as they do by themselves.
+template <class T>
+BC_INLINE void turn_freely(const Vec<T>& inverse_inertia, Mask<T> is_free, double h, T (&q)[4],
+                           Mat<T>& axes, Vec<T>& angular) {
+  T most = largest(abs(angular));
+  Mask<T> turns = most != 0.0, tumbles = turns & is_free & (h * most >= least_turn);
+  if (!any(turns)) return;
+  T spun[4] = {q[0], q[1], q[2], q[3]}, tumbled[4] = {q[0], q[1], q[2], q[3]};
+  if (bits(turns) & ~bits(tumbles)) spin(spun, angular, h);
+  Vec<T> momentum{};  // in its own frame
+  if (any(tumbles)) {
+    momentum = transposed_times(axes, angular) / inverse_inertia;
+    tumble<T>(inverse_inertia, tumbles, h, tumbled, momentum);
   }
-  Vec<double> momentum =
-      transposed_times(placed.axes, angular) / body.inverse_inertia;  // in its own frame
-  tumble(body, h, q, momentum);
-  placed.axes = rotation_matrix(q);
-  angular = placed.axes * (momentum * body.inverse_inertia);
+  for (int k = 0; k < 4; ++k)
+    q[k] = select<T>(turns, select<T>(tumbles, tumbled[k], spun[k]), q[k]);
+  Mat<T> after = rotation_matrix(q);
+  put<T>(turns, after, axes);
+  angular = select(tumbles, axes * (momentum * inverse_inertia), angular);
+}
+
+// Move bodies by their velocities for a time h. inverse_inertia: about their own axes.
+template <class T>
+BC_INLINE void move(const Vec<T>& inverse_inertia, double h, T (&q)[4], Speeds<T>& speeds,
+                    Where<T>& at) {
+  Mask<T> is_free = speeds.inverse_mass > 0.0;
+  at.placed.position += h * speeds.linear;
+  turn_freely<T>(inverse_inertia, is_free, h, q, at.placed.axes, speeds.angular);
+  put<T>(is_free, inverse_inertia_of(inverse_inertia, at.placed.axes), at.inverse_inertia);
+}
+inline void move(const Body& body, double h, Moving& moving) {
+  move<double>(body.inverse_inertia, h, moving.quaternion, moving, moving);
+  moving.pushed = {moving.linear, moving.angular};
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET::force

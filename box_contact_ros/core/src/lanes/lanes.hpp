@@ -183,6 +183,25 @@ BC_INLINE T sqrt(T x) {
 }
 
 template <class T>
+BC_INLINE T ceil(T x) {
+  if constexpr (is_scalar<T>) {
+    return std::ceil(x);
+#if defined(__AVX512F__)
+  } else if constexpr (std::is_same_v<T, Lanes<double, 8>>) {
+    return (T)_mm512_ceil_pd((__m512d)x);
+#endif
+#if defined(__AVX__)
+  } else if constexpr (std::is_same_v<T, Lanes<double, 4>>) {
+    return (T)_mm256_ceil_pd((__m256d)x);
+#endif
+  } else {
+    T above{};
+    for (int i = 0; i < width<T>; ++i) above[i] = std::ceil(x[i]);
+    return above;
+  }
+}
+
+template <class T>
 BC_INLINE auto lane(const T& x, int i) {
   if constexpr (is_scalar<T>) {
     return x;
