@@ -117,6 +117,11 @@ void each_block(const Island& island, const Visit& visit) {
     visit(island.blocks ? size_t(island.blocks[k]) : k);
 }
 
+// Before iterations begin, no speed has changed.
+inline void forget_changes(const Island& island, Moving* moving) {
+  each_body(island, [&](size_t k) { moving[k].changed = 0; });
+}
+
 // A larger change of a closing speed is an impact in a sub-step of this length [m/s].
 inline double least_impact(const Island& island, double length) {
   return island.is_new ? impact_change : max(impact_change, impact_acceleration * length);
@@ -159,15 +164,11 @@ inline void scale(const Island& island, bool is_pushing, int iteration, Moving* 
 }
 
 // Solve the blocks of islands in turn, so many times, each island as if alone. Beyond them only impacts
-// go on. `solve(iteration, is_beyond)`: a turn of all; returns whether a speed changed, and beyond, whether
-// one did as in an impact. `scale(island, iteration)`: see above.
+// go on. Changes were forgotten. `solve(iteration, is_beyond)`: a turn of all; returns whether a speed
+// changed, and beyond, whether one did as in an impact. `scale(island, iteration)`: see above.
 template <class Solve, class Scale>
 void iterate(Island* first, Island* last, int iterations, Moving* moving, const Solve& solve,
              const Scale& scale) {
-  auto forget_changes = [&](const Island& island) {
-    each_body(island, [&](size_t k) { moving[k].changed = 0; });
-  };
-  for (Island* island = first; island < last; ++island) forget_changes(*island);
   for (int iteration = 1;; ++iteration) {
     for (Island* island = first; island < last; ++island) island->is_struck = false;
     if (!solve(iteration, iteration > 1 && iteration >= iterations)) return;
@@ -175,7 +176,7 @@ void iterate(Island* first, Island* last, int iterations, Moving* moving, const 
     for (Island* island = first; island < last; ++island) {
       int most = island->is_uneven ? uneven_impact_iterations : impact_iterations;
       if (!island->is_struck || iteration >= most) {
-        if (iteration >= iterations) forget_changes(*island);  // it is not solved again
+        if (iteration >= iterations) forget_changes(*island, moving);  // it is not solved again
         continue;
       }
       if (iteration % scaled_every == 0) scale(*island, iteration);

@@ -38,6 +38,7 @@ class Stages {
     const Work& work = work_of(all);
     for (Island* island = work.first; island < work.last; ++island)
       island->impact = work.steps.is_late ? no_impact : least_impact(*island, work.steps.length);
+    forget_changes(work);
     work.meet();
     each(work, [&](G& group) { prepare(work, group); });
     agree_on_impact(work);
@@ -68,9 +69,11 @@ class Stages {
   // Relax, and end the sub-step.
   static void relax(void* all) {
     const Work& work = work_of(all);
+    forget_changes(work);
     work.meet();
     if (work.relaxations > 0) {
       each(work, [&](G& group) { follow(work, group); });
+      work.meet();
       iterate_all(work, work.relaxations, false);
     }
     if (work.counts && !work.is_last) each_in_turn(work, [&](G& group) { count(work, group); });
@@ -138,6 +141,11 @@ class Stages {
     if (work.moving[block.b].inverse_mass > 0.0) group.is_free_b |= bit;
   }
 
+  // Before a meeting: other parts warm-start bodies of this one.
+  static void forget_changes(const Work& work) {
+    for (Island* island = work.first; island < work.last; ++island)
+      force::forget_changes(*island, work.moving);
+  }
   // The largest impact of any part is that of its island.
   static void agree_on_impact(const Work& work) {
     if (!work.team) return;
@@ -152,7 +160,6 @@ class Stages {
     iterations *= work.steps.rounds;
     auto solve_all = [&](int iteration, bool is_beyond) {
       bool is_changed = false;
-      if (iteration == 1) work.meet();
       each_in_turn(work, [&](G& group) {
         is_changed |= solve(work, {is_pushing, iteration, is_beyond}, group);
       });
