@@ -245,6 +245,37 @@ def test_rest_is_the_poses_that_were_given(twins: tuple[World, World]) -> None:
     assert world.wrenches[1:, :3] == pytest.approx(-world.outside[1:, :3], abs=0.01)
 
 
+@pytest.mark.parametrize(('dt', 'speed'), [(1 / 240, 0.02), (1 / 60, 0.07), (0.1, 0.3)])
+def test_what_slides_within_a_step_is_not_laid_down_where_it_was(dt: float, speed: float) -> None:
+    """A settled cube is given a speed in the step in which it would be laid down."""
+    steps, settled = 0, World(FLOOR, cube(5, 0, 0, 0.25))
+    while not asleep(settled.step(dt)):
+        steps += 1
+    kicked = [World(FLOOR, cube(5, 0, 0, 0.25), rest=rest).run(steps * dt, dt)
+              for rest in (True, False)]
+    for world in kicked:
+        give_speed(world, 1, speed, 0, 0, 0, 0, 0)
+        world.step(dt)
+        assert world.awake[1]
+        world.run(2.0, dt)
+    assert asleep(kicked[0]) == [1]
+    assert kicked[0].poses == pytest.approx(kicked[1].poses, abs=1e-6)
+
+
+def test_what_falls_within_a_step_is_laid_down_where_it_landed() -> None:
+    """A step may be longer than what is slow must last."""
+    for dt in (0.6, 0.9):
+        world = World(FLOOR, cube(5, 0, 0, 3.0)).run(8 * dt, dt)
+        assert asleep(world) == [1]
+        assert world.poses[1, 2] == pytest.approx(0.25, abs=1e-3)
+
+
+def test_zeros_of_either_sign_wake_nobody(twins: tuple[World, World]) -> None:
+    world = deepcopy(twins[0])
+    world.velocities = -np.abs(world.velocities)
+    assert asleep(world.step(DT)) == [ON_PLATE, FOOT, MIDDLE, TOP, SLIDER]
+
+
 def test_what_is_not_touched_rests_on(twins: tuple[World, World]) -> None:
     """A push of the tower wakes neither the box on the plate nor the one beside."""
     world = deepcopy(twins[0])
@@ -494,6 +525,38 @@ def test_answers_of_others_let_fall_as_without_rest() -> None:
         resting, awake = (world.step(DT) for world in worlds)
         assert resting.poses == pytest.approx(awake.poses, abs=1e-6)
     assert resting.poses[3, 2] < 0.9
+
+
+def test_a_touch_told_after_what_it_touches_was_laid_down() -> None:
+    """The question is older than rest: a box that comes down on another one ends on it."""
+    def landed(start: float, **options) -> Told:
+        world = Told(FLOOR, cube(20, 0, 0, 0.25), cube(5, 0.02, 0, start), late=5, **options)
+        world.outside[2] = 0.0
+        give_speed(world, 2, 0, 0, -0.5, 0, 0, 0)
+        return world
+
+    steps, world = 0, landed(100.0)
+    while not asleep(world.step(DT)):
+        steps += 1
+    start = 0.75 + 0.5 * DT * (steps - 3)  # it touches three steps before the lower one is laid down
+    resting, awake = landed(start), landed(start, rest=False)
+    for _ in range(steps + 60):
+        assert resting.step(DT).poses == pytest.approx(awake.step(DT).poses, abs=1e-6)
+
+
+def test_contacts_of_ones_own_after_answers_wake() -> None:
+    """The answers were of larger boxes: without them the box comes down."""
+    world = Told(FLOOR, cube(5, 0, 0, 0.26))
+    world.forces.set_boxes(world.size)
+    boxes = world.size.copy()
+    world.size[1] += 0.02
+    assert asleep(world.run(2.0, DT)) == [1]
+    world.forces.set_boxes(boxes)
+    assert asleep(world.run(1.0, DT)) == [1] and world.poses[1, 2] > 0.2599
+    world.forces.hold(world.pairs)
+    for _ in range(240):
+        World.step(world, DT)
+    assert world.poses[1, 2] == pytest.approx(0.25, abs=1e-4)
 
 
 def test_stale_answers_wake_nobody() -> None:

@@ -150,11 +150,12 @@ class PatchForces {
     advance(dt, poses, velocities, outside, {sizeof(bc_motion), nullptr, nullptr, found.data(), nullptr});
   }
 
-  // What each pair carried, by the lower and the higher box: the mean of the last advance. None if
-  // bodies or boxes were changed, or patches forgotten, since.
+  // What each pair carried, by the lower and the higher box: the mean of the last advance. No row
+  // if bodies or boxes were changed, or patches forgotten, since.
   std::vector<Load> loads() const {
     std::vector<Load> found(std::size_t(bc_patch_forces_loads(forces_.get(), nullptr, 0)));
-    bc_patch_forces_loads(forces_.get(), found.data(), std::int64_t(found.size()));
+    found.resize(std::size_t(
+        bc_patch_forces_loads(forces_.get(), found.data(), std::int64_t(found.size()))));
     return found;
   }
 

@@ -106,7 +106,7 @@ class BodyStep {
     if (motion_.velocities) motion_.velocities[k] = velocity;
     if (motion_.wrenches) motion_.wrenches[k] = {};
     if (!motion_.poses) return;
-    if (are_within(velocity.linear, 3, 0.0) && are_within(velocity.angular, 3, 0.0)) {
+    if (is_still(velocity)) {
       motion_.poses[k] = given_.poses[k];
       return;
     }

@@ -147,10 +147,12 @@ class Clock {
             period_,
             overdue_periods * std::max(period_, dt)};
   }
+  // Whether contacts are those of answers.
+  bool is_told() const { return since_ >= 0.0; }
   // Since the last answer [s]; 0 with contacts of each step.
   double since() const { return std::max(0.0, since_); }
   void end(double dt) {
-    if (since_ >= 0.0) since_ += dt;
+    if (is_told()) since_ += dt;
   }
 
  private:

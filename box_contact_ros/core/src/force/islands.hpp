@@ -35,12 +35,14 @@ class Scratch {
  public:
   Scratch() = default;
   Scratch(const Scratch&) {}
+  Scratch(Scratch&&) = default;
   Scratch& operator=(const Scratch&) { return *this; }
 
   void make_room(size_t bytes) {
     if (bytes <= lines_ * sizeof(Line)) return;
-    lines_ = bytes / sizeof(Line) + 1;
-    memory_.reset(new Line[lines_]);
+    size_t lines = bytes / sizeof(Line) + 1;
+    memory_.reset(new Line[lines]);
+    lines_ = lines;
   }
   char* at(size_t byte) { return reinterpret_cast<char*>(memory_.get()) + byte; }
 

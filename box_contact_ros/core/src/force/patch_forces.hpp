@@ -72,11 +72,11 @@ class PatchForces {
     wake();
     for (size_t k = 0; k < std::min(bodies.size(), bodies_.size()); ++k)
       if (bodies[k].is_free() != bodies_[k].is_free()) begin_anew(k);
-    bodies_ = std::move(bodies);
-    ended_.resize(bodies_.size());
-    fineness_.resize(bodies_.size());
-    poses_.resize(bodies_.size());
-    rest_.change_bodies(bodies_, is_changed);
+    ended_.resize(bodies.size());
+    fineness_.resize(bodies.size());
+    poses_.resize(bodies.size());
+    rest_.change_bodies(bodies, is_changed);
+    bodies_ = std::move(bodies);  // last: there may be no memory for the others
     is_chosen_ = false;
     auto count = int32_t(bodies_.size());
     make_room(patches_.size());
@@ -136,13 +136,14 @@ class PatchForces {
   bool holds(const bc_patches& pairs) const { return own_.is_asked(pairs); }
   // Take pairs whose contacts are solved at the start of each advance. Impulses stay.
   Held hold(const bc_patches& pairs) {
+    bool were_told = clock_.is_told();
     if (!own_.ask(pairs, options_.friction, rest_.is_any(),
                   [this](const BoxPair& pair) { return rest_.has(pair); }))
       return Held::pair_twice;
     clock_.answer_each_step();
     is_chosen_ = false;
     make_room(own_.count());
-    rest_.mark_if([this](const Patch& patch) { return !own_.is_asked(patch); });
+    rest_.mark_if([&](const Patch& patch) { return were_told || !own_.is_asked(patch); });
     wake();
     if (own_.count() == 0) drop([](const Patch&) { return true; });
     return Held::all;
@@ -251,7 +252,7 @@ class PatchForces {
   }
   // Take what an answer says of patches at rest. A patch wakes where the answer says something new.
   void take_at_rest(double age, const bc_pose* asked) {
-    rest_.take(next_, age, asked);
+    rest_.take(bodies_, next_, age, asked);
     wake();
     next_.erase(std::remove_if(next_.begin(), next_.end(),
                                [this](const Patch& patch) { return rest_.rests(patch); }),

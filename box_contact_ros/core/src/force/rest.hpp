@@ -65,6 +65,7 @@ class Rest {
   }
   // Take other bodies; those that are changed are awake. They begin with no pose of before.
   void change_bodies(const std::vector<Body>& bodies, const std::vector<uint8_t>& is_changed) {
+    make_room(bodies.size(), 0);
     of_.resize(bodies.size());
     is_marked_.resize(bodies.size());
     for (size_t k = 0; k < bodies.size(); ++k)
@@ -126,13 +127,10 @@ class Rest {
     bool is_other = false, is_bearing = false;
     for (int32_t body : fixed_) {
       OfBody& of = of_[size_t(body)];
-      const double* speeds = given.velocities[body].linear;
-      bool is_still = are_within(speeds, 3, 0.0) &&
-                      are_within(given.velocities[body].angular, 3, 0.0) &&
-                      have_same_bits(of.pose, given.poses[body]);
-      is_other |= is_still != of.is_fixed_still;
-      of.is_fixed_still = is_still;
-      is_bearing |= !is_still && of.bears;
+      bool stays = is_still(given.velocities[body]) && have_same_bits(of.pose, given.poses[body]);
+      is_other |= stays != of.is_fixed_still;
+      of.is_fixed_still = stays;
+      is_bearing |= !stays && of.bears;
     }
     if (is_bearing)
       mark_if([this](const Patch& patch) {
@@ -143,10 +141,16 @@ class Rest {
 
   // Take what an answer, asked so long ago at poses, says of patches at rest: it goes from `next`, by pair.
   // Islands of which it says something new are marked.
-  void take(std::vector<Patch>& next, double age, const bc_pose* asked) {
+  void take(const std::vector<Body>& bodies, std::vector<Patch>& next, double age,
+            const bc_pose* asked) {
     auto told = next.begin();
+    auto is_awake = [&](int32_t k) {
+      return bodies[size_t(k)].is_free() && !is_at_rest(size_t(k));
+    };
+    // What moves may have come to touch since the question.
     auto mark_new = [&](const Patch& patch) {
-      if (patch.age >= 0.0 && !is_of_before(patch, age)) mark(patch);
+      if (patch.age >= 0.0 && (!is_of_before(patch, age) || is_awake(patch.a) || is_awake(patch.b)))
+        mark(patch);
     };
     for (Patch& patch : patches_) {
       for (; told != next.end() && told->pair() < patch.pair(); ++told) mark_new(*told);
@@ -192,7 +196,7 @@ class Rest {
              const Given& given, const SubSteps& steps, double slow) {
     bool is_any = false;
     for (const Island& island : islands.all) {
-      if (!comes_to_rest(island, islands, bodies, patches, steps, slow)) continue;
+      if (!comes_to_rest(island, islands, bodies, patches, given.poses, steps, slow)) continue;
       is_any = true;
       int32_t name = islands.moving[island.body].body;
       add_loads(island, islands);
@@ -260,9 +264,8 @@ class Rest {
   // Whether all that is given of a body at rest is as it was when it was laid down, to the bit.
   bool is_as_laid(size_t k, const Given& given) const {
     const OfBody& of = of_[k];
-    constexpr bc_velocity none{};
     constexpr bc_wrench no_wrench{};
-    return have_same_bits(of.pose, given.poses[k]) && have_same_bits(none, given.velocities[k]) &&
+    return have_same_bits(of.pose, given.poses[k]) && is_still(given.velocities[k]) &&
            have_same_bits(of.outside, given.outside ? given.outside[k] : no_wrench);
   }
   void write_end(size_t k, const bc_motion& motion) const {
@@ -308,7 +311,8 @@ class Rest {
   }
 
   bool comes_to_rest(const Island& island, Islands& islands, const std::vector<Body>& bodies,
-                     const std::vector<Patch>& patches, const SubSteps& steps, double slow) {
+                     const std::vector<Patch>& patches, const bc_pose* given, const SubSteps& steps,
+                     double slow) {
     double least = rest_time, limit = slow * slow, calm = calm_share * calm_share * limit;
     bool is_slow = island.block < island.block_end, is_calm = true;
     for (size_t k = island.body; is_slow && k < island.body_end; ++k) {
@@ -325,7 +329,9 @@ class Rest {
       is_calm = is_calm && moving.speed_squared <= std::max(of.least, calm);
     });
     if (least < rest_time) return false;
-    if (is_calm && is_held(island, islands, patches, steps)) return true;
+    if (is_calm && is_held(island, islands, patches, steps) &&
+        have_stayed(island, islands, bodies, given, steps.dt, slow))
+      return true;
     each_free(island, islands,
               [&](const Moving& moving) { of_[size_t(moving.body)].slow_time = 0.0; });
     return false;

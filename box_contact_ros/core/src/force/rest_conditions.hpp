@@ -17,14 +17,31 @@ void each_free(const Island& island, Islands& islands, const Visit& visit) {
     if (islands.moving[k].inverse_mass > 0.0) visit(islands.moving[k]);
 }
 
-// Twice the kinetic energy by the mass [m²/s²]: with pushing out, and after relaxation.
+// Twice the kinetic energy by the mass [m²/s²].
+inline double speed_squared(const Body& body, const Placed& placed, const Motion& motion) {
+  Vec<double> turning = transposed_times(placed.axes, motion.angular);
+  return dot(motion.linear, motion.linear) +
+         body.inverse_mass * dot(turning / body.inverse_inertia, turning);
+}
+// At the end of an advance: with pushing out, and after relaxation.
 inline double speed_squared(const Body& body, const Moving& moving) {
-  auto of = [&](const Motion& motion) {
-    Vec<double> turning = transposed_times(moving.placed.axes, motion.angular);
-    return dot(motion.linear, motion.linear) +
-           body.inverse_mass * dot(turning / body.inverse_inertia, turning);
-  };
-  return std::max(of(moving.pushed), of({moving.linear, moving.angular}));
+  return std::max(speed_squared(body, moving.placed, moving.pushed),
+                  speed_squared(body, moving.placed, {moving.linear, moving.angular}));
+}
+
+// Whether all bodies of an island were slow on the mean of an advance: what slid, or fell, and stopped within
+// it does not rest where it was given.
+inline bool have_stayed(const Island& island, Islands& islands, const std::vector<Body>& bodies,
+                        const bc_pose* given, double dt, double slow) {
+  bool have_stayed = true;
+  each_free(island, islands, [&](const Moving& moving) {
+    const Body& body = bodies[size_t(moving.body)];
+    Placed from = placed_at(given[moving.body], body.centre);
+    double rate = 1.0 / dt;
+    Motion mean{rate * (moving.placed.position - from.position), rate * turn(from, moving.placed)};
+    have_stayed = have_stayed && speed_squared(body, moving.placed, mean) < slow * slow;
+  });
+  return have_stayed;
 }
 
 // The impulses of an advance as the loads have them: after relaxation.

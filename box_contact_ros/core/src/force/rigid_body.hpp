@@ -33,6 +33,9 @@ inline bool are_within(const double* numbers, int64_t count, double limit) {
   return std::all_of(numbers, numbers + count,
                      [limit](double number) { return std::fabs(number) <= limit; });
 }
+inline bool is_still(const bc_velocity& velocity) {
+  return are_within(velocity.linear, 3, 0.0) && are_within(velocity.angular, 3, 0.0);
+}
 inline bool is_within(const Vec<double>& a, double limit) { return are_within(a.v, 3, limit); }
 inline bool is_amount(double number) { return number >= 0.0 && number <= amount_max; }
 inline bool is_mass(double number) { return number >= mass_min && number <= mass_max; }
