@@ -51,7 +51,7 @@ class CheckAnswerer:
             raise ValueError(f'contacts: {count} pairs touch or are near, and a response has '
                              f'at most {MOST_CONTACTS}: ask for fewer boxes, or name pairs')
         listed, names_of = response.contacts, self._check.names_of
-        listed.header = request.header
+        listed.header, listed.revision = request.header, self.solver.revision
         listed.contacts = self._kept.fill([names_of(a, b) for a, b in found.pairs.tolist()],
                                           found.contacts)
         listed.near = near_messages([names_of(a, b) for a, b in found.near_pairs.tolist()],

@@ -24,7 +24,7 @@ from ros_client import CUBES, DEEP, Client, serving
 from std_msgs.msg import Header
 from typed_messages import a_box, contacts_by_pair, pose_array
 
-from box_contact_msgs.srv import SetBoxes
+from box_contact_msgs.srv import Check, SetBoxes
 from box_contact_ros import SceneSolver, read_scene
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.set_boxes import changed
@@ -89,6 +89,10 @@ def test_a_lift(client: YardClient, scene: str) -> None:
         answer = client.set_boxes(fixed=[a_box('c1', (0, 0, 1, 0, 0, 0, 1), CUBE)])
         assert (answer.success, answer.message, answer.revision) == (True, '', 1)
         assert labels(client, (0, 0, 2.4, 0, 0, 0, 1)) == ['hook_c1']
+        checked = client.call(Check, 'contact_node/check', Check.Request(
+            header=Header(frame_id='map'), boxes=[a_box('lid', (0, 0, 2.4, 0, 0, 0, 1), CUBE)]))
+        assert (checked.message, checked.contacts.revision) == ('', 1)
+        assert 'lid_c1' in contacts_by_pair(checked.contacts)
         assert client.set_boxes(moving=[a_box('c1', ORIGIN)]).revision == 2
         late = client.ask((0, 0, 2.4, 0, 0, 0, 1))
         assert client.contacts[late].revision == 1
