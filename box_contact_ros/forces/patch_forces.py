@@ -55,9 +55,9 @@ FRICTION = 0.5
 """Coulomb's μ [1], steel on steel, dry."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Body:
-    """What the forces know of a body.
+    """What the forces know of a body. It equals itself alone, as its fields may be arrays.
 
     Raises ValueError, with field and value, for a mass outside 1e-50 to 1e50 kg. Moments of inertia
     that no body has and a centre that is not finite are refused as well.
@@ -252,7 +252,8 @@ class PatchForces:
         """Take the contacts of pairs of boxes (k, 2), asked for at `poses`; forget other pairs.
 
         Without contacts, they are one's own: `exact` solves the pairs at the start of each
-        `advance`. That needs `set_boxes`, and no poses, age or period.
+        `advance`. That needs `set_boxes`, and no poses, age or period. Holding the same pairs at
+        each step wakes nobody.
         A contact whose separation is NaN is stale: the patch of its pair stays.
         friction: μ (k,).
         surface_velocity: (k, 3) of B's surface relative to A's [m/s], as of a belt. That of the
@@ -265,6 +266,8 @@ class PatchForces:
         twice; nothing changes then.
         """
         if contacts is None:
+            if poses is not None or age or period:
+                raise ValueError('contacts must be those of poses, age and period, not None')
             self._native.hold_pairs(as_pairs(pairs, 'pairs'), *_columns_of_pairs(
                 friction, surface_velocity, stiffness))
             return
@@ -290,8 +293,8 @@ class PatchForces:
         """Return where the bodies are after a step of `dt` [s], and what contacts did.
 
         poses, velocities: at its start. wrenches: all but those of contacts, gravity among them.
-        changed: (k,) those bodies at rest that may be given otherwise than at the end of the last
-        step: the others are not compared. None: all may be.
+        changed: (k,) places of those bodies at rest that may be given otherwise than at the end of
+        the last step. The others are not read: they stay where they were. None: all may be.
         Call `advance` once a step. Steps of less than 1 s may differ in length.
         ValueError: names field and value; nothing changes then.
         """
@@ -311,7 +314,7 @@ class PatchForces:
     def loads(self) -> Loads:
         """Return what each pair carried in the last step.
 
-        None if bodies or boxes were changed, or patches forgotten, since.
+        No rows if bodies or boxes were changed, or patches forgotten, since.
         """
         return Loads._make(self._native.loads())
 

@@ -188,6 +188,12 @@ def test_nothing_presses_before_the_landing() -> None:
 # --- bodies of several boxes ----------------------------------------------------------------------
 
 
+def test_a_body_equals_itself_alone() -> None:
+    """Its fields may be arrays, which are not compared."""
+    one, other = (Body.of_box((1, 1, 1), 1.0) for _ in range(2))
+    assert one == one and one != other and len({one, other}) == 2
+
+
 def test_two_feet_stand_on_a_floor() -> None:
     """A table of 100 kg. Its feet carry the weight, and its middle is between them."""
     forces = PatchForces([FIXED, Body(mass=100.0, inertia=(30.0, 30.0, 30.0), centre=(0, 0, 0.3))])
@@ -209,6 +215,9 @@ def test_two_feet_stand_on_a_floor() -> None:
     assert abs(loads.pressing @ loads.centre[:, 0]) < 1e-5 * GRAVITY
     with pytest.raises(ValueError, match=r'pairs\[0\]: both boxes are of body 1'):
         forces.hold([(1, 3)])
+    for times in ({'age': 0.1}, {'period': 0.1}, {'poses': poses}):
+        with pytest.raises(ValueError, match='^contacts must be those of'):
+            forces.hold([(0, 1)], **times)
 
 
 def test_a_body_of_boxes_has_their_moments() -> None:

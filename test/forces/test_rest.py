@@ -538,7 +538,7 @@ def test_a_touch_told_after_what_it_touches_was_laid_down() -> None:
     steps, world = 0, landed(100.0)
     while not asleep(world.step(DT)):
         steps += 1
-    start = 0.75 + 0.5 * DT * (steps - 3)  # it touches three steps before the lower one is laid down
+    start = 0.75 + 0.5 * DT * (steps - 3)  # to touch three steps before the lower is laid down
     resting, awake = landed(start), landed(start, rest=False)
     for _ in range(steps + 60):
         assert resting.step(DT).poses == pytest.approx(awake.step(DT).poses, abs=1e-6)
