@@ -66,7 +66,7 @@ struct SubSteps {
     return std::max(1, int(std::ceil(dt / window - sub_step_slack)));
   }
   // With windows shorter by a factor.
-  SubSteps finer(int factor) const {
+  SubSteps finer(double factor) const {
     SubSteps steps = *this;
     steps.window = window / factor;
     steps.share = share / factor;

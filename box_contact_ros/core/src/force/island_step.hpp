@@ -93,7 +93,7 @@ class IslandStep {
     for (Island& island : islands_.of(chunk)) begin(island);
     // Those with as many iterations, in sub-steps as fine, are advanced together.
     for (const Island& island : islands_.of(chunk))
-      if (island.factor > 0) advance(chunk, island.factor, island.rounds);
+      if (island.factor > 0.0) advance(chunk, island.factor, island.rounds);
     chunk.lost = first_lost(chunk);
   }
   // The same of a large island, by threads that have a part of it each.
@@ -135,7 +135,7 @@ class IslandStep {
   // Begin an island. One without contacts ends the advance, too.
   void begin(Island& island) const {
     begin_bodies(island);
-    island.factor = 0;
+    island.factor = 0.0;
     if (island.block == island.block_end) {
       for (size_t k = island.body; k < island.body_end; ++k) body_step_.advance(moving_[k]);
       return;
@@ -174,10 +174,10 @@ class IslandStep {
   void choose(Island& island) const {
     double swayed = fineness_of_.swayed(island, island.fastest, step_.steps.dt, fineness_);
     island.rounds = step_.steps.is_late ? 1 : rounds_of(swayed, island.is_uneven);
-    island.factor = step_.own ? fineness_of_(island, step_.steps, fineness_) : 1;
+    island.factor = step_.own ? fineness_of_(island, step_.steps, fineness_) : 1.0;
   }
   // Advance the islands whose sub-steps are finer by a factor, and that take so many times the iterations.
-  void advance(const Chunk& chunk, int factor, int rounds) const {
+  void advance(const Chunk& chunk, double factor, int rounds) const {
     SubSteps steps = steps_of(factor, rounds);
     auto advance = [&](Islands::Range range, const detail::ForceKernel& kernel, void* groups,
                        size_t count) {
@@ -191,13 +191,13 @@ class IslandStep {
       advance(islands_.of(chunk), *islands_.side(), islands_.groups_of(chunk), groups);
     for (Island& island : islands_.of(chunk)) {
       if (!island.is_shared) continue;
-      island.factor = 0;
+      island.factor = 0.0;
       if (groups == 0)
         advance({&island, &island + 1}, Stages<Block>::kernel, &blocks_[island.block],
                 island.block_end - island.block);
     }
   }
-  SubSteps steps_of(int factor, int rounds) const {
+  SubSteps steps_of(double factor, int rounds) const {
     SubSteps steps = step_.steps.finer(factor);
     steps.rounds *= rounds;
     return steps;
@@ -228,7 +228,7 @@ class IslandStep {
     });
   }
 
-  void advance_by(const detail::ForceKernel& kernel, int factor, Work& work) const {
+  void advance_by(const detail::ForceKernel& kernel, double factor, Work& work) const {
     auto each_island = [&](const auto& visit) {
       for (const Island* island = work.first; island < work.last; ++island)
         if (island->is_shared) visit(*island);
@@ -248,7 +248,7 @@ class IslandStep {
     const detail::ForceKernel& moves = islands_.side() ? *islands_.side() : Stages<Block>::kernel;
     const SubSteps& steps = work.steps;
     // From one answer to the next.
-    double time = factor > 1 ? std::min(parts_of_a_contact * steps.length, steps.dt) : steps.dt;
+    double time = factor > 1.0 ? std::min(parts_of_a_contact * steps.length, steps.dt) : steps.dt;
     each_island([&](const Island& island) {
       each(island, [&](Block& block, const Patch& patch, Moving& a, Moving& b) {
         close(patch, a, b, time, block);
@@ -258,7 +258,7 @@ class IslandStep {
     work.meet();
     kernel.load(&work);
     for (int number = 1; number <= steps.count; ++number) {
-      if (factor > 1 && number > 1 && number % parts_of_a_contact == 1) {
+      if (factor > 1.0 && number > 1 && number % parts_of_a_contact == 1) {
         end();
         work.meet();
         each_island([&](const Island& island) { ask_again(island, time); });

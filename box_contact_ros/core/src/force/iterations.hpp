@@ -99,7 +99,7 @@ struct Island {
   bool is_new;     // whether it had no patch before this advance
   bool is_uneven;  // whether bodies touch whose masses are
   int rounds;      // how many times as many iterations it takes
-  int factor;      // by which its sub-steps are finer; 0: its advance is over
+  double factor;   // by which its sub-steps are finer; 0: its advance is over
   bool is_shared;  // whether it is advanced with others
   double impact;   // a larger change of a closing speed is an impact [m/s]
   bool is_struck;  // whether the last iteration changed a closing speed as in an impact
