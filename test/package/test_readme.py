@@ -440,7 +440,7 @@ LIMITS = {
         f'the frequency {SOFT}/window', f'{float(SOFT) ** -2:.1f}·g·h² deep',
         f'the frequency is {LATE}/T', f'g·T²/{float(LATE) ** 2}',
         f'faster than {constant(FORCES, "push_out_limit")} m/s',
-        f'overdue by {constant(CLOCK, "overdue_periods")} periods'),
+        f'older than {constant(CLOCK, "overdue_periods")} periods'),
     'explanation/mlp.md': (
         f'reads {LAYERS[0][1]} features',
         f'two hidden layers of {LAYERS[1][0]} rectified units and {LAYERS[-1][0]} outputs'),

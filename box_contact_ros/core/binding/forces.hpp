@@ -223,7 +223,8 @@ inline PyMethodDef forces_methods[] = {
      "set_bodies(mass, inertia, centre)\n--\n\nChange the bodies: (n,), (n, 3), (n, 3)."},
     {"hold", method<forces_hold>(), METH_FASTCALL,
      "hold(pairs, separation, normal, point, volume, covariance, poses, friction, surface, "
-     "stiffness, age, period)\n--\n\nTake the arrays of an answer; None for the last three.\n\n"
+     "stiffness, age, period)\n--\n\nTake the arrays of an answer; None for friction, surface "
+     "and stiffness.\n\n"
      "Return False, and change nothing, where one is no plain array."},
     {"hold_pairs", method<forces_hold_pairs>(), METH_FASTCALL,
      "hold_pairs(pairs, friction, surface, stiffness)\n--\n\nTake pairs whose contacts are solved at "

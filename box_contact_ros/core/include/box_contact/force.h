@@ -73,7 +73,8 @@ typedef struct bc_patches {
                                bodies, as of a belt [m/s]; NULL: none */
   const double* stiffness;  /* [N/m], up to what step and answers bear; 0, or NULL: that */
   double age;               /* since the answer was asked for [s] */
-  double period;            /* from one question to the next [s]; 0: from the answer before */
+  double period;            /* from one question to the next [s]; 0: the least of the last
+                               intervals between answers */
 } bc_patches;
 
 typedef struct bc_force_options {

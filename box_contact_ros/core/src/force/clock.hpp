@@ -36,12 +36,12 @@ constexpr double step_shrinkage = 1.25;
 // large in a step of 1 ns as in one of 5 ms: divided by the step it would be any force.
 constexpr double most_again = 2.0;
 // Angular frequency of a soft constraint times the window [1]: a quarter turn. A box that rests on a
-// whole face is 0.4·g·step² deep.
+// whole face is 0.4·g·window² deep.
 constexpr double soft_frequency = 1.57;
 // The same times half a period and the latency of an answer [1]. With 2 a container at 50 Hz and 5 ms
 // tilts by 0.06°; from 4 on late loads vibrate.
 constexpr double late_frequency = 2.5;
-// An answer that is overdue by so many periods [1] pushes nothing out.
+// An answer that is older than so many periods [1] pushes nothing out.
 constexpr double overdue_periods = 3.0;
 // A period that is not told is the least of so many intervals between answers: some get lost.
 constexpr int intervals_kept = 8;
