@@ -10,16 +10,16 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// Write the places `first` to `end` in the order of their numbers, which are below `numbers`; equal ones stay
-// in turn. `starts`: where each number begins in `order`, and the last ends.
+// Write the places below `count` in the order of their numbers, which are below `numbers`; equal ones stay in
+// turn. `starts`: where each number begins in `order`, and the last ends.
 template <class NumberOf>
-void counting_sort(size_t first, size_t end, size_t numbers, const NumberOf& number_of,
+void counting_sort(size_t count, size_t numbers, const NumberOf& number_of,
                    std::vector<int32_t>& starts, int32_t* order) {
   starts.assign(numbers + 1, 0);
-  for (size_t k = first; k < end; ++k) ++starts[size_t(number_of(k))];
+  for (size_t k = 0; k < count; ++k) ++starts[size_t(number_of(k))];
   int32_t sum = 0;
   for (int32_t& start : starts) start = sum += start;
-  for (size_t k = end; k-- > first;) order[--starts[size_t(number_of(k))]] = int32_t(k);
+  for (size_t k = count; k-- > 0;) order[--starts[size_t(number_of(k))]] = int32_t(k);
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET::force

@@ -251,7 +251,7 @@ class Islands {
     template <class IslandOf>
     void sort(size_t count, size_t islands, IslandOf island_of) {
       order_.resize(count);
-      counting_sort(0, count, islands, island_of, starts_, order_.data());
+      counting_sort(count, islands, island_of, starts_, order_.data());
     }
     Range of(size_t island) const {
       return {order_.data() + starts_[island], order_.data() + starts_[island + 1]};

@@ -76,8 +76,8 @@ constexpr int most_rounds = 12;
 // How many times as many iterations an island takes that has swayed for a time [s]; 0: it does not sway.
 inline int rounds_of(double swayed, bool is_uneven) {
   if (swayed == 0.0) return is_uneven ? more_rounds : 1;
-  bool is_most = swayed >= sway_time * (most_rounds / more_rounds);
-  return is_most ? most_rounds : more_rounds * (1 + int(swayed / sway_time));
+  constexpr int most_times = most_rounds / more_rounds;
+  return more_rounds * int(min(1.0 + swayed / sway_time, double(most_times)));
 }
 // How fast the bodies of a patch pass each other, at its rims at most [m/s].
 inline double passing_speed(const Patch& patch, const Moving& a, const Moving& b) {

@@ -110,7 +110,7 @@ class Parts {
     }
     order_.resize(links_.size());
     counting_sort(
-        0, links_.size(), size_t(longest), [&](size_t k) { return links_[k].number; }, starts_,
+        links_.size(), size_t(longest), [&](size_t k) { return links_[k].number; }, starts_,
         order_.data());
     return size_t(longest);
   }
@@ -143,7 +143,7 @@ class Parts {
                        [&](int32_t j, int32_t k) { return place_of(j)[axis] < place_of(k)[axis]; });
       for (int32_t* at = from; at < to; ++at) ends_[size_t(*at)].part = int32_t(part);
     }
-    counting_sort(0, ends_.size(), count, [&](size_t k) { return ends_[k].part; }, starts_, first);
+    counting_sort(ends_.size(), count, [&](size_t k) { return ends_[k].part; }, starts_, first);
     for (int32_t* at = first; at < first + ends_.size(); ++at) *at += int32_t(island.body);
     for (size_t part = 0; part < count; ++part) {
       parts[part].bodies = bodies_.data();
@@ -156,8 +156,7 @@ class Parts {
     for (Link& link : links_)
       link.part = std::min(ends_[size_t(link.a)].part, ends_[size_t(link.b)].part);
     int32_t* first = &blocks_[island.block];
-    counting_sort(
-        0, links_.size(), count, [&](size_t k) { return links_[k].part; }, starts_, first);
+    counting_sort(links_.size(), count, [&](size_t k) { return links_[k].part; }, starts_, first);
     for (int32_t* at = first; at < first + links_.size(); ++at) *at += int32_t(island.block);
     for (size_t part = 0; part < count; ++part) {
       parts[part].blocks = blocks_.data();
