@@ -9,6 +9,7 @@ import hashlib
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from worlds import FLOOR, World, turned
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import instruction_sets
 
+ROOT = Path(__file__).resolve().parents[2]
 TOWERS, HEIGHT = 11, 3
 KINDS = ('steady', 'uneven', 'impacts', 'springs', 'belts', 'turntable', 'spins', 'late', 'finer')
 SPINS = np.array([300.0, 1e-10, 30.0])  # of a tower's boxes by their sizes beyond 0.4 m [rad/s/m]
@@ -142,6 +144,20 @@ def block_of_boxes(kind: str, threads: int) -> bytes:
 def test_parts_of_an_island_have_the_bits_of_the_whole(kind: str) -> None:
     whole = block_of_boxes(kind, 1)
     assert all(block_of_boxes(kind, threads) == whole for threads in (2, 3))
+
+
+def test_parts_take_turns_in_the_order_of_the_whole(tmp_path: Path) -> None:
+    """Whichever part of an island goes on, bodies see their blocks in turn.
+
+    A slab and boxes at random are cut; a tower and a star, whose blocks follow each other, are not.
+    """
+    program = tmp_path / 'parts'
+    subprocess.run([*os.environ.get('CXX', 'c++').split(), '-std=c++17', '-O1', '-Wall', '-Werror',
+                    '-Wno-psabi', '-I', ROOT / 'box_contact_ros' / 'core' / 'src',
+                    Path(__file__).with_name('parts_law.cpp'), '-o', program], check=True)
+    out = subprocess.run([program], capture_output=True, text=True, check=True).stdout
+    assert out.splitlines() == ['slab 2 0', 'slab 3 0', 'slab 5 0', *['chance 3 0'] * 5,
+                                'tower 0 0', 'star 0 0']
 
 
 def advance_here_and_in_a_fork() -> None:
