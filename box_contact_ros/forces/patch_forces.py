@@ -194,6 +194,16 @@ class PatchForces:
     (n, 6) are linear, of the centre of mass, then angular. Wrenches (n, 6) are a force, then a
     torque about the centre of mass. All are in the common frame.
 
+    With contacts of one's own, for boxes of `sizes` of which some are `fixed`, where nothing moves
+    by more than 0.1 m in a step:
+
+        forces = PatchForces(bodies)
+        forces.set_boxes(sizes)
+        while True:
+            pairs, _ = contacts_of(sizes, poses, fixed=fixed, margin=0.1)
+            forces.hold(pairs)
+            poses, velocities, _, awake = forces.advance(dt, poses, velocities, gravity)
+
     To take a body out of the middle, put the last one in its place, `forget` both, and
     `set_bodies` without the last. Where `set_boxes` was called, call it before with the boxes that
     are left; with those of a new body, after.
