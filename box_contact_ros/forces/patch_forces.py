@@ -195,7 +195,7 @@ class PatchForces:
     torque about the centre of mass. All are in the common frame.
 
     With contacts of one's own, for boxes of `sizes` of which some are `fixed`, where nothing moves
-    by more than 0.1 m in a step:
+    by more than 0.1 m in a step::
 
         forces = PatchForces(bodies)
         forces.set_boxes(sizes)
