@@ -33,15 +33,15 @@ inline double speed_squared(const Body& body, const Moving& moving) {
 // it does not rest where it was given.
 inline bool have_stayed(const Island& island, Islands& islands, const std::vector<Body>& bodies,
                         const bc_pose* given, double dt, double slow) {
-  bool have_stayed = true;
+  bool all_have = true;
   each_free(island, islands, [&](const Moving& moving) {
     const Body& body = bodies[size_t(moving.body)];
     Placed from = placed_at(given[moving.body], body.centre);
     double rate = 1.0 / dt;
     Motion mean{rate * (moving.placed.position - from.position), rate * turn(from, moving.placed)};
-    have_stayed = have_stayed && speed_squared(body, moving.placed, mean) < slow * slow;
+    all_have = all_have && speed_squared(body, moving.placed, mean) < slow * slow;
   });
-  return have_stayed;
+  return all_have;
 }
 
 // The impulses of an advance as the loads have them: after relaxation.
