@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from .solver.contact import Contact, Contacts, patch_area, patch_areas
 from .solver.contact_solver import ContactSolver
+from .solver.motion import Approach, Approaches
 from .solver.nearest import Nearest, Nearests
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from .solver.contacts_of import contacts_of
     from .stream.read_contacts import ReadContacts, read_contacts
 
-__all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Frame', 'Nearest', 'Nearests',
+__all__ = ['Approach', 'Approaches', 'Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Frame', 'Nearest', 'Nearests',
            'Pair', 'PatchForces', 'Plan', 'ReadContacts', 'Scene', 'SceneSolver', 'contacts_of',
            'inspect_plan', 'make_model', 'patch_area', 'patch_areas', 'read_contacts', 'read_plan',
            'read_scene', 'support']

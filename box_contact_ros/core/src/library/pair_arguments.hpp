@@ -78,9 +78,11 @@ inline bc_status check_rows(const bc_rows& rows, int threads, int64_t& refused) 
               (long long)rows.pairs[2 * refused + 1], (long long)rows.pose_count);
 }
 
-// Answer rows by `solve`, which returns the first that is refused, or −1.
-template <class Solve>
-bc_status answer_rows(const bc_rows& given, int threads, int64_t& refused, const Solve& solve) {
+// Answer rows by `solve`, which returns the first that is refused, or −1. `refuse` finds the words for a
+// row, by the places of its boxes.
+template <class Solve, class Refuse>
+bc_status answer_rows(const bc_rows& given, int threads, int64_t& refused, const Solve& solve,
+                      const Refuse& refuse) {
   bc_status status = check_rows(given, threads, refused);
   if (status != BC_OK || given.count == 0) return status;
   Rows rows{numbers(given.poses_a),
@@ -99,12 +101,18 @@ bc_status answer_rows(const bc_rows& given, int threads, int64_t& refused, const
   for (int64_t place : places)
     if (given.pairs && (place < 0 || place >= given.pose_count))
       return fail(BC_BAD_ROWS, "pairs[%lld] was changed while it was read", (long long)refused);
-  refuse_pair(rows.poses_a + 7 * places[0], rows.poses_b + 7 * places[1],
-              rows.sizes_a + rows.size_step_a * places[0],
-              rows.sizes_b + rows.size_step_b * places[1]);
+  refuse(rows, places);
   char why[sizeof error_text];
   std::memcpy(why, error_text, sizeof why);
   return fail(BC_BAD_ROWS, "row %lld: %.480s", (long long)refused, why);
+}
+template <class Solve>
+bc_status answer_rows(const bc_rows& given, int threads, int64_t& refused, const Solve& solve) {
+  return answer_rows(given, threads, refused, solve, [](const Rows& rows, const int64_t* places) {
+    refuse_pair(rows.poses_a + 7 * places[0], rows.poses_b + 7 * places[1],
+                rows.sizes_a + rows.size_step_a * places[0],
+                rows.sizes_b + rows.size_step_b * places[1]);
+  });
 }
 
 }  // namespace box_contact::detail
