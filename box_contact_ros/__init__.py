@@ -28,10 +28,10 @@ if TYPE_CHECKING:
     from .solver.contacts_of import contacts_of
     from .stream.read_contacts import ReadContacts, read_contacts
 
-__all__ = ['Approach', 'Approaches', 'Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Frame', 'Nearest', 'Nearests',
-           'Pair', 'PatchForces', 'Plan', 'ReadContacts', 'Scene', 'SceneSolver', 'contacts_of',
-           'inspect_plan', 'make_model', 'patch_area', 'patch_areas', 'read_contacts', 'read_plan',
-           'read_scene', 'support']
+__all__ = ['Approach', 'Approaches', 'Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Frame',
+           'Nearest', 'Nearests', 'Pair', 'PatchForces', 'Plan', 'ReadContacts', 'Scene',
+           'SceneSolver', 'contacts_of', 'inspect_plan', 'make_model', 'patch_area', 'patch_areas',
+           'read_contacts', 'read_plan', 'read_scene', 'support']
 # `ContactNode` needs ROS, and `import *` does without.
 
 _LOADED_WHEN_USED = {

@@ -236,20 +236,20 @@ class ContactSolver(native.PairSolver):
                     sizes: ArrayLike | None, pairs: ArrayLike | None, centre_a: ArrayLike | None,
                     centre_b: ArrayLike | None, centres: ArrayLike | None,
                     clearance: float | None, tolerance: float, threads: int) -> Approaches:
-        if pairs is None and (centres is not None or ends_b is None):
+        names = 'ends_a', 'ends_b', 'centre_a', 'centre_b'
+        if pairs is not None:
+            if not centre_a is centre_b is ends_b is None:
+                raise ValueError('pairs are places in starts, ends, sizes and centres: there is '
+                                 'neither ends_b nor centre_a nor centre_b')
+            names = 'ends', 'ends', 'centres', 'centres'
+            ends_b, centre_a, centre_b = ends_a, centres, centres
+        elif centres is not None or ends_b is None:
             raise ValueError('a batch takes (starts_a, ends_a, starts_b, ends_b), or (starts, '
                              'ends, sizes=…, pairs=…) and centres')
-        if pairs is not None and not centre_a is centre_b is ends_b is None:
-            raise ValueError('pairs are places in starts, ends, sizes and centres: there is '
-                             'neither ends_b nor centre_a nor centre_b')
         asked = self._rows(starts_a, starts_b, size_a, size_b, sizes, pairs, threads)
-        by_place = pairs is not None
-        return find_approaches(
-            asked[:4], (ends_a, ends_a if by_place else ends_b),
-            (centres, centres) if by_place else (centre_a, centre_b),
-            ('ends', 'ends', 'centres', 'centres') if by_place else
-            ('ends_a', 'ends_b', 'centre_a', 'centre_b'), clearance=clearance, tolerance=tolerance,
-            threads=asked.threads, pairs=asked.places)
+        return find_approaches(asked[:4], (ends_a, ends_b), (centre_a, centre_b), names,
+                               clearance=clearance, tolerance=tolerance, threads=asked.threads,
+                               pairs=asked.places)
 
     def _pair(self, pose_a: ArrayLike, pose_b: ArrayLike) -> _Asked:
         """Return one pair of poses of any kind of numbers."""

@@ -45,7 +45,8 @@ class Approaches(Rows[Approach]):
         return Approach(float(time), float(closing_speed), nearest)
 
 
-def find_approaches(starts: tuple[np.ndarray, ...], ends: tuple[ArrayLike, ArrayLike],
+def find_approaches(starts: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+                    ends: tuple[ArrayLike, ArrayLike],
                     centres: tuple[ArrayLike | None, ArrayLike | None], names: tuple[str, ...],
                     *, clearance: float | None, tolerance: float, threads: int,
                     pairs: np.ndarray | None) -> Approaches:
@@ -55,12 +56,13 @@ def find_approaches(starts: tuple[np.ndarray, ...], ends: tuple[ArrayLike, Array
     names: of both, in a refusal. Raises ValueError, with field and value, for what is refused.
     """
     count = len(starts[0])
-    checked = [as_floats(poses, name, f'poses ({count}, 7), one for each start', (count, 7))
-               for poses, name in zip(ends, names[:2])]
-    places = [centre if centre is None else np.broadcast_to(
+    end_a, end_b = (as_floats(poses, name, f'poses ({count}, 7), one for each start', (count, 7))
+                    for poses, name in zip(ends, names[:2]))
+    centre_a, centre_b = (centre if centre is None else np.broadcast_to(
         as_floats(centre, name, f'centres (3,) or ({count}, 3)', (3,), (count, 3)), (count, 3))
-              for centre, name in zip(centres, names[2:])]
+        for centre, name in zip(centres, names[2:]))
     time, closing_speed, *nearest = native.approaches(
-        *starts, *checked, *places, None if clearance is None else as_number(clearance, 'clearance'),
+        *starts, end_a, end_b, centre_a, centre_b,
+        None if clearance is None else as_number(clearance, 'clearance'),
         as_number(tolerance, 'tolerance'), threads, pairs)
     return Approaches(time, closing_speed, Nearests(*nearest))

@@ -13,17 +13,13 @@ using motion::Follower;
 using motion::LeastDistance;
 using motion::Motion;
 using motion::Near;
+using motion::SweepNumbers;
 
 // What is asked of two boxes.
 struct Question {
   bool is_least;     // the least distance, or else the first time
   double clearance;  // [m]
   double tolerance;  // [m]
-};
-
-// The numbers of a sweep. centre nullptr: zeros.
-struct SweepNumbers {
-  const double *start, *end, *size, *centre;
 };
 
 bool is_length(double x) { return std::fabs(x) <= length_max; }
@@ -37,8 +33,8 @@ bc_status check_question(const Question& asked) {
   return BC_OK;
 }
 
-// Read one of both boxes; `of`: its letter.
-bc_status read_sweep(const SweepNumbers& given, char of, motion::Moving& box) {
+// Check one of both boxes; `of`: its letter.
+bc_status check_sweep(const SweepNumbers& given, char of) {
   char field[8];
   auto named = [&](const char* name) {
     std::snprintf(field, sizeof field, "%s_%c", name, of);
@@ -51,18 +47,18 @@ bc_status read_sweep(const SweepNumbers& given, char of, motion::Moving& box) {
     if (!is_length(given.centre[k]))
       return fail(BC_BAD_POSE, "centre_%c (%g, %g, %g) is not finite, or exceeds 1e50 m", of,
                   given.centre[0], given.centre[1], given.centre[2]);
-  if (box.set(given.start, given.end, given.size, given.centre)) return BC_OK;
-  return fail(BC_BAD_POSE,
-              "the turn from start_%c to end_%c by 180 degrees has two ways: give a pose between",
-              of, of);
+  return BC_OK;
 }
 
 bc_status read_motion(const SweepNumbers& a, const SweepNumbers& b, double tolerance,
                       Motion& motion) {
-  bc_status status = read_sweep(a, 'a', motion.a);
-  if (!status) status = read_sweep(b, 'b', motion.b);
+  bc_status status = check_sweep(a, 'a');
+  if (!status) status = check_sweep(b, 'b');
   if (status) return status;
-  motion.join();
+  if (int box = motion.set(a, b); box >= 0)
+    return fail(BC_BAD_POSE,
+                "the turn from start_%c to end_%c by 180 degrees has two ways: give a pose between",
+                "ab"[box], "ab"[box]);
   if (tolerance >= motion.least_tolerance()) return BC_OK;
   // What is printed is accepted.
   return fail(BC_BAD_ARGUMENT,

@@ -24,7 +24,7 @@ class LeastDistance {
     look(1.0);
     Instant now = motion_.at(0.0);
     do {
-      Near here = look(now.s);
+      Near here = look(now);
       if (follower_.rate(here) < 0.0 && here.nearest.distance <= least()) descend(here);
       if (least() <= tolerance_) {
         Near first;
@@ -40,14 +40,17 @@ class LeastDistance {
  private:
   double least() const { return best_.nearest.distance; }
 
-  Near look(double s) {
-    Near near = follower_.see(s);
-    if (!near.nearest.colliding) follower_.take_up(near, motion_.at(s));
+  Near look(double s) { return look(motion_.at(s)); }
+  Near look(const Instant& now) {
+    Near near = follower_.see(now);
+    if (!near.nearest.colliding) follower_.take_up(near, now);
     if (near.nearest.distance < least()) best_ = near;
     return near;
   }
 
-  // Go down from a time at which the distance falls, to where it rises again.
+  // Go down from a time at which the distance falls: first on to where it rises again, then between both.
+  // No distance of a convex valley is below the point where the tangents meet: a valley that has nothing
+  // lower to offer is left. The proof looks at all of them again.
   void descend(Near low) {
     double step = min(0.25, low.nearest.distance / -follower_.rate(low));
     auto rises = [&](const Near& near) {

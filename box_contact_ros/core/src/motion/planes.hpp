@@ -15,55 +15,46 @@
 
 namespace box_contact::BOX_CONTACT_SET::motion {
 
-enum class Turns { never, with_a, with_b, with_points, with_edges };
-
-// How a vector e of a box turns against a normal n. With δ the difference of their rates and ν the
-// normal's, (n·e)' = n·(δ × e) and (n·e)'' = n·(δ × (δ × e) + (δ × ν) × e).
-struct Against {
-  Vector rate;   // δ [rad]
-  double speed;  // |δ|
-  double bend;   // a bound of |(n·e)''| for a unit vector
-
-  Against() = default;
-  Against(const Vector& of_box, const Vector& of_normal) : rate(of_box - of_normal) {
-    speed = norm(rate);
-    bend = speed * speed + norm(cross(rate, of_normal));
-  }
-};
+enum class Follows { face_of_a, face_of_b, points, edges, nothing };
 
 struct Plane {
-  Turns turns;
+  Follows follows;
   // A normal that turns at constant rate.
   double since;           // the s of the normal
-  Vector normal;          // unit vector from A to B; in the axes of the box that it turns with
+  Vector normal;          // unit vector from A to B; in the axes of the box whose face it follows
   Vector rate;            // ν [rad]
   double turn, crossing;  // |ν|, and |ν × n|: the speed of the normal
-  Against against[2];     // of the axes of A, and of B
+  // How vectors e of the boxes turn against it. With δ the difference of their rates and ν,
+  // (n·e)' = n·(δ × e), and (n·e)'' = n·(δ × (δ × e) + (δ × ν) × e).
+  BothVectors against;  // δ [rad]
+  Both against_speed;   // |δ|
+  Both against_bend;    // a bound of |(n·e)''| for a unit vector
   // One across edges: which of each box, and on which side of A B is, along the cross product.
   int edges[2];
   double side;
 
-  static Plane turning(const Motion& motion, const Instant& now, Turns turns, const Vector& n,
+  static Plane turning(const Motion& motion, const Instant& now, Follows follows, const Vector& n,
                        const Vector& nu) {
     Plane plane;
-    plane.turns = turns;
+    plane.follows = follows;
     plane.since = now.s;
-    plane.normal = turns == Turns::with_a   ? now.a.local(n)
-                   : turns == Turns::with_b ? now.b.local(n)
-                                            : n;
+    plane.normal = follows == Follows::face_of_a   ? now.local(0, n)
+                   : follows == Follows::face_of_b ? now.local(1, n)
+                                                   : n;
     plane.rate = nu;
     plane.turn = norm(nu);
     plane.crossing = norm(cross(nu, n));
-    plane.against[0] = {motion.a.rate, nu};
-    plane.against[1] = {motion.b.rate, nu};
+    plane.against = motion.rate - both(nu, nu);
+    plane.against_speed = norm(plane.against);
+    plane.against_bend = plane.against_speed * plane.against_speed +
+                         norm(cross(plane.against, both(nu, nu)));
     return plane;
   }
-  static Plane across(const Motion& motion, int edge_a, int edge_b, double side) {
+  static Plane across(int edge_a, int edge_b, double side) {
     Plane plane;
-    plane.turns = Turns::with_edges;
+    plane.follows = Follows::edges;
     plane.edges[0] = edge_a, plane.edges[1] = edge_b;
     plane.side = side;
-    plane.against[1] = {motion.b.rate, motion.a.rate};
     return plane;
   }
 };
@@ -72,128 +63,126 @@ struct Plane {
 constexpr double largest_turn = 1.0;
 
 // Find the normal of a plane that turns; false where it has turned too far.
-inline bool find_normal(const Plane& plane, const Instant& now, Vector& n) {
-  n = plane.turns == Turns::with_a   ? now.a.bring(plane.normal)
-      : plane.turns == Turns::with_b ? now.b.bring(plane.normal)
-                                     : plane.normal;
+BC_INLINE bool find_normal(const Plane& plane, const Instant& now, Vector& n) {
+  if (plane.follows == Follows::face_of_a || plane.follows == Follows::face_of_b) {
+    n = now.bring(plane.follows == Follows::face_of_b, plane.normal);
+    return true;
+  }
+  n = plane.normal;
   double angle = std::fabs(now.s - plane.since) * plane.turn;
-  if (plane.turns != Turns::with_points || angle == 0.0) return true;
+  if (plane.follows == Follows::nothing || angle == 0.0) return true;
   if (!(angle <= 2.0 * largest_turn)) return false;
-  SineAndCosine half = sine_and_cosine(0.5 * angle);
-  Vector axis = ((now.s < plane.since ? -half.sine : half.sine) / plane.turn) * plane.rate;
-  Vector aside = cross(axis, n);
-  n = n + (2.0 * half.cosine * aside + 2.0 * cross(axis, aside));
+  SinesAndCosines half = sines_and_cosines(splat<Both>(0.5 * angle));
+  double sine = now.s < plane.since ? -half.sine[0] : half.sine[0];
+  Vector axis = (sine / plane.turn) * plane.rate, aside = cross(axis, n);
+  n = n + (2.0 * half.cosine[0] * aside + 2.0 * cross(axis, aside));
   return true;
 }
-
-// The vertex of a box that is farthest along a direction. Of edges across it, the middle.
-struct Vertex {
-  Vector arm;          // from the centre of turning, common frame [m]
-  Vector side, along;  // of each axis: −1, 0 or 1, and its cosine to the direction
-
-  Vertex(const Moving& box, const BoxAt& here, const Vector& direction) : arm(here.arm) {
-    constexpr double flat = 1e-7;
-    for (int k = 0; k < 3; ++k) {
-      along[k] = dot(direction, here.axes[k]);
-      side[k] = std::fabs(along[k]) < flat ? 0.0 : along[k] > 0.0 ? 1.0 : -1.0;
-      arm += (side[k] * box.half[k]) * here.axes[k];
-    }
-  }
-};
 
 // Bound the gap along a normal that turns. Second derivatives have two bounds, and the smaller one is
 // taken. As the normal sees it, a box that turns with it bends nothing. As the common frame sees it,
 // nothing depends on how far the vertices are from the centres of turning but their own turns.
+//
+// Of a gap that is not above the target by `slack`, the value alone is found.
 inline Bound bound_turning(const Motion& motion, const Instant& now, const Plane& plane,
-                           double target) {
+                           double target, double slack) {
+  constexpr double flat = 1e-7;  // edges across the normal, up to this cosine, count by their middles
   Bound bound;
   Vector n;
   if (!find_normal(plane, now, n)) return bound;
-  double nu = plane.turn, p = plane.crossing, d = 1.0 - now.s;
-  if (plane.turns == Turns::with_points) d = min(d, largest_turn / nu);
-  Vector way = now.between, moving = motion.way;
-  double in_turn = p * (nu * max(norm(way), norm(way + d * motion.way)) + 2.0 * motion.speed);
-  double pulled = 0.0, pulled_along = 0.0, fast = motion.speed + p * motion.far;
-  bound.rate = dot(n, motion.way) + dot(cross(plane.rate, n), now.between);
-  for (int of = 0; of < 2; ++of) {
-    const Moving& box = of ? motion.b : motion.a;
-    const BoxAt& here = of ? now.b : now.a;
-    const Against& against = plane.against[of];
-    double sign = of ? 1.0 : -1.0;
-    Vertex vertex(box, here, -sign * n);
-    Vector speed = cross(box.rate, vertex.arm);
-    way += sign * vertex.arm, moving += sign * speed;
-    bound.rate += sign * dot(n, cross(against.rate, vertex.arm));
-    in_turn += norm(vertex.arm) * against.bend;
-    // A normal along the axis of a turn sees nothing of it.
-    double oblique = min(1.0, norm(cross(box.turn.axis, n)) + d * p);
-    pulled += box.turned * norm(speed);
-    pulled_along += oblique * box.turned * norm(speed);
-    double bend = min(against.bend, (oblique * box.turned + 2.0 * p) * box.turned + nu * p);
-    for (int k = 0; k < 3; ++k)
-      bound.add_least((vertex.side[k] - 1.0) * box.half[k], (vertex.side[k] + 1.0) * box.half[k],
-                      {vertex.along[k], -sign * dot(n, cross(against.rate, here.axes[k])), bend});
-    fast += against.speed * box.reach;
+  Both one = splat<Both>(1.0), zero{}, sign{-1.0, 1.0};
+  BothVectors normals = both(n, n), vertices = now.arms;
+  Both along[3], side[3];  // of each axis: its cosine to the way to the other box, and −1, 0 or 1
+  for (int k = 0; k < 3; ++k) {
+    along[k] = -sign * dot(normals, now.axes[k]);
+    side[k] = select<Both>(abs(along[k]) < splat<Both>(flat), zero,
+                           select<Both>(along[k] > zero, one, -one));
+    vertices += (side[k] * motion.half[k]) * now.axes[k];
   }
-  double speed = norm(moving) + d * pulled;
-  double in_frame = pulled_along + p * (2.0 * speed + nu * (norm(way) + d * speed));
-  bound.value = dot(n, way) - target;
-  bound.rate -= rounding_share * fast;
-  bound.curve = 0.5 * min(in_turn, in_frame);
+  Vector between = now.between + difference(vertices);
+  bound.value = dot(n, between) - target;
+  if (!(bound.value > slack)) return bound;
+  double nu = plane.turn, p = plane.crossing, d = 1.0 - now.s;
+  if (plane.follows == Follows::points) d = min(d, largest_turn / nu);
+  BothVectors turning = cross(normals, plane.against);  // n·(δ × x) = (n × δ)·x
+  BothVectors speeds = cross(motion.rate, vertices);
+  // A normal along the axis of a turn sees nothing of it.
+  Both oblique = min(one, norm(cross(motion.turns.axis, normals)) + d * p);
+  Both pull = motion.turned * norm(speeds), pull_along = oblique * pull;
+  Both bend = min(plane.against_bend, (oblique * motion.turned + 2.0 * p) * motion.turned + nu * p);
+  Both in_turn = norm(vertices) * plane.against_bend, moving = plane.against_speed * motion.reach;
+  for (int k = 0; k < 3; ++k)
+    bound.add_least((side[k] - one) * motion.half[k], (side[k] + one) * motion.half[k],
+                    {along[k], -sign * dot(turning, now.axes[k]), bend});
+  double far = larger_norm(now.between, now.between + d * motion.way);
+  double by_turn = (in_turn[0] + in_turn[1]) + p * (nu * far + 2.0 * motion.speed);
+  double speed = norm(motion.way + difference(speeds)) + d * (pull[0] + pull[1]);
+  double by_frame = (pull_along[0] + pull_along[1]) +
+                    p * (2.0 * speed + nu * (norm(between) + d * speed));
+  bound.rate = (dot(n, motion.way) + dot(cross(plane.rate, n), now.between)) +
+               difference(dot(turning, vertices));
+  bound.rate -= rounding_share * (motion.speed + p * motion.far + (moving[0] + moving[1]));
+  bound.curve = 0.5 * min(by_turn, by_frame);
   bound.horizon = d;
   return bound;
 }
 
 // Bound the gap along N = ± a × b / |a × b now|, of an edge of each box. N·(an axis of A) is another axis
 // of A times b, and so for B. The gap stays above the target where N·c − Σ h·|N·e| stays above
-// target · (1 + N²)/2, which is at least target · |N|.
+// target · (1 + N²)/2, which is at least target · |N|. A gap up to the slack is of no use here, too.
 inline Bound bound_across(const Motion& motion, const Instant& now, const Plane& plane,
-                          double target) {
-  const Moving &A = motion.a, &B = motion.b;
-  const Vector &a = now.a.axes[plane.edges[0]], &b = now.b.axes[plane.edges[1]];
+                          double target, double slack) {
   Bound bound;
-  Vector edges = cross(a, b);
+  Vector a = now.axis(0, plane.edges[0]), b = now.axis(1, plane.edges[1]), edges = cross(a, b);
   double size = 1.0 / norm(edges), scale = plane.side * size, half_target = 0.5 * max(target, 0.0);
   if (!(size < 1e6)) return bound;  // too nearly parallel
-  Vector n = scale * edges, way = now.between + (now.b.arm - now.a.arm);
-  Vector moving = motion.way + (cross(B.rate, now.b.arm) - cross(A.rate, now.a.arm));
-  Vector da = cross(A.rate, a), db = cross(B.rate, b);
-  const Against& against = plane.against[1];
-  double pa = norm(da), pb = norm(db), lever_a = norm(A.lever), lever_b = norm(B.lever);
-  double d = 1.0 - now.s, levers = lever_a + lever_b;
-  double far = max(norm(way), norm(way + d * motion.way)) + 2.0 * levers;
-  double fast = motion.speed + A.turned * lever_a + B.turned * lever_b;
+  Vector n = scale * edges, way = now.between + difference(now.arms);
+  BothVectors u[2], v[2];
+  Both half[2], along[2];
+  for (int step = 0; step < 2; ++step) {  // N stays across the edges themselves
+    int k[2] = {(plane.edges[0] + step + 1) % 3, (plane.edges[1] + step + 1) % 3};
+    u[step] = both(cross(now.axis(0, k[0]), a), a), v[step] = both(b, cross(b, now.axis(1, k[1])));
+    half[step] = Both{motion.half[k[0]][0], motion.half[k[1]][1]};
+    along[step] = scale * dot(u[step], v[step]);
+  }
   double cosine = dot(a, b), share = half_target * size * size;  // N² is size² (1 − cosine²)
-  bound.value = dot(n, way) - (half_target + share * (1.0 - cosine * cosine));
-  bound.rate = (dot(n, moving) + scale * dot(cross(da, b) + cross(a, db), way)) +
-               2.0 * share * cosine * dot(a, cross(against.rate, b));
-  bound.curve =
-      0.5 * size *
-          ((A.turned * pa + 2.0 * pa * pb + B.turned * pb) * far + 2.0 * (pa + pb) * fast +
-           A.turned * A.turned * lever_a + B.turned * B.turned * lever_b) +
-      share * against.bend;
-  bound.horizon = d;
+  double value = dot(n, way) - (half_target + share * (1.0 - cosine * cosine));
+  Both reaches = half[0] * abs(along[0]) + half[1] * abs(along[1]);
+  if (!(value - (reaches[0] + reaches[1]) > slack)) return bound;
+  Vector moving = motion.way + difference(cross(motion.rate, now.arms));
+  Vector rate_a = vector_of(motion.rate, 0), rate_b = vector_of(motion.rate, 1);
+  Vector da = cross(rate_a, a), db = cross(rate_b, b), against = rate_b - rate_a;
+  Both levers = norm(motion.lever), turned = motion.turned, pulls = turned * turned * levers;
+  double pa = norm(da), pb = norm(db), against_speed = norm(against);
+  double bend = against_speed * against_speed + norm(cross(against, rate_a));
+  double d = 1.0 - now.s;
+  double far = larger_norm(way, way + d * motion.way) + 2.0 * (levers[0] + levers[1]);
+  double fast = motion.speed + (turned[0] * levers[0] + turned[1] * levers[1]);
   // The rounding of a × b is that of N times its size.
-  double reach = far + (A.reach + B.reach) + half_target * size;
-  bound.value -= size * rounding_share * reach;
-  bound.rate -= size * rounding_share * (fast + (A.turned + B.turned) * reach);
-  for (int of = 0; of < 2; ++of)
-    for (int step = 1; step < 3; ++step) {  // N stays across the edge itself
-      int k = (plane.edges[of] + step) % 3;
-      const Vector& e = (of ? now.b : now.a).axes[k];
-      Vector u = of ? a : cross(e, a), v = of ? cross(b, e) : b;
-      double half = (of ? B : A).half[k];
-      bound.add_least(-half, half, {scale * dot(u, v), scale * dot(u, cross(against.rate, v)),
-                                    size * against.bend});
-    }
+  double reach = far + (motion.reach[0] + motion.reach[1]) + half_target * size;
+  double rounding = size * rounding_share;
+  bound.value = value - rounding * reach;
+  bound.rate = (dot(n, moving) + scale * dot(cross(da, b) + cross(a, db), way)) +
+               2.0 * share * cosine * dot(a, cross(against, b));
+  bound.rate -= rounding * (fast + (turned[0] + turned[1]) * reach);
+  bound.curve = 0.5 * size *
+                    ((turned[0] * pa + 2.0 * pa * pb + turned[1] * pb) * far +
+                     2.0 * (pa + pb) * fast + (pulls[0] + pulls[1])) +
+                share * bend;
+  bound.horizon = d;
+  for (int step = 0; step < 2; ++step)
+    bound.add_least(-half[step], half[step],
+                    {along[step], scale * dot(u[step], cross(both(against, against), v[step])),
+                     splat<Both>(size * bend)});
   return bound;
 }
 
-// Bound the gap less the target along a plane from now on. Where it is of no use, the value is below 0.
-inline Bound bound_of(const Motion& motion, const Instant& now, const Plane& plane,
-                      double target) {
-  return plane.turns == Turns::with_edges ? bound_across(motion, now, plane, target)
-                                          : bound_turning(motion, now, plane, target);
+// Bound the gap less the target along a plane from now on. Where it is not above `slack`, the bound is of
+// no use.
+inline Bound bound_of(const Motion& motion, const Instant& now, const Plane& plane, double target,
+                      double slack) {
+  return plane.follows == Follows::edges ? bound_across(motion, now, plane, target, slack)
+                                         : bound_turning(motion, now, plane, target, slack);
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET::motion

@@ -20,7 +20,7 @@ inline bool find_time_of_impact(Follower& follower, double clearance, double tol
   double slack = 0.5 * tolerance - motion.rounding;
   Instant now = motion.at(0.0);
   do {
-    found = follower.see(now.s);
+    found = follower.see(now);
     if (found.nearest.colliding || found.nearest.distance <= enough) return true;
     follower.forget_all_but(4);
     follower.take_up(found, now);
