@@ -4,8 +4,8 @@
 """Kinds of motions of two boxes: everyday ones, and ones that are hard for a time of impact.
 
 A box is drawn as a body: its origin goes on a line, its axes turn at constant rate, and its own
-centre is off the origin by a lever. Grazing motions come as near as is asked: B is moved aside until
-the least distance is that.
+centre is off the origin by a lever. Grazing motions come as near as is asked: B is moved aside
+until the least distance is that.
 """
 from __future__ import annotations
 
@@ -161,8 +161,10 @@ def plates_and_bullets(rng: Rng, n: int) -> Motions:
 
 def swinging_containers(rng: Rng, n: int) -> Motions:
     """Draw containers on a crane beside ones that stand."""
-    place = rng.normal(size=(n, 3)) * [1.0, 6.0, 0.0] + _column(rng.uniform(2.0, 4.0, n)) * [0, 0, 1]
-    way = rng.normal(size=(n, 3)) * [2.0, 6.0, 0.0] - _column(rng.uniform(0.0, 1.5, n)) * [0, 0, 1]
+    place = rng.normal(size=(n, 3)) * [1.0, 6.0, 0.0]
+    place[:, 2] = rng.uniform(2.0, 4.0, n)
+    way = rng.normal(size=(n, 3)) * [2.0, 6.0, 0.0]
+    way[:, 2] = -rng.uniform(0.0, 1.5, n)
     return motions(body(HALF_CONTAINER, np.zeros((n, 3)), 0.0, _yaw(0.02 * rng.normal(size=n))),
                    body(HALF_CONTAINER, place, way, _yaw(0.1 * rng.normal(size=n)),
                         rng.normal(size=(n, 3)) * [0.05, 0.05, 0.1]))

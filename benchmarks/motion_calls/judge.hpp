@@ -153,8 +153,9 @@ inline Real distance(const Both& boxes) {
           if (!(square > 0)) continue;
           Real on_a = dot(cross(way, v), n) / square, on_b = dot(cross(way, u), n) / square;
           if (std::fabs(on_a) > boxes.a.half[i] || std::fabs(on_b) > boxes.b.half[j]) continue;
-          Real along = dot(way, n);
-          least = std::min(least, along * along / square);
+          // Points of both edges: the cross product of edges that are almost parallel is rounding.
+          V between = way + on_b * v - on_a * u;
+          least = std::min(least, dot(between, between));
         }
   return std::sqrt(least);
 }
@@ -206,12 +207,14 @@ class Judge {
       bool is_touching;
       V n = hint(here, is_touching);
       if (!is_touching && proves(n)) continue;
-      Real largest;
-      n = separating(here, largest);
-      if (proves(n)) continue;
-      if (target <= 0 ? largest < target - doubt
-                      : largest < target && (largest < 0 || distance(here) < target - doubt))
-        return Verdict::refuted;
+      if (is_touching || !(gap(here, n) > target)) {  // else a shorter interval is proved by it
+        Real largest;
+        n = separating(here, largest);
+        if (proves(n)) continue;
+        if (target <= 0 ? largest < target - doubt
+                        : largest < target && (largest < 0 || distance(here) < target - doubt))
+          return Verdict::refuted;
+      }
       if (width < 1e-15L) {
         is_doubtful = true;
         continue;

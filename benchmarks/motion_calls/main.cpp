@@ -63,10 +63,9 @@ bool counted(const box_contact::detail::PairNumbers& pair, bc_nearest& nearest) 
 
 motion::Motion motion_of(const Row& row) {
   motion::Motion found;
-  if (!found.a.set(row.start_a, row.end_a, row.size_a, row.centre_a) ||
-      !found.b.set(row.start_b, row.end_b, row.size_b, row.centre_b))
+  if (found.set({row.start_a, row.end_a, row.size_a, row.centre_a},
+                {row.start_b, row.end_b, row.size_b, row.centre_b}) >= 0)
     fail("a turn has two ways");
-  found.join();
   return found;
 }
 
@@ -91,12 +90,15 @@ double sampled(const motion::Motion& ways) {
   query.patch = BC_NO_PATCH;
   for (long k = 0; k <= count; ++k) {
     double s = double(k) / double(count);
-    auto pa = ways.a.pose_at(s), pb = ways.b.pose_at(s);
-    bc_box a, b;
-    std::copy_n(pa.position.v, 7, a.pose.position), std::copy_n(pb.position.v, 7, b.pose.position);
-    std::copy_n(ways.a.size.v, 3, a.size.extent), std::copy_n(ways.b.size.v, 3, b.size.extent);
+    motion::Instant now = ways.at(s);
+    bc_box boxes[2];
+    for (int of = 0; of < 2; ++of) {
+      auto pose = ways.pose(of, now);
+      std::copy_n(pose.position.v, 7, boxes[of].pose.position);
+      std::copy_n(ways.sizes[of].v, 3, boxes[of].size.extent);
+    }
     bc_contact contact;
-    check(bc_collide(&a, &b, &query, &contact));
+    check(bc_collide(&boxes[0], &boxes[1], &query, &contact));
     if (contact.colliding) return s;
   }
   return std::numeric_limits<double>::quiet_NaN();
