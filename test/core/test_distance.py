@@ -311,8 +311,8 @@ ALMOST_PARALLEL = {
             0.15966442433894687, 0.1602884237974992, -0.7843021784701493),
            (3.497169724441383, 2.3405447947159623, 1.1739512963577101),
            (7.105095614906032, 1.972656434746702, 1.4786493060700696))}
-"""Boxes some micrometres apart whose edges are parallel to so many radians. A vertex of either box is
-nearest, but for rounding, and the way from one of them is not across both edges."""
+"""Boxes some micrometres apart whose edges are parallel to so many radians. A vertex of either box
+is nearest, but for rounding, and the way from one of them is not across both edges."""
 
 
 @pytest.mark.parametrize('angle', ALMOST_PARALLEL)
