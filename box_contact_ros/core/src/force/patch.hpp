@@ -12,13 +12,21 @@
 #include <vector>
 
 #include "../../include/box_contact/force.h"
-#include "faces.hpp"
-#include "rigid_body.hpp"
+#include "../faces/face_patch.hpp"
+#include "rectangle.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
+using namespace faces;
+
 // A patch that is at least so wide as a part of its faces stops a turn by itself [1].
 constexpr double wide = 0.5;
+
+inline Span span_along(const Face& face, const Vec<double>& axis) {
+  double middle = dot(face.centre, axis);
+  double half = std::fabs(dot(face.half_1, axis)) + std::fabs(dot(face.half_2, axis));
+  return {middle - half, middle + half};
+}
 
 // The faces by which two boxes meet, from the point of their patch: how far both reach along its axes. Where
 // it is narrow, also the gap between them, gap + slope · place.
@@ -99,8 +107,8 @@ struct Patch {
                   const bc_size& size_b) {
     Face a = face_along(box_at_a, size_a, point, normal),
          b = face_along(box_at_b, size_b, point, -normal);
-    faces = {a.span_along(shape.axis_1).within(b.span_along(shape.axis_1)),
-             a.span_along(shape.axis_2).within(b.span_along(shape.axis_2)),
+    faces = {span_along(a, shape.axis_1).within(span_along(b, shape.axis_1)),
+             span_along(a, shape.axis_2).within(span_along(b, shape.axis_2)),
              0.0,
              {0.0, 0.0}};
     shape.span_1 = shape.span_1.within(faces.span_1);

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "../../include/box_contact/force.h"
-#include "../poses.hpp"
+#include "../placed.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
@@ -52,28 +52,9 @@ struct Body {
   bool is_free() const { return inverse_mass > 0.0; }
 };
 
-// Where a body is: its centre of mass, and its axes as columns; common frame.
-template <class T>
-struct PlacedOf {
-  Vec<T> position;
-  Mat<T> axes;
-};
-using Placed = PlacedOf<double>;
-
 struct Motion {
   Vec<double> linear, angular;  // of the centre of mass [m/s], [rad/s]
 };
-
-template <class T>
-BC_INLINE Vec<T> cross(const Vec<T>& a, const Vec<T>& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-template <class T>
-BC_INLINE T length(const Vec<T>& a) {
-  return sqrt(dot(a, a));
-}
-inline Vec<double> vector_at(const double* numbers) { return {numbers[0], numbers[1], numbers[2]}; }
-inline Vec<double> vector(const double (&numbers)[3]) { return vector_at(numbers); }
 
 // The inverse of a matrix, by its cofactors. One whose determinant is not positive gives zero.
 template <class T>
@@ -96,10 +77,6 @@ inline void tangents(const Vec<double>& n, Vec<double>& t1, Vec<double>& t2) {
 inline Placed placed_at(const bc_pose& pose, const Vec<double>& centre) {
   Mat<double> axes = rotation_matrix(pose.quaternion);
   return {vector(pose.position) + axes * centre, axes};
-}
-// The same of a box, about its own centre.
-inline Placed box_at(const bc_pose& pose) {
-  return {vector(pose.position), rotation_matrix(pose.quaternion)};
 }
 // The pose of a body that is placed so. quaternion: of any length.
 inline bc_pose pose_at(const Placed& placed, const double (&quaternion)[4],

@@ -44,13 +44,13 @@ inline bc_status read_body(const bc_body& given, size_t k, Body& body) {
       return fail(BC_BAD_ARGUMENT,
                   "inertia of body %zu must be within 1e-50 to 1e50 kg m², not (%g, %g, %g)", k,
                   inertia[0], inertia[1], inertia[2]);
-  Vec<double> moments = force::vector(given.inertia);
+  Vec<double> moments = vector(given.inertia);
   if (!force::is_inertia(moments))
     return fail(BC_BAD_ARGUMENT,
                 "inertia of body %zu (%g, %g, %g) has a moment that exceeds the sum of the others",
                 k, inertia[0], inertia[1], inertia[2]);
   Vec<double> ones{1.0, 1.0, 1.0}, zeros{0.0, 0.0, 0.0};
-  body = {moves ? 1.0 / mass : 0.0, moves ? ones / moments : zeros, force::vector(given.centre)};
+  body = {moves ? 1.0 / mass : 0.0, moves ? ones / moments : zeros, vector(given.centre)};
   return check_within("centre", k, given.centre, 3, length_max);
 }
 
@@ -88,9 +88,9 @@ inline bc_status check_patch(const bc_patches& answer, size_t k) {
                 k, volume);
   if (bc_status status = check_within("point", k, answer.point + 3 * k, 3, length_max))
     return status;
-  if (!force::is_unit(force::vector_at(normal)))
+  if (!force::is_unit(vector_at(normal)))
     return fail(BC_BAD_ARGUMENT, "normal[%zu] (%g, %g, %g) has the length %g, not 1", k, normal[0],
-                normal[1], normal[2], force::length(force::vector_at(normal)));
+                normal[1], normal[2], length(vector_at(normal)));
   if (!force::is_covariance(c))
     return fail(BC_BAD_ARGUMENT,
                 "covariance[%zu] (%g, %g, %g; %g, %g, %g; %g, %g, %g) is not symmetric, or has an "
@@ -183,7 +183,7 @@ inline bc_status read_boxes(const bc_body_box* given, int64_t count, size_t bodi
     if (boxes[k].body < 0 || size_t(boxes[k].body) >= bodies)
       return fail(BC_BAD_ARGUMENT, "body[%zu]: there is no body %lld", k, (long long)boxes[k].body);
     if (!pose_is_valid(pose)) return refuse_pose(field, pose);
-    if (!size_valid<double>(triple(force::vector_at(size))))
+    if (!size_valid<double>(triple(vector_at(size))))
       return fail(BC_BAD_SIZE, "sizes[%zu] (%g, %g, %g) is not within 1e-50 to 1e50 m", k, size[0],
                   size[1], size[2]);
   }
