@@ -86,7 +86,7 @@ typedef struct bc_force_options {
                       Unless answers are late, there are three times as many of both where
                       masses that touch differ tenfold or stacks sway, and up to twelve times
                       the longer they sway */
-  int threads;     /* 1 to 1,024, and no more than cores; many boxes that touch are moved in parts */
+  int threads;     /* 1 to 1,024, and no more than cores; boxes that touch are moved by one */
   double friction; /* Coulomb's μ [1] */
   double most_depth; /* how deep what rests may be at most [m], where a load is large for the lighter
                         body: with contacts of one's own, its island makes up to 64 times as many

@@ -60,17 +60,10 @@ class IslandStep {
   // Advance all islands. Returns the first body whose numbers are not finite at the end, or −1. No bit depends
   // on the number of threads.
   template <class InThreads>
-  int64_t advance(InThreads& in_threads, TeamsPay& teams_pay) const {
+  int64_t advance(InThreads& in_threads) const {
     std::vector<Chunk>& chunks = islands_.chunks;
-    for (Chunk& chunk : chunks) {
-      if (chunk.parts() == 0) continue;
-      Team team(int(chunk.parts()));
-      in_threads.together(team.parts(), [&](long part) { advance(chunk, int(part), team); });
-      teams_pay.end(team);
-    }
-    in_threads(options_.threads, long(chunks.size()), [&](long, long k) {
-      if (chunks[size_t(k)].parts() == 0) advance(chunks[size_t(k)]);
-    });
+    in_threads(options_.threads, long(chunks.size()),
+               [&](long, long k) { advance(chunks[size_t(k)]); });
     for (const Chunk& chunk : chunks)
       if (chunk.lost >= 0) return chunk.lost;
     return -1;
@@ -96,35 +89,6 @@ class IslandStep {
       if (island.factor > 0.0) advance(chunk, island.factor, island.rounds);
     chunk.lost = first_lost(chunk);
   }
-  // The same of a large island, by threads that have a part of it each.
-  void advance(Chunk& chunk, int part, Team& team) const {
-    Island &whole = *islands_.of(chunk).first, *parts = islands_.parts_of(chunk);
-    Island& mine = parts[part];
-    begin_bodies(mine);
-    team.meet(part);
-    begin_blocks(mine, whole.block_end - whole.block);
-    team.meet(part);
-    if (part == 0) {
-      join(parts, team.parts(), whole);
-      choose(whole);
-    }
-    team.meet(part);
-    mine.is_new = whole.is_new;
-    mine.is_uneven = whole.is_uneven;
-    mine.is_shared = true;
-    SubSteps steps = steps_of(whole.factor, whole.rounds);
-    Work work =
-        work_of({&mine, &mine + 1}, steps, islands_.groups_of(chunk), mine.group, mine.group_end);
-    work.team = &team;
-    work.part = part;
-    work.parts = parts;
-    work.whole = &whole;
-    work.turns = islands_.turns_of(chunk);
-    advance_by(*islands_.side(), whole.factor, work);
-    team.meet(part);
-    if (part == 0) chunk.lost = first_lost(chunk);
-  }
-
   // The first body of a chunk whose numbers are not finite at the end, or −1.
   int64_t first_lost(const Chunk& chunk) const {
     for (const Island& island : islands_.of(chunk))
@@ -134,24 +98,21 @@ class IslandStep {
   }
   // Begin an island. One without contacts ends the advance, too.
   void begin(Island& island) const {
-    begin_bodies(island);
+    for (size_t k = island.body; k < island.body_end; ++k) body_step_.begin(moving_[k]);
     island.factor = 0.0;
     if (island.block == island.block_end) {
       for (size_t k = island.body; k < island.body_end; ++k) body_step_.advance(moving_[k]);
       return;
     }
-    begin_blocks(island, island.block_end - island.block);
+    begin_blocks(island);
     choose(island);
   }
-  void begin_bodies(const Island& island) const {
-    each_body(island, [&](size_t k) { body_step_.begin(moving_[k]); });
-  }
-  // Begin the blocks of an island, or of a part of one that has so many.
-  void begin_blocks(Island& island, size_t count) const {
+  void begin_blocks(Island& island) const {
     island.is_new = true;
     island.is_uneven = false;
     island.fastest = 0.0;
-    island.over_relaxation = step_.steps.is_late ? 1.0 : over_relaxation(count);
+    island.over_relaxation =
+        step_.steps.is_late ? 1.0 : over_relaxation(island.block_end - island.block);
     each(island, [&](Block& block, const Patch& patch, Moving& a, Moving& b) {
       take(patch, island.over_relaxation, block);
       island.fastest = std::max(island.fastest, passing_speed(patch, a, b));
@@ -159,16 +120,6 @@ class IslandStep {
       island.is_new = island.is_new && patch.window == 0.0;
       island.is_uneven = island.is_uneven || is_uneven(a.inverse_mass, b.inverse_mass);
     });
-  }
-  static void join(const Island* parts, int count, Island& whole) {
-    whole.is_new = true;
-    whole.is_uneven = false;
-    whole.fastest = 0.0;
-    for (const Island* part = parts; part < parts + count; ++part) {
-      whole.is_new = whole.is_new && part->is_new;
-      whole.is_uneven = whole.is_uneven || part->is_uneven;
-      whole.fastest = std::max(whole.fastest, part->fastest);
-    }
   }
   // Choose how fine its sub-steps are, and how many iterations they take.
   void choose(Island& island) const {
@@ -181,7 +132,7 @@ class IslandStep {
     SubSteps steps = steps_of(factor, rounds);
     auto advance = [&](Islands::Range range, const detail::ForceKernel& kernel, void* groups,
                        size_t count) {
-      Work work = work_of(range, steps, groups, 0, count);
+      Work work = work_of(range, steps, groups, count);
       advance_by(kernel, factor, work);
     };
     for (Island& island : islands_.of(chunk))
@@ -202,8 +153,7 @@ class IslandStep {
     steps.rounds *= rounds;
     return steps;
   }
-  Work work_of(Islands::Range range, const SubSteps& steps, void* groups, size_t group,
-               size_t group_end) const {
+  Work work_of(Islands::Range range, const SubSteps& steps, void* groups, size_t count) const {
     bool counts = step_.motion.wrenches;
     return {range.first,
             range.last,
@@ -212,8 +162,7 @@ class IslandStep {
             blocks_.data(),
             patches_.data(),
             groups,
-            group,
-            group_end,
+            count,
             steps,
             options_.iterations,
             options_.relaxations,
@@ -221,11 +170,11 @@ class IslandStep {
   }
   template <class Visit>
   void each(const Island& island, const Visit& visit) const {
-    each_block(island, [&](size_t k) {
+    for (size_t k = island.block; k < island.block_end; ++k) {
       Block& block = blocks_[k];
       visit(block, patches_[size_t(block.patch)], moving_[size_t(block.a)],
             moving_[size_t(block.b)]);
-    });
+    }
   }
 
   void advance_by(const detail::ForceKernel& kernel, double factor, Work& work) const {
@@ -234,8 +183,9 @@ class IslandStep {
         if (island->is_shared) visit(*island);
     };
     auto each_moving = [&](const auto& visit) {
-      each_island(
-          [&](const Island& island) { each_body(island, [&](size_t k) { visit(moving_[k]); }); });
+      each_island([&](const Island& island) {
+        for (size_t k = island.body; k < island.body_end; ++k) visit(moving_[k]);
+      });
     };
     auto end = [&] {
       kernel.end(&work);
@@ -255,14 +205,11 @@ class IslandStep {
         if (steps.is_late) block.closing = {};  // rocking is soft
       });
     });
-    work.meet();
     kernel.load(&work);
     for (int number = 1; number <= steps.count; ++number) {
       if (factor > 1.0 && number > 1 && number % parts_of_a_contact == 1) {
         end();
-        work.meet();
         each_island([&](const Island& island) { ask_again(island, time); });
-        work.meet();
         kernel.load(&work);
       }
       work.is_last = number == steps.count;

@@ -11,8 +11,7 @@
 #include <vector>
 
 #include "../kernel.hpp"
-#include "counting_sort.hpp"
-#include "parts.hpp"
+#include "iterations.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
@@ -24,10 +23,7 @@ constexpr size_t blocks_per_chunk = 128;
 struct Chunk {
   size_t island, island_end;
   size_t block, block_end;
-  size_t part, part_end;  // of a large island, which is alone; else none
   int64_t lost;  // the first body whose numbers are not finite at the end of an advance, or −1
-
-  size_t parts() const { return part_end - part; }
 };
 
 // Memory for a time. A copy has none of it.
@@ -75,13 +71,12 @@ class Islands {
     by_height.reserve(patches);
     chunks.reserve(bodies);
     rooms_.reserve(patches + bodies);
-    parts_.make_room(bodies, patches);
     if (side_) groups_.make_room(2 * patches / size_t(side_->lanes) * side_->group_size);
   }
 
-  // awake: the bodies in islands, in turn. Large islands are cut into parts, for up to so many threads.
+  // awake: the bodies in islands, in turn.
   void group(const std::vector<Body>& bodies, const std::vector<int32_t>& awake,
-             const std::vector<Patch>& patches, const bc_pose* poses, size_t threads) {
+             const std::vector<Patch>& patches) {
     by_height.resize(patches.size());
     number(bodies, awake, patches);
     bodies_.sort(awake.size(), all.size(), [&](size_t k) { return island_[size_t(awake[k])]; });
@@ -107,8 +102,7 @@ class Islands {
       here.body_end = moving.size();
       here.block_end = count;
     }
-    threads_ = threads;
-    cut(poses);
+    cut();
     rooms_.resize(blocks.size() + chunks.size());
   }
 
@@ -122,15 +116,11 @@ class Islands {
     return {all.data() + chunk.island, all.data() + chunk.island_end};
   }
 
-  size_t threads() const { return threads_; }
   const detail::ForceKernel* side() const { return side_; }
   // Memory for groups of a chunk.
   void* groups_of(const Chunk& chunk) {
     return groups_.at(first_group(chunk.block) * side_->group_size);
   }
-  // The parts of the island of a chunk, and the turns of its groups.
-  Island* parts_of(const Chunk& chunk) { return &parts_.all[chunk.part]; }
-  const GroupTurn* turns_of(const Chunk& chunk) { return &parts_.turns[first_group(chunk.block)]; }
 
   // Put the blocks of the islands of a chunk that are shared into groups, whose lanes are solved side by
   // side. In turn, each goes into the first group with room behind those of its bodies. So bodies see
@@ -165,37 +155,25 @@ class Islands {
   struct Room {
     int32_t next, filled;
   };
+  static int32_t first_room(Room* rooms, int32_t group) {
+    while (rooms[group].next != group) group = rooms[group].next = rooms[rooms[group].next].next;
+    return group;
+  }
 
-  void cut(const bc_pose* poses) {
+  void cut() {
     chunks.clear();
-    parts_.begin(moving.size(), blocks.size());
     for (size_t island = 0; island < all.size();) {
       size_t first = island;
-      if (is_large(all[island])) {
-        size_t part = parts_.all.size();
-        if (parts_.cut(all[island], threads_, poses, side_->lanes, first_group(all[island].block),
-                       moving, blocks)) {
-          chunks.push_back({island, island + 1, all[island].block, all[island].block_end, part,
-                            parts_.all.size(), -1});
-          ++island;
-          continue;
-        }
-      }
       // A body alone is some work, too.
       auto size = [&] { return all[island].block_end - all[first].block + (island - first); };
       do ++island;
-      while (island < all.size() && size() <= blocks_per_chunk && !is_large(all[island]));
-      chunks.push_back({first, island, all[first].block, all[island - 1].block_end, 0, 0, -1});
+      while (island < all.size() && size() <= blocks_per_chunk);
+      chunks.push_back({first, island, all[first].block, all[island - 1].block_end, -1});
     }
   }
 
   // Groups of blocks from this one on begin here.
   size_t first_group(size_t block) const { return 2 * block / size_t(side_->lanes); }
-  bool is_large(const Island& island) const {
-    size_t count = island.block_end - island.block;
-    return side_ && threads_ > 1 && count >= 2 * blocks_per_part &&
-           count * threads_ > blocks.size();
-  }
 
   int32_t root_of(int32_t body) {
     while (root_[size_t(body)] != body)
@@ -236,7 +214,7 @@ class Islands {
     return place_[size_t(body)];
   }
 
-  // Things in the order of their islands.
+  // Places of things in the order of their islands; those of an island stay in turn (counting sort).
   class Sorted {
    public:
     struct Range {
@@ -251,7 +229,11 @@ class Islands {
     template <class IslandOf>
     void sort(size_t count, size_t islands, IslandOf island_of) {
       order_.resize(count);
-      counting_sort(count, islands, island_of, starts_, order_.data());
+      starts_.assign(islands + 1, 0);
+      for (size_t k = 0; k < count; ++k) ++starts_[size_t(island_of(k))];
+      int32_t sum = 0;
+      for (int32_t& start : starts_) start = sum += start;
+      for (size_t k = count; k-- > 0;) order_[size_t(--starts_[size_t(island_of(k))])] = int32_t(k);
     }
     Range of(size_t island) const {
       return {order_.data() + starts_[island], order_.data() + starts_[island + 1]};
@@ -267,8 +249,6 @@ class Islands {
   const detail::ForceKernel* side_;
   std::vector<Room> rooms_;  // of the groups of each chunk, and one behind them
   Scratch groups_;
-  size_t threads_ = 1;  // for parts of islands
-  Parts parts_;
 };
 
 }  // namespace box_contact::BOX_CONTACT_SET::force

@@ -33,9 +33,6 @@ constexpr double no_impact = std::numeric_limits<double>::infinity();
 // least one and the least one is too near to 1.
 constexpr int scaled_every = 8;
 constexpr double least_factor = 2.0;
-// Parts of an island agree after so many iterations whether they go on: else they wait for each other less.
-constexpr int agreed_every = 4;
-static_assert(scaled_every % agreed_every == 0);
 
 // Pressing and rocking are over-relaxed: their impulses change by more than what solves a block alone, by up
 // to this factor (successive over-relaxation, Young, 1954) [1]. The sway of stacks dies away in half of the
@@ -88,13 +85,10 @@ inline double passing_speed(const Patch& patch, const Moving& a, const Moving& b
   return length(speed(b) - speed(a) + patch.surface) + reach * length(b.angular - a.angular);
 }
 
-// An island, or a part of one.
 struct Island {
   size_t body, body_end;  // among those that move
   size_t block, block_end;
-  const int32_t *bodies, *blocks;  // of a part: their places, of which these are some; else null
-  size_t group, group_end;         // of a part: those of its blocks
-  double over_relaxation;          // see above
+  double over_relaxation;  // see above
   double fastest;  // as which its bodies pass each other at the start of an advance [m/s]
   bool is_new;     // whether it had no patch before this advance
   bool is_uneven;  // whether bodies touch whose masses are
@@ -105,21 +99,9 @@ struct Island {
   bool is_struck;  // whether the last iteration changed a closing speed as in an impact
 };
 
-// Visit the places of its bodies, or of its blocks.
-template <class Visit>
-void each_body(const Island& island, const Visit& visit) {
-  for (size_t k = island.body; k < island.body_end; ++k)
-    visit(island.bodies ? size_t(island.bodies[k]) : k);
-}
-template <class Visit>
-void each_block(const Island& island, const Visit& visit) {
-  for (size_t k = island.block; k < island.block_end; ++k)
-    visit(island.blocks ? size_t(island.blocks[k]) : k);
-}
-
 // Before iterations begin, no speed has changed.
 inline void forget_changes(const Island& island, Moving* moving) {
-  each_body(island, [&](size_t k) { moving[k].changed = 0; });
+  for (size_t k = island.body; k < island.body_end; ++k) moving[k].changed = 0;
 }
 
 // A larger change of a closing speed is an impact in a sub-step of this length [m/s].

@@ -6,7 +6,6 @@
 
 #include "iterations.hpp"
 #include "preparing.hpp"
-#include "team.hpp"
 #include "turning.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
@@ -20,19 +19,11 @@ struct Work {
   Block* blocks;
   const Patch* patches;
   void* groups;
-  size_t group, group_end;
+  size_t group_count;
   const SubSteps& steps;
   int iterations, relaxations;
   bool counts;           // whether impulses are added up
   bool is_last = false;  // whether it is the last sub-step
-  // Of a part of an island, which is `first`; else null.
-  Team* team = nullptr;
-  int part = 0;
-  const Island *parts = nullptr, *whole = nullptr;
-  const GroupTurn* turns = nullptr;
-
-  // Wait until all parts are here. Returns all bits that they bring.
-  unsigned meet(unsigned bits = 0) const { return team ? team->meet(part, bits) : bits; }
 };
 
 // By how much B has turned more than A since the answer.

@@ -40,7 +40,6 @@ class PatchForces {
   // A copy, whose advance takes no memory either.
   PatchForces copy() const {
     PatchForces twin = *this;
-    twin.is_grouped_ = false;  // parts of islands point into memory of this one
     twin.own_.make_room();
     twin.make_room(0);
     return twin;
@@ -174,12 +173,10 @@ class PatchForces {
     Advance step{clock_.begin(dt, options_.substeps), given, all,
                  own_.count() > 0 ? &own_ : nullptr, solve_pair};
     BodyStep body_step(bodies_, step.steps, given, all, moves_by_wrenches_, ended_);
-    size_t threads = threads_within_islands(in_threads);
-    if (!is_grouped_ || threads != islands_.threads())
-      islands_.group(bodies_, rest_.awake(), patches_, given.poses, threads);
+    if (!is_grouped_) islands_.group(bodies_, rest_.awake(), patches_);
     is_grouped_ = true;
     IslandStep islands(options_, bodies_, step, body_step, fineness_, patches_, loads_, islands_);
-    if (int64_t lost = islands.advance(in_threads, teams_pay_); lost >= 0) {
+    if (int64_t lost = islands.advance(in_threads); lost >= 0) {
       restore();
       return lost;
     }
@@ -287,12 +284,6 @@ class PatchForces {
     islands_.make_room(bodies_.size(), room_);
     reader_.make_room(bodies_.size(), size_t(box_count()), room_);
   }
-  // How many threads may wait for each other.
-  template <class InThreads>
-  size_t threads_within_islands(InThreads& in_threads) {
-    bool is_any = options_.threads > 1 && patches_.size() >= 2 * blocks_per_part;
-    return is_any && teams_pay_() ? size_t(in_threads.begin(options_.threads)) : 1;
-  }
   // Loads name boxes, which may be others or none from now on.
   template <class Condition>
   void drop(Condition condition) {
@@ -339,7 +330,6 @@ class PatchForces {
   // Memory that calls use again.
   PatchReader reader_;
   Islands islands_;
-  TeamsPay teams_pay_;
   Rollback rollback_;        // for an advance that fails
   size_t room_ = 0;          // for patches
   bool is_taken_ = false;    // whether patches were taken since `keep`; those before are in `next_`
