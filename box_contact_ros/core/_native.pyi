@@ -23,7 +23,7 @@ FEATURES: int
 OUTPUTS: int
 UNITS_MAX: int
 THREADS_MAX: int
-ITERATIONS_MAX: int
+SUBSTEPS_MAX: int
 
 kernel: str
 instruction_set: str

@@ -405,6 +405,8 @@ LENGTHS, QUATERNIONS = (
     for what in ('length', 'quaternion'))
 MORE, MOST, SWAY = (float(constant('force/iterations.hpp', name)) for name in (
     'more_rounds', 'most_rounds', 'sway_time'))
+ITERATIONS = constant('force/iterations.hpp', 'iterations')
+RELAXATIONS = constant('force/iterations.hpp', 'relaxations')
 FOLD = {3.0: 'threefold', 12.0: 'twelvefold'}
 HEADER = 'box_contact_ros/core/include/box_contact/box_contact.hpp'
 CERTIFICATE = 'overlap/certificate.hpp'
@@ -419,15 +421,15 @@ LIMITS = {
     'contributing/decisions/patch-law.md': (
         f'Frequency of {SOFT}/window', f'Frequency of {LATE}/T',
         f'Damping ratio {constant(FORCES, "soft_damping_ratio")}',
-        f'{STEPS["substeps"].default} sub-steps of {STEPS["iterations"].default} iterations'),
+        f'{STEPS["substeps"].default} sub-steps of {ITERATIONS} iterations'),
     'contributing/decisions/planes.md': (
         f'less than {constant("overlap/planes.hpp", "flush_limit")} of the overlap',),
     'contributing/testing.md': (f'{sum(HARD):,} cases in {len(HARD)} families',),
     'explanation/force.md': (
         f'{1e3 * float(constant(CLOCK, "sub_step_limit")):g} ms at most',
         f'the last half second and {constant(CLOCK, "steps_count")} steps',
-        f'up to {STEPS["iterations"].default} times',
-        f'{STEPS["relaxations"].default} more iterations ',
+        f'up to {ITERATIONS} times',
+        f'{RELAXATIONS} more iterations ',
         f'{constant("force/rectangle.hpp", "torsion_share")} times the mean',
         f'last {constant(CLOCK, "intervals_kept")} intervals',
         f'shrinks to 1 / {constant(CLOCK, "step_shrinkage")} per step',

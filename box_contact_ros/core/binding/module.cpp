@@ -118,7 +118,7 @@ PyObject* make_module() {
                              {"OUTPUTS", detail::network_outputs},
                              {"UNITS_MAX", detail::network_units_max},
                              {"THREADS_MAX", detail::threads_max},
-                             {"ITERATIONS_MAX", force::iterations_max}})
+                             {"SUBSTEPS_MAX", force::substeps_max}})
     add(name, PyLong_FromLong(value));
   using Real = std::pair<const char*, double>;
   for (auto [name, value] : {Real{"LENGTH_MIN", length_min},

@@ -19,16 +19,16 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// Most sub-steps, iterations or relaxations: their product is a number of 32 bits.
-constexpr int iterations_max = 1000;
+// Most sub-steps that may be asked for.
+constexpr int substeps_max = 1000;
 
 // The ends of so many bodies and blocks are written at a time: some 20 µs of work for a thread.
 constexpr size_t ends_per_chunk = 256;
 
 struct Options {
-  int substeps, iterations, relaxations, threads;
+  int substeps, threads;
   double friction, most_depth;
-  double rest_speed;  // below which an island comes to rest [m/s]; 0: none does
+  bool rest;  // whether islands come to rest
 };
 
 // What an advance begins with, and where its end goes.
@@ -164,8 +164,6 @@ class IslandStep {
             groups,
             count,
             steps,
-            options_.iterations,
-            options_.relaxations,
             counts};
   }
   template <class Visit>

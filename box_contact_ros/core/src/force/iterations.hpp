@@ -11,6 +11,9 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
+// Iterations of a sub-step that push overlaps out, and those that then remove that speed again, at most.
+constexpr int iterations = 4, relaxations = 2;
+
 // A smaller change of a patch's speeds [m/s] does not make its neighbours be solved again. A jittered tower of
 // 20 sways for 3 s at 4 ms; with 1e-6 it sways for 8 s.
 constexpr double least_change = 1e-8;
@@ -145,20 +148,20 @@ inline void scale(const Island& island, bool is_pushing, int iteration, Moving* 
   });
 }
 
-// Solve the blocks of islands in turn, so many times, each island as if alone. Beyond them only impacts
+// Solve the blocks of islands in turn, `count` times, each island as if alone. Beyond them only impacts
 // go on. Changes were forgotten. `solve(iteration, is_beyond)`: a turn of all; returns whether a speed
 // changed, and beyond, whether one did as in an impact. `scale(island, iteration)`: see above.
 template <class Solve, class Scale>
-void iterate(Island* first, Island* last, int iterations, Moving* moving, const Solve& solve,
+void iterate(Island* first, Island* last, int count, Moving* moving, const Solve& solve,
              const Scale& scale) {
   for (int iteration = 1;; ++iteration) {
     for (Island* island = first; island < last; ++island) island->is_struck = false;
-    if (!solve(iteration, iteration > 1 && iteration >= iterations)) return;
-    bool goes_on = iteration < iterations;
+    if (!solve(iteration, iteration > 1 && iteration >= count)) return;
+    bool goes_on = iteration < count;
     for (Island* island = first; island < last; ++island) {
       int most = island->is_uneven ? uneven_impact_iterations : impact_iterations;
       if (!island->is_struck || iteration >= most) {
-        if (iteration >= iterations) forget_changes(*island, moving);  // it is not solved again
+        if (iteration >= count) forget_changes(*island, moving);  // it is not solved again
         continue;
       }
       if (iteration % scaled_every == 0) scale(*island, iteration);

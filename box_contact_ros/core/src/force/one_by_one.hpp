@@ -21,7 +21,6 @@ struct Work {
   void* groups;
   size_t group_count;
   const SubSteps& steps;
-  int iterations, relaxations;
   bool counts;           // whether impulses are added up
   bool is_last = false;  // whether it is the last sub-step
 };

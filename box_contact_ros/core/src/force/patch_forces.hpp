@@ -184,8 +184,8 @@ class PatchForces {
     are_loads_known_ = true;
     window_ = step.steps.window;
     bool is_resting =
-        options_.rest_speed > 0.0 && motion.poses && motion.velocities &&
-        rest_.count(islands_, bodies_, patches_, given, step.steps, options_.rest_speed);
+        options_.rest && motion.poses && motion.velocities &&
+        rest_.count(islands_, bodies_, patches_, given, step.steps);
     rest_.end(given.poses, dt);
     islands.write_ends(in_threads);
     for (int32_t k : rest_.fixed()) body_step.move_alone(size_t(k));

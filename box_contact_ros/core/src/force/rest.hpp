@@ -15,7 +15,9 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// An island is laid down once it was slow for this time [s].
+// An island is slow while all its bodies are slower than this, by their energies [m/s].
+constexpr double rest_speed = 1e-4;
+// It is laid down once it was slow for this time [s].
 constexpr double rest_time = 0.5;
 // Then it is no faster than it was within that time, or than this share of what is slow [1]: what begins
 // to tip gains speed.
@@ -193,10 +195,10 @@ class Rest {
   // Count for how long islands are slow at the end of an advance, and note what is given of those that
   // come to rest. Returns whether any does.
   bool count(Islands& islands, const std::vector<Body>& bodies, const std::vector<Patch>& patches,
-             const Given& given, const SubSteps& steps, double slow) {
+             const Given& given, const SubSteps& steps) {
     bool is_any = false;
     for (const Island& island : islands.all) {
-      if (!comes_to_rest(island, islands, bodies, patches, given.poses, steps, slow)) continue;
+      if (!comes_to_rest(island, islands, bodies, patches, given.poses, steps)) continue;
       is_any = true;
       int32_t name = islands.moving[island.body].body;
       add_loads(island, islands);
@@ -311,9 +313,9 @@ class Rest {
   }
 
   bool comes_to_rest(const Island& island, Islands& islands, const std::vector<Body>& bodies,
-                     const std::vector<Patch>& patches, const bc_pose* given, const SubSteps& steps,
-                     double slow) {
-    double least = rest_time, limit = slow * slow, calm = calm_share * calm_share * limit;
+                     const std::vector<Patch>& patches, const bc_pose* given, const SubSteps& steps) {
+    double least = rest_time, limit = rest_speed * rest_speed,
+           calm = calm_share * calm_share * limit;
     bool is_slow = island.block < island.block_end, is_calm = true;
     for (size_t k = island.body; is_slow && k < island.body_end; ++k) {
       Moving& moving = islands.moving[k];
@@ -330,7 +332,7 @@ class Rest {
     });
     if (least < rest_time) return false;
     if (is_calm && is_held(island, islands, patches, steps) &&
-        have_stayed(island, islands, bodies, given, steps.dt, slow))
+        have_stayed(island, islands, bodies, given, steps.dt, limit))
       return true;
     each_free(island, islands,
               [&](const Moving& moving) { of_[size_t(moving.body)].slow_time = 0.0; });

@@ -29,17 +29,17 @@ inline double speed_squared(const Body& body, const Moving& moving) {
                   speed_squared(body, moving.placed, {moving.linear, moving.angular}));
 }
 
-// Whether all bodies of an island were slow on the mean of an advance: what slid, or fell, and stopped within
+// Whether the mean speeds of an advance have squares below a limit, of all bodies of an island: what slid, or fell, and stopped within
 // it does not rest where it was given.
 inline bool have_stayed(const Island& island, Islands& islands, const std::vector<Body>& bodies,
-                        const bc_pose* given, double dt, double slow) {
+                        const bc_pose* given, double dt, double limit) {
   bool all_have = true;
   each_free(island, islands, [&](const Moving& moving) {
     const Body& body = bodies[size_t(moving.body)];
     Placed from = placed_at(given[moving.body], body.centre);
     double rate = 1.0 / dt;
     Motion mean{rate * (moving.placed.position - from.position), rate * turn(from, moving.placed)};
-    all_have = all_have && speed_squared(body, moving.placed, mean) < slow * slow;
+    all_have = all_have && speed_squared(body, moving.placed, mean) < limit;
   });
   return all_have;
 }

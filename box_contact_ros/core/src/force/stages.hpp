@@ -41,7 +41,7 @@ class Stages {
     forget_changes(work);
     each(work, [&](G& group) { prepare(work, group); });
     each(work, [&](G& group) { warm_start(work, group); });
-    iterate_all(work, work.iterations, true);
+    iterate_all(work, iterations, true);
     if (work.counts) each(work, [&](G& group) { count(work, group); });
   }
   // Move bodies by their velocities.
@@ -68,10 +68,8 @@ class Stages {
   static void relax(void* all) {
     const Work& work = work_of(all);
     forget_changes(work);
-    if (work.relaxations > 0) {
-      each(work, [&](G& group) { follow(work, group); });
-      iterate_all(work, work.relaxations, false);
-    }
+    each(work, [&](G& group) { follow(work, group); });
+    iterate_all(work, relaxations, false);
     if (work.counts && !work.is_last) each(work, [&](G& group) { count(work, group); });
     each(work, [&](G& group) { store(work.steps, group); });
   }
@@ -131,8 +129,8 @@ class Stages {
       force::forget_changes(*island, work.moving);
   }
 
-  static void iterate_all(const Work& work, int iterations, bool is_pushing) {
-    iterations *= work.steps.rounds;
+  static void iterate_all(const Work& work, int count, bool is_pushing) {
+    count *= work.steps.rounds;
     auto solve_all = [&](int iteration, bool is_beyond) {
       bool is_changed = false;
       each(work, [&](G& group) {
@@ -143,7 +141,7 @@ class Stages {
     auto scale_it = [&](const Island& island, int iteration) {
       scale_one(work, island, is_pushing, iteration);
     };
-    iterate(work.first, work.last, iterations, work.moving, solve_all, scale_it);
+    iterate(work.first, work.last, count, work.moving, solve_all, scale_it);
   }
   // Its blocks are in all groups, so they come out for it.
   static void scale_one(const Work& work, const Island& island, bool is_pushing, int iteration) {

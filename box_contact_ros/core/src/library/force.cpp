@@ -101,8 +101,8 @@ bc_status bc_patch_forces_create(const bc_body* bodies, int64_t count,
     const Kernel* kernel = chosen_kernel();
     *forces = handle(
         new Handled{PatchForces(std::move(read),
-                                {all.substeps, all.iterations, all.relaxations, all.threads,
-                                 all.friction, all.most_depth, all.rest ? all.rest_speed : 0.0},
+                                {all.substeps, all.threads, all.friction, all.most_depth,
+                                 all.rest != 0},
                                 kernel ? &kernel->side : nullptr)});
     return BC_OK;
   });

@@ -124,25 +124,15 @@ inline bc_status check_row(const bc_patches& answer, size_t k, const PatchForces
 }
 
 inline bc_status check_options(const bc_force_options& all) {
-  struct Count {
-    const char* field;
-    int least, count;
-  };
-  for (auto [field, least, count] :
-       {Count{"substeps", 1, all.substeps}, Count{"iterations", 1, all.iterations},
-        Count{"relaxations", 0, all.relaxations}})
-    if (count < least || count > force::iterations_max)
-      return fail(BC_BAD_ARGUMENT, "%s must be within %d and %d, not %d", field, least,
-                  force::iterations_max, count);
+  if (all.substeps < 1 || all.substeps > force::substeps_max)
+    return fail(BC_BAD_ARGUMENT, "substeps must be within 1 and %d, not %d", force::substeps_max,
+                all.substeps);
   if (all.threads < 1 || all.threads > threads_max)
     return fail(BC_BAD_ARGUMENT, "threads must be within 1 and %d, not %d", threads_max,
                 all.threads);
   if (!(all.most_depth > 0.0 && all.most_depth <= length_max))
     return fail(BC_BAD_ARGUMENT, "most_depth must be above 0 and at most 1e50 m, not %g",
                 all.most_depth);
-  if (!(all.rest_speed >= 0.0 && all.rest_speed <= force::speed_max))
-    return fail(BC_BAD_ARGUMENT, "rest_speed must be within 0 and 1e50 m/s, not %g",
-                all.rest_speed);
   if (!force::is_amount(all.friction))
     return fail(BC_BAD_ARGUMENT, "friction must be within 0 and 1e50, not %g", all.friction);
   return BC_OK;
