@@ -34,7 +34,8 @@ int main(int count, char** arguments) {
   }
   if (!(asked == "contact" && count == 7) && !(asked == "distance" && count == 6))
     fail(
-        "usage: native contact POSES ROUNDS CALLS ANSWERS NETWORKS | distance POSES ROUNDS CALLS ANSWERS | "
+        "usage: native contact POSES ROUNDS CALLS ANSWERS NETWORKS | distance POSES ROUNDS CALLS "
+        "ANSWERS | "
         "each POSES PASSES");
   Query query = asked == "contact" ? Query::contact : Query::distance;
   Poses poses(arguments[2]);

@@ -34,7 +34,8 @@ bc_rows rows_of(const Poses& poses) {
           poses.size_b.data(), n, n, nullptr};
 }
 
-void add_contacts(const Poses& poses, size_t calls, bc_model model, bc_patch patch, Contestants& all) {
+void add_contacts(const Poses& poses, size_t calls, bc_model model, bc_patch patch,
+                  Contestants& all) {
   bc_query query = bc_default_query();
   query.model = model;
   query.patch = patch;
@@ -84,9 +85,9 @@ void add_distances(const Poses& poses, size_t calls, Contestants& all) {
   auto batch = [&poses, &found](size_t) {
     // distance: bc_distance_rows
     bc_rows rows = rows_of(poses);
-    bc_nearest_results results = {sizeof results,       nullptr,
+    bc_nearest_results results = {sizeof results,        nullptr,
                                   found.distance.data(), found.normal.data(),
-                                  found.point_a.data(), found.point_b.data()};
+                                  found.point_a.data(),  found.point_b.data()};
     bc_distance_rows(&rows, &results, 1, nullptr);
     // end of call
   };
