@@ -438,7 +438,6 @@ LIMITS = {
         f'{constant("force/iterations.hpp", "impact_acceleration")} m/s²·sub-step, up to '
         f'{constant("force/iterations.hpp", "impact_iterations")} times',
         f'no more than {constant("force/gaps.hpp", "gap_share")}·g·dt²',
-        f'apart by {1e3 * float(constant("force/gaps.hpp", "pressed_gap")):g} mm',
         f'the frequency {SOFT}/window', f'{float(SOFT) ** -2:.1f}·g·h² deep',
         f'the frequency is {LATE}/T', f'g·T²/{float(LATE) ** 2}',
         f'faster than {constant(FORCES, "push_out_limit")} m/s',

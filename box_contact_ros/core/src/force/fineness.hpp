@@ -24,6 +24,12 @@ namespace box_contact::BOX_CONTACT_SET::force {
 // pile does not pay five times as much for one patch. Where masses are uneven it jumps: else of landed pallets of
 // 0.2 to 100 kg three times as many still move after 6 s.
 constexpr double least_push = 600.0;
+// Masses that differ by this factor or more are uneven [1].
+constexpr double uneven_masses = 10.0;
+inline bool are_uneven(double inverse_mass_a, double inverse_mass_b) {
+  double least = min(inverse_mass_a, inverse_mass_b), most = max(inverse_mass_a, inverse_mass_b);
+  return least > 0.0 && most >= uneven_masses * least;
+}
 // Which part of the depth that is wanted is aimed at [1]: what moves presses more than what rests, and the
 // depths of a stack add up.
 constexpr double aimed_depth = 0.36;
@@ -110,6 +116,7 @@ class FinenessOf {
       lightest = std::max(lightest, bodies_[body].inverse_mass);
     });
     double weight = length(total), push = 0.0;
+    bool is_uneven = false;
     bool may_be_heavy = weight * 2.0 * lightest > least_push;
     if (may_be_heavy) add_loads(island, (-1.0 / weight) * total);
     for (size_t k = island.block; k < island.block_end; ++k) {
@@ -117,13 +124,14 @@ class FinenessOf {
       double above = may_be_heavy ? blocks_[k].load : 0.0;
       patch.lasting =
           std::min(patch.force, std::max(patch.lasting, above) * (1.0 + steps.dt / lasting_time));
-      double closing =
-          moving_[size_t(blocks_[k].a)].inverse_mass + moving_[size_t(blocks_[k].b)].inverse_mass;
-      push = std::max(push, std::max(patch.lasting, above) * closing);
+      double of_a = moving_[size_t(blocks_[k].a)].inverse_mass,
+             of_b = moving_[size_t(blocks_[k].b)].inverse_mass;
+      is_uneven = is_uneven || are_uneven(of_a, of_b);
+      push = std::max(push, std::max(patch.lasting, above) * (of_a + of_b));
     }
     double ratio = steps.window * std::sqrt(push / (aimed_depth * most_depth_)) / soft_frequency;
     double beyond = push / least_push;
-    return island.is_uneven && beyond > 1.0 ? std::ceil(ratio) : std::min(ratio, beyond);
+    return is_uneven && beyond > 1.0 ? std::ceil(ratio) : std::min(ratio, beyond);
   }
 
   // Weights from the top: each body hands what it bears to its patches below, in equal parts.

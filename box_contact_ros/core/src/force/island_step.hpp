@@ -109,7 +109,6 @@ class IslandStep {
   }
   void begin_blocks(Island& island) const {
     island.is_new = true;
-    island.is_uneven = false;
     island.fastest = 0.0;
     island.over_relaxation =
         step_.steps.is_late ? 1.0 : over_relaxation(island.block_end - island.block);
@@ -118,13 +117,12 @@ class IslandStep {
       island.fastest = std::max(island.fastest, passing_speed(patch, a, b));
       block.normal_sum = block.friction_sum = {};
       island.is_new = island.is_new && patch.window == 0.0;
-      island.is_uneven = island.is_uneven || is_uneven(a.inverse_mass, b.inverse_mass);
     });
   }
   // Choose how fine its sub-steps are, and how many iterations they take.
   void choose(Island& island) const {
     double swayed = fineness_of_.swayed(island, island.fastest, step_.steps.dt, fineness_);
-    island.rounds = step_.steps.is_late ? 1 : rounds_of(swayed, island.is_uneven);
+    island.rounds = step_.steps.is_late ? 1 : rounds_of(swayed);
     island.factor = step_.own ? fineness_of_(island, step_.steps, fineness_) : 1.0;
   }
   // Advance the islands whose sub-steps are finer by a factor, and that take so many times the iterations.

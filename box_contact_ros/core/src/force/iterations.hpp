@@ -18,13 +18,10 @@ constexpr int iterations = 4, relaxations = 2;
 // 20 sways for 3 s at 4 ms; with 1e-6 it sways for 8 s.
 constexpr double least_change = 1e-8;
 
-// An impact goes on being solved while an iteration changes a closing speed by more than this [m/s], and by
-// more than this share of its island's largest [1]. It ends after so many iterations. What is left of a
-// closing speed comes back as an overlap that is pushed out.
+// An impact goes on being solved while an iteration changes a closing speed by more than this [m/s]. It ends
+// after so many iterations. What is left of a closing speed comes back as an overlap that is pushed out.
 constexpr double impact_change = 0.01;
-constexpr double impact_share = 0.2;
 constexpr int impact_iterations = 40;
-constexpr int uneven_impact_iterations = 100;  // with 40, 24 t on four timbers rest a sixth deeper
 // In an island that had patches before, the change must also exceed this acceleration times the sub-step
 // [m/s²]. In 1/240 s, the loads of what rolls in a pile change by 0.01 m/s all the time, and are no impact. A
 // pile of 1,000 at 1/60 s takes a third of the time that it takes with 0, and timbers below 24 t rest earlier.
@@ -48,22 +45,14 @@ inline double over_relaxation(size_t blocks) {
   return 1.0 + (most_over_relaxation - 1.0) * (1.0 - 1.0 / double(blocks));
 }
 
-// In some islands impulses take more iterations to agree. They have so many times as many, but not with late
-// answers, whose patches are soft:
+// Where stacks sway, impulses take more iterations to agree: so many times as many, but not with late answers,
+// whose patches are soft. The fastest of the bodies that touch pass each other at a speed in this range [m/s].
+// Slower, they rest; faster, they fall or slide. Of 60 landings of real pallets of like masses, at 1/60 s and
+// at 4 ms, all rest within 6 s; without it, 18 still move. What does not sway yet begins at a higher speed.
+// Fewer iterations end at impulses that differ a little: where sway ends at 1e-5 m/s, 15 still move.
+// A flush wall that begins is pushed out, which these iterations do not speed up: they are a third of its
+// first second's work. But by a rule that spares it, 42 of 162 scenes and timings rest later.
 constexpr int more_rounds = 3;
-// - Where bodies touch whose masses differ by this factor or more [1]. At 1/60 s, 24 t that fall on four
-//   timbers press 55 mm into them; without it, 64 mm.
-constexpr double uneven_masses = 10.0;
-inline bool is_uneven(double inverse_mass_a, double inverse_mass_b) {
-  double least = min(inverse_mass_a, inverse_mass_b), most = max(inverse_mass_a, inverse_mass_b);
-  return least > 0.0 && most >= uneven_masses * least;
-}
-// - Where stacks sway: the fastest of the bodies that touch pass each other at a speed in this range [m/s].
-//   Slower, they rest; faster, they fall or slide. Of 60 landings of real pallets of like masses, at 1/60 s and
-//   at 4 ms, all rest within 6 s; without it, 18 still move. What does not sway yet begins at a higher speed.
-//   Fewer iterations end at impulses that differ a little: where sway ends at 1e-5 m/s, 15 still move.
-//   A flush wall that begins is pushed out, which these iterations do not speed up: they are a third of its
-//   first second's work. But by a rule that spares it, 42 of 162 scenes and timings rest later.
 constexpr double least_sway = 1e-7, begun_sway = 1e-4, most_sway = 0.1;
 inline bool is_sway(double speed, bool has_swayed) {
   return speed > (has_swayed ? least_sway : begun_sway) && speed < most_sway;
@@ -74,8 +63,8 @@ inline bool is_sway(double speed, bool has_swayed) {
 constexpr double sway_time = 0.5;
 constexpr int most_rounds = 12;
 // How many times as many iterations an island takes that has swayed for a time [s]; 0: it does not sway.
-inline int rounds_of(double swayed, bool is_uneven) {
-  if (swayed == 0.0) return is_uneven ? more_rounds : 1;
+inline int rounds_of(double swayed) {
+  if (swayed == 0.0) return 1;
   constexpr int most_times = most_rounds / more_rounds;
   return more_rounds * int(min(1.0 + swayed / sway_time, double(most_times)));
 }
@@ -94,7 +83,6 @@ struct Island {
   double over_relaxation;  // see above
   double fastest;  // as which its bodies pass each other at the start of an advance [m/s]
   bool is_new;     // whether it had no patch before this advance
-  bool is_uneven;  // whether bodies touch whose masses are
   int rounds;      // how many times as many iterations it takes
   double factor;   // by which its sub-steps are finer; 0: its advance is over
   bool is_shared;  // whether it is advanced with others
@@ -159,8 +147,7 @@ void iterate(Island* first, Island* last, int count, Moving* moving, const Solve
     if (!solve(iteration, iteration > 1 && iteration >= count)) return;
     bool goes_on = iteration < count;
     for (Island* island = first; island < last; ++island) {
-      int most = island->is_uneven ? uneven_impact_iterations : impact_iterations;
-      if (!island->is_struck || iteration >= most) {
+      if (!island->is_struck || iteration >= impact_iterations) {
         if (iteration >= count) forget_changes(*island, moving);  // it is not solved again
         continue;
       }

@@ -41,8 +41,6 @@ inline void prepare(const Work& work, Block& block) {
   Moving &a = work.moving[block.a], &b = work.moving[block.b];
   auto turned = [&] { return turned_since(work.patches[block.patch], a, b); };
   prepare<double>(work.steps, a, b, a, b, turned, block);
-  Island& island = *work.first;
-  island.impact = max(island.impact, impact_share * closing_speed<double>(block, a, b));
 }
 inline void warm_start(const Work& work, Block& block) {
   warm_start<double>(work.steps, block, work.moving[block.a], work.moving[block.b]);

@@ -157,7 +157,7 @@ class PatchForces {
       own_.choose(rest_.is_any(),
                   [this](size_t box) { return rest_.is_quiet(size_t(body_of(int64_t(box)))); });
     is_chosen_ = true;
-    long refused = own_.solve(poses, Gaps(bodies_, boxes(), patches_, dt, outside), solve);
+    long refused = own_.solve(poses, Gaps(bodies_, boxes(), dt, outside), solve);
     if (refused < 0) held = take(own_.answer(), poses, true, in_threads);
     return refused;
   }

@@ -132,10 +132,6 @@ template <class T>
     return all;
   };
   prepare<T>(work.steps, a, b, at_a, at_b, turned, group);
-  T impact = impact_share * closing_speed<T>(group, a, b);
-  if (!any(impact > impact_change)) return;
-  for (int i = 0; i < width<T>; ++i)
-    group.island[i]->impact = max(group.island[i]->impact, lane(impact, i));
 }
 
 template <class T>
