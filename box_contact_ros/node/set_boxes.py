@@ -4,7 +4,6 @@
 """The service ~/set_boxes: boxes that come, go, land or are lifted while the node runs."""
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,12 +12,9 @@ from box_contact_msgs.srv import SetBoxes
 from ..scene.changes import MOST_BOXES
 from ..scene.scene import Box, Scene, SceneError
 from ..scene.scene_solver import SceneSolver
-from ..solver.checks import nearest_name, short_repr
+from ..solver.checks import name_fault, nearest_name, short_repr
 from .messages import check_frame, pose_of, size_of
 from .paced_service import Kind
-
-NAME = re.compile('[A-Za-z_][A-Za-z0-9_]*')
-"""Of a box, as msg_schemas/scene.json has it."""
 
 
 def changed(solver: SceneSolver, request: SetBoxes.Request) -> SceneSolver:
@@ -47,8 +43,8 @@ def _boxes(scene: Scene, boxes: Sequence[Any], field: str) -> dict[str, Box]:
         try:
             if name in found:
                 raise SceneError((), f'is the name of {field}[{list(found).index(name)}], too')
-            if not known and not NAME.fullmatch(name):
-                raise SceneError((), 'is no name of letters, digits and _')
+            if not known and (fault := name_fault(name, token=True)):
+                raise SceneError((), fault)
             if not known and not any(size):
                 raise SceneError((), 'has no size, and is no box of the scene'
                                      f'{nearest_name(name, scene.boxes)}')

@@ -139,7 +139,7 @@ class SceneCheck:
         resized: dict[int, Row] = {}  # sizes by row, where they differ from those before
         for number, (name, pose, size) in enumerate(zip(names, poses, sizes)):
             if fault := name_fault(name):
-                raise ValueError(f'boxes[{number}].name: {fault}')
+                raise ValueError(f'boxes[{number}].name: {short_repr(name)} {fault}')
             if name in rows:
                 raise ValueError(f'boxes[{number}]: {short_repr(name)} is the name of '
                                  f'boxes[{names.index(name)}], too')

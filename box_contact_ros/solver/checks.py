@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import numbers
+import re
 import reprlib
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
@@ -25,6 +26,8 @@ SHOWN = 200  # characters of a refused value that an error shows
 MOST_NAME_BYTES = 255
 """Of the name of a box or pair, and of a frame_id, in UTF-8; ROS's own names have no more. A
 response may repeat a name thousands of times."""
+TOKEN = re.compile('[A-Za-z_][A-Za-z0-9_]*')
+"""Of a topic's name: the name of a box or body."""
 _REPR = reprlib.Repr()
 _REPR.maxlist = _REPR.maxtuple = 8  # a pose, and whether there is more
 _REPR.maxlevel = 3
@@ -50,12 +53,15 @@ def nearest_name(name: object, known: Iterable[str]) -> str:
     return nearest and f' (did you mean {spelled[nearest]}?)'
 
 
-def name_fault(name: str) -> str | None:
-    """Return why a text is too long to be a name or a frame_id, or None."""
+def name_fault(name: str, *, token: bool = False) -> str | None:
+    """Return what follows a text that is no name or frame_id, as to why; or None.
+
+    token: names are letters, digits and _, as those of boxes in msg_schemas/scene.json.
+    """
+    if token and not TOKEN.fullmatch(name):
+        return 'is no name of letters, digits and _'
     size = len(name.encode(errors='surrogatepass'))
-    if size <= MOST_NAME_BYTES:
-        return None
-    return f'{short_repr(name)} has {size} bytes, more than {MOST_NAME_BYTES}'
+    return f'has {size} bytes, more than {MOST_NAME_BYTES}' if size > MOST_NAME_BYTES else None
 
 
 _POSITION, _QUATERNION = ('position ({0:g}, {1:g}, {2:g})',
@@ -110,11 +116,11 @@ def as_number(value: Any, name: str) -> float:
     raise ValueError(f'{name} must be a number, not {short_repr(value)}')
 
 
-def as_margin(value: Any) -> float:
-    """Return the separation up to which pairs apart are listed [m]; ValueError for no length."""
-    margin = as_number(value, 'margin')
+def as_margin(value: Any, name: str = 'margin') -> float:
+    """Return the separation up to which pairs apart count [m]; ValueError for no length."""
+    margin = as_number(value, name)
     if not 0.0 <= margin <= LENGTH_MAX:
-        raise ValueError(f'margin must lie within 0 and {LENGTH_MAX:g} m, not {margin:g}')
+        raise ValueError(f'{name} must lie within 0 and {LENGTH_MAX:g} m, not {margin:g}')
     return margin
 
 
