@@ -15,7 +15,6 @@ from .solver.nearest import Nearest, Nearests
 
 if TYPE_CHECKING:
     from .forces.patch_forces import Body, PatchForces
-    from .forces.support import support
     from .models.make_model import make_model
     from .node.contact_node import ContactNode as ContactNode  # noqa: F401
     from .plans.inspect_plan import inspect_plan
@@ -30,12 +29,11 @@ if TYPE_CHECKING:
 __all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Frame', 'Nearest', 'Nearests',
            'Pair', 'PatchForces', 'Plan', 'ReadContacts', 'Scene', 'SceneSolver', 'contacts_of',
            'inspect_plan', 'make_model', 'patch_area', 'patch_areas', 'read_contacts', 'read_plan',
-           'read_scene', 'support']
+           'read_scene']
 # `ContactNode` needs ROS, and `import *` does without.
 
 _LOADED_WHEN_USED = {
     'forces.patch_forces': ('Body', 'PatchForces'),
-    'forces.support': ('support',),
     'models.make_model': ('make_model',),
     'node.contact_node': ('ContactNode',),
     'plans.inspect_plan': ('inspect_plan',),

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from ..core import native
 from ..extras import require
-from ..forces.support import across_of, base_areas, deepest, hull_margins, standing
 from ..solver.checks import as_floats, as_number, short_repr
 from ..solver.contacts_of import contacts_of
 from ..solver.faces import TOLERANCE, FacePatches, as_tolerance, corner_shares, face_patches
@@ -19,6 +18,7 @@ from ..solver.pose import rotation_matrix
 from .bearings import NEGLIGIBLE, Bearings, on_corners, on_faces
 from .inspection import Inspection
 from .plan import Plan
+from .standing import across_of, base_areas, deepest, hull_margins, standing
 from .statics import Beds, Bodies, Rest, settle
 
 BESIDE = np.sqrt(0.5)
@@ -101,7 +101,7 @@ def _meetings(plan: Plan, tolerance: float, felt: np.ndarray, sides: bool, by_co
     slope = contacts.normal @ up
     normal = np.where(slope[:, None] > 0.0, contacts.normal, -contacts.normal)
     pairs = np.where(slope[:, None] > 0.0, pairs, pairs[:, ::-1])
-    patches = face_patches(plan.sizes, plan.poses, pairs, normal, tolerance)
+    patches = face_patches(plan.sizes, plan.poses, pairs, normal, tolerance=tolerance)
     on_top = np.abs(slope) >= BESIDE
     # Boxes beside each other may overlap by the tolerance: a strip that wide carries nothing.
     bear = np.flatnonzero((patches.width > tolerance) & (on_top | sides))

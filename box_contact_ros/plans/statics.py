@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from ..core import native
-from ..forces.support import hull_margins
+from .standing import hull_margins
 
 FALLS = 1e-5
 """Missing part of its weight from which a body falls [1]: above what the solver leaves."""

@@ -29,7 +29,6 @@ from box_contact_ros import (
     patch_area,
     patch_areas,
     read_scene,
-    support,
 )
 
 UNIT = (1.0, 1.0, 1.0)
@@ -217,16 +216,6 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: contacts_of(UNIT, POSES, margin=np.nan), 'margin', 'nan'),
     (lambda: contacts_of(UNIT, POSES, margin='1'), 'margin', "'1'"),
     (lambda: contacts_of(UNIT, POSES, threads=0), 'threads', '0'),
-    (lambda: support(UNIT, POSES, [(0, 1)], None), 'contacts', 'None'),
-    (lambda: support(UNIT, POSES, [], CONTACTS), 'contacts', '0 pairs'),
-    (lambda: support(UNIT, POSES, [(0, 2)], CONTACTS), 'pairs[0]', '(0, 2)'),
-    (lambda: support(UNIT, POSES * 0, [(0, 1)], CONTACTS), 'poses[0]', 'w=0'),
-    (lambda: support([UNIT, (1, INF, 1)], POSES, [(0, 1)], CONTACTS), 'sizes[1]', '(1, inf, 1)'),
-    (lambda: support(UNIT, POSES, [(0, 1)], CONTACTS, ground=2), 'ground', '2'),
-    (lambda: support(UNIT, POSES, [(0, 1)], CONTACTS, ground=['a']), 'ground', "'a'"),
-    (lambda: support(UNIT, POSES, [(0, 1)], CONTACTS, up=(0, 0, 0)), 'up', '(0, 0, 0)'),
-    (lambda: support(UNIT, POSES, [(0, 1), (1, 0)], CONTACTS[[0, 0]]), 'pairs', '(0, 1)'),
-    (lambda: support(UNIT, POSES, [(0, 1)], CONTACTS, up=(0, NAN, 0)), 'up', '(0, nan, 0)'),
     (lambda: read_scene(5), 'path', '5'),
     (lambda: read_scene('no.yaml'), 'scene', "'no.yaml'"),
     (lambda: read_scene('a\0b'), 'path', "'a\\x00b'"),
