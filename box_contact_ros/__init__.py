@@ -24,12 +24,13 @@ if TYPE_CHECKING:
     from .scene.scene_file import read_scene
     from .scene.scene_solver import SceneSolver
     from .solver.contacts_of import contacts_of
+    from .solver.faces import FacePatches, face_patches
     from .stream.read_contacts import ReadContacts, read_contacts
 
-__all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Frame', 'Nearest', 'Nearests',
-           'Pair', 'PatchForces', 'Plan', 'ReadContacts', 'Scene', 'SceneSolver', 'contacts_of',
-           'inspect_plan', 'make_model', 'patch_area', 'patch_areas', 'read_contacts', 'read_plan',
-           'read_scene']
+__all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'FacePatches', 'Frame', 'Nearest',
+           'Nearests', 'Pair', 'PatchForces', 'Plan', 'ReadContacts', 'Scene', 'SceneSolver',
+           'contacts_of', 'face_patches', 'inspect_plan', 'make_model', 'patch_area', 'patch_areas',
+           'read_contacts', 'read_plan', 'read_scene']
 # `ContactNode` needs ROS, and `import *` does without.
 
 _LOADED_WHEN_USED = {
@@ -43,6 +44,7 @@ _LOADED_WHEN_USED = {
     'scene.scene': ('Box', 'Frame', 'Pair', 'Scene'),
     'scene.scene_solver': ('SceneSolver',),
     'solver.contacts_of': ('contacts_of',),
+    'solver.faces': ('FacePatches', 'face_patches'),
     'stream.read_contacts': ('ReadContacts', 'read_contacts'),
 }
 

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..core import native
-from .checks import as_number
+from .checks import as_boxes, as_floats, as_margin, as_number, as_places
 
 TOLERANCE = 1e-4
 """Gap up to which faces touch [m]: that of a simulation at rest."""
@@ -57,13 +58,23 @@ class FacePatches:
                            self.centre[rows], self.rectangle[rows])
 
 
-def face_patches(sizes: np.ndarray, poses: np.ndarray, pairs: np.ndarray, normal: np.ndarray,
-                 tolerance: float) -> FacePatches:
-    """Return the patches of pairs (k, 2) with normals (k, 3) from A to B.
+def face_patches(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike, normal: ArrayLike, *,
+                 tolerance: float = TOLERANCE) -> FacePatches:
+    """Return the patches of the faces by which pairs of boxes meet.
 
-    sizes: (n, 3). poses: (n, 7). tolerance: the largest gap within a patch [m].
+    sizes: full extents (n, 3), or (3,) of all boxes [m]. poses: (n, 7) in a common frame.
+    pairs: (k, 2), boxes A and B by index.
+    normal: (k, 3) unit vectors from A to B, as `normal` of the pairs' contacts.
+    tolerance: the largest gap of two faces within their patch [m].
+
+    Raises ValueError, with the field and the value, for bad input.
     """
-    return FacePatches(*native.face_patches(sizes, poses, pairs, normal, tolerance))
+    sizes, poses = as_boxes(sizes, poses)
+    rows = as_places(pairs, 'pairs', len(poses))
+    count = len(rows)
+    normals = as_floats(normal, 'normal', f'unit vectors ({count}, 3)', (count, 3))
+    return FacePatches(*native.face_patches(sizes, poses, rows, normals,
+                                            as_margin(tolerance, 'tolerance')))
 
 
 def corner_shares(rectangle: np.ndarray, at: np.ndarray) -> np.ndarray:

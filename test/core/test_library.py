@@ -27,7 +27,7 @@ import pytest
 from patience import PATIENCE
 from poses import Pairs, assert_same_bits, fields
 
-from box_contact_ros import Body, ContactSolver, PatchForces, make_model
+from box_contact_ros import Body, ContactSolver, PatchForces, face_patches, make_model
 from box_contact_ros.core import FORCE, instruction_sets
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.pose import rotation_matrix
@@ -354,6 +354,44 @@ def test_distances_in_cpp(tmp_path: Path) -> None:
     assert run(tmp_path / 'distances') == (
         '3.60555 0.5 0.83205 0\n-1 3.60555 1 0\n'
         'pose_b quaternion (0, 0, 0, 0) has no length within 1e-100 to 1e100\n')
+
+
+class Polygon(ctypes.Structure):
+    """`bc_polygon`."""
+
+    _fields_ = [('size', c_size_t), ('count', c_int32), ('corners', 9 * (3 * c_double)),
+                ('area', c_double), ('centre', 3 * c_double)]
+
+
+def test_patches_of_faces_have_the_bits_of_python(library: ctypes.CDLL, tmp_path: Path) -> None:
+    """In C, by ctypes, and in C++, without memory: containers, tilted by nothing and by degrees."""
+    pairs = poses.joined(poses.near_parallel_pairs(np.random.default_rng(5), 500), some_pairs())
+    found = ContactSolver(model='exact').batch(*pairs[:2], size_a=pairs.size_a, size_b=pairs.size_b)
+    pairs, normal = Pairs(*(part[found.colliding] for part in pairs)), found.normal[found.colliding]
+    count = len(normal)
+    rows = np.column_stack((np.arange(count), count + np.arange(count)))
+    wanted = face_patches(np.concatenate(pairs[2:]), np.concatenate(pairs[:2]), rows, normal)
+    assert {0, 3, 4, 5, 6, 7} <= set(wanted.corner_count.tolist())
+    want = np.column_stack((wanted.corner_count, wanted.area, wanted.centre,
+                            wanted.polygon.reshape(-1, 27)))
+
+    given = np.column_stack((*pairs, normal))
+    patch = Polygon(ctypes.sizeof(Polygon))
+    for pair, row in zip(given, want):
+        a, b = (pair[[*range(7 * k, 7 * k + 7), *range(14 + 3 * k, 17 + 3 * k)]] for k in (0, 1))
+        pointers = [array.ctypes.data_as(POINTER(c_double)) for array in (a, b, pair[20:].copy())]
+        assert library.bc_face_patch(*pointers, c_double(1e-4), byref(patch)) == 0
+        assert np.array_equal(row, [patch.count, patch.area, *patch.centre,
+                                    *np.ravel(patch.corners)], equal_nan=True)
+
+    program = tmp_path / 'face_patch_test'
+    run(tool('g++'), '-std=c++17', '-O2', *STRICT, INCLUDES,
+        ROOT / 'test/core/face_patch_test.cpp', *LINKED, '-o', program)
+    (tmp_path / 'pairs').write_text('\n'.join(' '.join(map(float.hex, row)) for row in given))
+    *lines, allocated = run(program, tmp_path / 'pairs').splitlines()
+    assert allocated == '0 allocations'
+    assert np.array_equal(want, [[float.fromhex(word) for word in line.split()] for line in lines],
+                          equal_nan=True)
 
 
 def test_a_debug_build_is_as_fast(tmp_path: Path) -> None:

@@ -25,13 +25,14 @@ from box_contact_ros import (
     Scene,
     SceneSolver,
     contacts_of,
+    face_patches,
     make_model,
     patch_area,
     patch_areas,
     read_scene,
 )
 
-UNIT = (1.0, 1.0, 1.0)
+UNIT, NORMAL = (1.0, 1.0, 1.0), (0.0, 0.0, 1.0)
 POSE = np.array([0.0, 0, 0, 0, 0, 0, 1])
 POSES, STILL = np.tile(POSE, (2, 1)), np.zeros((2, 6))
 SOLVER = ContactSolver(UNIT, UNIT)
@@ -216,6 +217,14 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: contacts_of(UNIT, POSES, margin=np.nan), 'margin', 'nan'),
     (lambda: contacts_of(UNIT, POSES, margin='1'), 'margin', "'1'"),
     (lambda: contacts_of(UNIT, POSES, threads=0), 'threads', '0'),
+    (lambda: face_patches(UNIT, POSES * 0, [(0, 1)], [NORMAL]), 'poses[0]', 'w=0'),
+    (lambda: face_patches((1, INF, 1), POSES, [(0, 1)], [NORMAL]), 'sizes', '(1, inf, 1)'),
+    (lambda: face_patches(UNIT, POSES, [(0, 2)], [NORMAL]), 'pairs[0]', '(0, 2)'),
+    (lambda: face_patches(UNIT, POSES, [(0, 1)], NORMAL), 'normal', '(3,)'),
+    (lambda: face_patches(UNIT, POSES, [(0, 1)] * 2, [NORMAL, UNIT]), 'normal[1]', '[1.0, 1.0, 1.0]'),
+    (lambda: face_patches(UNIT, POSES, [(0, 1)], [(0, 0, NAN)]), 'normal[0]', 'nan'),
+    (lambda: face_patches(UNIT, POSES, [(0, 1)], [NORMAL], tolerance=-1), 'tolerance', '-1'),
+    (lambda: face_patches(UNIT, POSES, [(0, 1)], [NORMAL], tolerance=NAN), 'tolerance', 'nan'),
     (lambda: read_scene(5), 'path', '5'),
     (lambda: read_scene('no.yaml'), 'scene', "'no.yaml'"),
     (lambda: read_scene('a\0b'), 'path', "'a\\x00b'"),

@@ -13,6 +13,16 @@
 
 namespace box_contact::binding {
 
+inline void check_normals(const Array<double>& normal) {
+  for (npy_intp k = 0; k < normal.length(0); ++k) {
+    if (is_unit(vector_at(normal.numbers + 3 * k))) continue;
+    Owned row(made(PySequence_GetItem(normal.object.get(), k)));
+    Owned numbers(made(PyObject_CallMethod(row.get(), "tolist", nullptr)));
+    PyErr_Format(PyExc_ValueError, "normal[%zd] must be of length 1, not %R", k, numbers.get());
+    throw PythonError{};
+  }
+}
+
 // The rows of `polygon` (count, corners_max, 3): the corners, and the first one again in what is left.
 // Where faces are apart there are none, and places are NaN.
 inline PyObject* face_patches(PyObject*, PyObject* const* args, Py_ssize_t count) {
@@ -26,6 +36,7 @@ inline PyObject* face_patches(PyObject*, PyObject* const* args, Py_ssize_t count
   double tolerance = number_of(args[4], "tolerance");
   if (bad_place(pairs.numbers, n, sizes.length(0)) >= 0)
     fail(PyExc_ValueError, "pairs has a place that no pose has");
+  check_normals(normal);
   constexpr npy_intp corners = faces::Polygon::corners_max;
   auto polygon = make<double>({n, corners, 3}), area = make<double>({n});
   auto corner_count = make<int64_t>({n});
@@ -36,13 +47,12 @@ inline PyObject* face_patches(PyObject*, PyObject* const* args, Py_ssize_t count
     int64_t a = pairs.numbers[2 * k], b = pairs.numbers[2 * k + 1];
     faces::FacePatch patch = faces::patch_of_faces(
         pose[a], size[a], pose[b], size[b], vector_at(normal.numbers + 3 * k), tolerance);
-    area.numbers[k] = patch.area;
-    corner_count.numbers[k] = patch.polygon.count;
-    if (patch.polygon.count == 0) patch.height = std::numeric_limits<double>::quiet_NaN();
-    write(patch.in_common_frame(patch.centroid), centre.numbers + 3 * k);
-    for (int c = 0; c < corners; ++c)
-      write(patch.in_common_frame(patch.polygon[c < patch.polygon.count ? c : 0]),
-            polygon.numbers + 3 * (corners * k + c));
+    bc_polygon found = faces::in_common_frame(patch);
+    area.numbers[k] = found.area;
+    corner_count.numbers[k] = found.count;
+    std::copy_n(found.centre, 3, centre.numbers + 3 * k);
+    std::copy_n(found.corners[0], 3 * corners, polygon.numbers + 3 * corners * k);
+    if (found.count == 0) patch.height = not_a_number;
     auto around = patch.rectangle();
     for (size_t c = 0; c < 4; ++c)
       write(patch.level(around[c]), rectangle.numbers + 3 * (4 * k + npy_intp(c)));

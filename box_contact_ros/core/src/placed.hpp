@@ -12,6 +12,14 @@ namespace box_contact::BOX_CONTACT_SET {
 inline Vec<double> vector_at(const double* numbers) { return {numbers[0], numbers[1], numbers[2]}; }
 inline Vec<double> vector(const double (&numbers)[3]) { return vector_at(numbers); }
 
+// By how much the length of a normal may differ from 1 [1].
+constexpr double normal_slack = 1e-6;
+inline bool is_unit(const Vec<double>& a) {
+  double squared = dot(a, a);
+  return squared >= (1.0 - normal_slack) * (1.0 - normal_slack) &&
+         squared <= (1.0 + normal_slack) * (1.0 + normal_slack);
+}
+
 // A place, and axes as columns; common frame. Of a body, the place is its centre of mass.
 template <class T>
 struct PlacedOf {

@@ -129,6 +129,21 @@ inline FacePatch patch_of_faces(const bc_pose& pose_a, const bc_size& size_a, co
   return patch;
 }
 
+static_assert(Polygon::corners_max == BC_CORNERS_MAX);
+
+// The patch in the common frame. Behind the last corner the first one comes again; without corners, places
+// are NaN.
+inline bc_polygon in_common_frame(FacePatch patch) {
+  bc_polygon polygon{sizeof(bc_polygon), patch.polygon.count, {}, patch.area, {}};
+  if (polygon.count == 0) patch.height = not_a_number;
+  for (int k = 0; k < BC_CORNERS_MAX; ++k) {
+    auto corner = patch.in_common_frame(patch.polygon[k < polygon.count ? k : 0]);
+    std::copy_n(corner.v, 3, polygon.corners[k]);
+  }
+  std::copy_n(patch.in_common_frame(patch.centroid).v, 3, polygon.centre);
+  return polygon;
+}
+
 // The parts of a load at the corners of a rectangle, by its centre at `at`: bilinear, so none is below 0.
 inline std::array<double, 4> corner_shares(const std::array<Point, 4>& rectangle, const Point& at) {
   const Point &high = rectangle[0], &low = rectangle[2];

@@ -24,16 +24,8 @@ constexpr double torsion_share = 0.966;
 // A patch is a square where its variances differ from their mean by less [1].
 constexpr double square_slack = 1e-3;
 
-// By how much the length of a normal may differ from 1 [1].
-constexpr double normal_slack = 1e-6;
 // By how much of its trace an eigenvalue of a covariance may be below zero [1]: rounding.
 constexpr double covariance_slack = 1e-9;
-
-inline bool is_unit(const Vec<double>& a) {
-  double squared = dot(a, a);
-  return squared >= (1.0 - normal_slack) * (1.0 - normal_slack) &&
-         squared <= (1.0 + normal_slack) * (1.0 + normal_slack);
-}
 
 // Whether numbers (3, 3) are symmetric, and have no eigenvalue below zero: by the pivots of Cholesky's
 // decomposition, with the slack on the diagonal.

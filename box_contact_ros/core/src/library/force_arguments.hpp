@@ -88,7 +88,7 @@ inline bc_status check_patch(const bc_patches& answer, size_t k) {
                 k, volume);
   if (bc_status status = check_within("point", k, answer.point + 3 * k, 3, length_max))
     return status;
-  if (!force::is_unit(vector_at(normal)))
+  if (!is_unit(vector_at(normal)))
     return fail(BC_BAD_ARGUMENT, "normal[%zu] (%g, %g, %g) has the length %g, not 1", k, normal[0],
                 normal[1], normal[2], length(vector_at(normal)));
   if (!force::is_covariance(c))

@@ -8,6 +8,7 @@
 #include <iterator>
 #include <string>
 
+#include "../faces/face_patch.hpp"
 #include "../mlp/shipped_network.hpp"
 #include "batch.hpp"
 #include "refusals.hpp"
@@ -156,6 +157,23 @@ PairNumbers pair_of(const bc_box& a, const bc_box& b) {
   return {numbers(&a.pose), numbers(&b.pose), numbers(&a.size), numbers(&b.size)};
 }
 
+bc_status find_face_patch(const bc_box& a, const bc_box& b, const double* normal, double tolerance,
+                          bc_polygon& patch) {
+  auto [pose_a, pose_b, size_a, size_b] = pair_of(a, b);
+  if (!pose_is_valid(pose_a) || !pose_is_valid(pose_b) || !size_is_valid(size_a) ||
+      !size_is_valid(size_b))
+    return refuse_pair(pose_a, pose_b, size_a, size_b);
+  Vec<double> from_a = vector_at(normal);
+  if (!is_unit(from_a))
+    return fail(BC_BAD_ARGUMENT, "normal (%g, %g, %g) must be of length 1", normal[0], normal[1],
+                normal[2]);
+  if (!(tolerance >= 0.0 && tolerance <= length_max))
+    return fail(BC_BAD_ARGUMENT, "tolerance must be within 0 and 1e50 m, not %g", tolerance);
+  patch = faces::in_common_frame(
+      faces::patch_of_faces(a.pose, a.size, b.pose, b.size, from_a, tolerance));
+  return BC_OK;
+}
+
 }  // namespace
 }  // namespace box_contact::detail
 
@@ -238,6 +256,16 @@ bc_status bc_distance_rows(const bc_rows* rows, const bc_nearest_results* result
   });
   if (refused) *refused = first;
   return status;
+}
+
+bc_status bc_face_patch(const bc_box* a, const bc_box* b, const double* normal, double tolerance,
+                        bc_polygon* patch) {
+  return guarded([&] {
+    if (!a || !b || !normal || !patch)
+      return refuse_null(!a ? "a" : !b ? "b" : !normal ? "normal" : "patch");
+    if (patch->size != sizeof(bc_polygon)) return fail(BC_BAD_ABI, "patch.size is unknown");
+    return find_face_patch(*a, *b, normal, tolerance, *patch);
+  });
 }
 
 // e₁·e₂ of the covariance C across the normal n is n·adj(C)·n.
