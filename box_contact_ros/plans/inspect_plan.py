@@ -111,7 +111,7 @@ def _meetings(plan: Plan, tolerance: float, felt: np.ndarray, sides: bool, by_co
         contacts.separation, on_top, pairs[bear], on_top[bear],
         contacts.separation[bear], normal[bear],
         patches, on_corners(plan.sizes, plan.poses, pairs[bear], normal[bear], patches, tolerance,
-                            fixed) if by_corners else on_faces(patches), by_corners)
+                            fixed[plan.body]) if by_corners else on_faces(patches), by_corners)
 
 
 def _bodies(plan: Plan, meet: _Meetings) -> Bodies:

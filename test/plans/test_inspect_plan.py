@@ -167,6 +167,13 @@ def test_containers_bear_on_their_corners():
     assert np.isnan(inspect_plan(plan, bears='corners').pressure[1:3]).all()
 
 
+def test_boxes_of_a_body_bear_on_their_corners():
+    """Four boxes in one body, and a fifth on it: the ground is fixed, and none of these."""
+    plan = plan_of([box(0, 0.5 + k) for k in range(5)], [10] * 5, body=[0, 1, 1, 1, 1, 2])
+    found = inspect_plan(plan, bears='corners')
+    assert found.sound and loads(found) == pytest.approx({(0, 1): 50, (4, 5): 10})
+
+
 def test_pressure_is_the_greatest_below_a_load():
     """N / A in the middle, and N / A · (1 + 6 e / a) off it; then a triangle."""
     for off, factor in ((0.0, 1.0), (0.1, 1.6), (0.3, 2 / (3 * 0.2))):
