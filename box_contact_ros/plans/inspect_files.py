@@ -24,7 +24,6 @@ from ..arguments import program_parser, within
 from ..extras import MissingExtra
 from .inspect_plan import inspect_plan
 from .inspection import Inspection
-from .plan import Plan
 from .read_plan import read_any
 
 SOUND, NOT_SOUND, NOT_READ = 0, 1, 2
@@ -40,10 +39,9 @@ def judged(path: str, options: argparse.Namespace) -> Inspection:
     if options.limit is not None:
         free = np.setdiff1d(np.arange(len(plan)), plan.ground)
         limits[free] = np.minimum(limits[free], options.limit)
-    ground = range(len(plan)) if len(plan) == 1 else plan.ground  # it can touch nothing
-    plan = Plan(plan.sizes, plan.poses, None if options.geometry else plan.masses, ground=ground,
-                names=plan.names, centres=plan.centres, limits=limits, body=plan.body,
-                apart=plan.apart, faults=plan.faults)
+    ground = np.arange(len(plan)) if len(plan) == 1 else plan.ground  # it can touch nothing
+    plan = dataclasses.replace(plan, masses=None if options.geometry else plan.masses,
+                               ground=ground, limits=limits)
     try:
         return inspect_plan(plan, tolerance=options.tolerance, acceleration=options.acceleration,
                             bears=options.bears or bears)

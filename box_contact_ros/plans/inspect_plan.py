@@ -15,7 +15,7 @@ from ..solver.checks import as_floats, as_number, short_repr
 from ..solver.contacts_of import contacts_of
 from ..solver.faces import TOLERANCE, FacePatches, as_tolerance, corner_shares, face_patches
 from ..solver.pose import rotation_matrix
-from .bearings import NEGLIGIBLE, Bearings, on_corners, on_faces
+from .bearings import Bearings, on_corners, on_faces
 from .inspection import Inspection
 from .plan import Plan
 from .standing import across_of, base_areas, deepest, hull_margins, standing
@@ -154,16 +154,13 @@ def _loads(plan: Plan, meet: _Meetings, bodies: Bodies, friction: float) -> _Loa
     require('plans')
     from tqdm import tqdm
 
-    patches, frame, bearings = meet.patches, meet.frame, meet.bearings
+    patches, frame = meet.patches, meet.frame
     sides = patches.rectangle[:, (1, 3)] - patches.rectangle[:, :1]
-    patch, place = np.nonzero(bearings.stiffness > NEGLIGIBLE * patches.area[:, None])
     beds = Beds(
         pairs=plan.body[meet.pairs], carries=meet.carries, normal=meet.normal @ frame.T,
         centre=patches.centre @ frame.T, area=patches.area,
-        radius=np.sqrt((sides**2).sum(axis=(1, 2)) / 12.0), hull=bearings.hull @ frame.T,
-        point=bearings.point[patch, place] @ frame.T, patch=patch,
-        stiffness=bearings.stiffness[patch, place],
-        spans=place < bearings.hull.shape[1])
+        radius=np.sqrt((sides**2).sum(axis=(1, 2)) / 12.0),
+        bearings=meet.bearings.in_frame(frame))
     with tqdm(total=int((~meet.fixed).sum()), unit='box', desc='loads', leave=False,
               disable=len(plan) <= MANY) as bar:
         rest = settle(bodies, beds, friction, bar.update)
