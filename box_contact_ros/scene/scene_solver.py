@@ -66,6 +66,36 @@ class Answer(NamedTuple):
         return [self.scene.pair_of(a, b) for a, b in self.stale.tolist()]
 
 
+class _Revision(NamedTuple):
+    """A revision of a scene, and what finds its pairs."""
+
+    scene: Scene
+    number: int
+    moving: tuple[str, ...]
+    """Whose poses a call takes, in their order. What moves no more has a row still, which is not
+    read."""
+    rows: np.ndarray
+    """(m, 7) poses of boxes, of bodies, and of what moves no more."""
+    moving_rows: np.ndarray
+    """(l,) of what moves."""
+    broad_phase: native.BroadPhase
+
+    @classmethod
+    def of(cls, scene: Scene, moving: Sequence[str], number: int, margin: float) -> _Revision:
+        """Begin without poses."""
+        rows = scene.fixed_poses(spare=1)
+        is_moving = set(scene.moving)
+        moving_rows = np.array([scene.row_of[name] if name in is_moving else len(rows) - 1
+                                for name in moving], np.int64)
+        return cls(scene, number, tuple(moving), rows, moving_rows, native.BroadPhase(
+            scene.sizes, scene.is_fixed, margin, scene.rows, *scene.groups, scene.body_of))
+
+    @property
+    def poses(self) -> np.ndarray:
+        """(n, 7) of the boxes."""
+        return self.rows[:len(self.scene.boxes)]
+
+
 class SceneSolver:
     """Contacts of all pairs of a scene, one tick at a time.
 
@@ -86,27 +116,25 @@ class SceneSolver:
         self._most_near = as_whole(most_near, 'most_near', 0, sys.maxsize)
         self.model = model
         self._solver = ContactSolver(model=model, margin=self.margin)
-        self._take(scene, scene.moving, 0)
+        self._at = _Revision.of(scene, scene.moving, 0, self.margin)
         self._refuse_sizes(*(np.unique(sizes, axis=0)
                              for sizes in (scene.sizes, scene.sizes[scene.rows].reshape(-1, 6))))
         self([None] * len(self.moving))
 
-    def _take(self, scene: Scene, moving: Sequence[str], revision: int) -> None:
-        """Begin anew with a scene. moving: whose poses a tick has, in their order."""
-        self.scene = scene
-        self.revision = revision
+    @property
+    def scene(self) -> Scene:
+        """The scene as it is now."""
+        return self._at.scene
+
+    @property
+    def revision(self) -> int:
         """How often the scene has been changed."""
-        self.moving = tuple(moving)
-        """Whose poses a call takes, in their order. What moves no more has a row still, which is
-        not read."""
-        self._rows = scene.fixed_poses(spare=1)
-        """Poses of boxes, of bodies, and of what moves no more."""
-        self._poses = self._rows[:len(scene.boxes)]
-        is_moving = set(scene.moving)
-        self._moving = np.array([scene.row_of[name] if name in is_moving else len(self._rows) - 1
-                                 for name in self.moving], np.int64)
-        self._broad_phase = native.BroadPhase(scene.sizes, scene.is_fixed, self.margin, scene.rows,
-                                              *scene.groups, scene.body_of)
+        return self._at.number
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """Whose poses a call takes, in their order."""
+        return self._at.moving
 
     def __reduce__(self) -> tuple[Callable[..., SceneSolver], tuple[Any, ...]]:
         """Pickle what makes the solver."""
@@ -127,10 +155,11 @@ class SceneSolver:
             kept = np.delete(kept, gone)
         kept = np.concatenate((kept, np.full(len(scene.boxes) - len(kept), -1)))
         rows = (*self.moving, *(name for name in moving or {} if name not in self.moving))
+        later = _Revision.of(scene, rows, self.revision + 1, self.margin)
+        later.broad_phase.take_fixed(self._at.broad_phase, kept)
         solver = object.__new__(SceneSolver)
-        vars(solver).update(vars(self))
-        solver._take(scene, rows, self.revision + 1)
-        solver._broad_phase.take_fixed(self._broad_phase, kept)
+        solver.model, solver.margin, solver._at = self.model, self.margin, later
+        solver._most_near, solver._solver = self._most_near, self._solver
         sizes = np.array([box.size for box in changes.values() if box is not None]).reshape(-1, 3)
         listed = [] if scene.listed_names.isdisjoint(changes) else scene.sizes[scene.rows]
         solver._refuse_sizes(sizes, np.reshape(listed, (-1, 6)))
@@ -152,7 +181,7 @@ class SceneSolver:
         Listed pairs, patterns and bodies stay; new boxes are in the pairs whose patterns match.
         Raises SceneError, a ValueError with field and value.
         """
-        vars(self).update(vars(self.changed(fixed=fixed, moving=moving, absent=absent)))
+        self._at = self.changed(fixed=fixed, moving=moving, absent=absent)._at
         return self.revision
 
     def _refuse_sizes(self, sizes: np.ndarray, listed: np.ndarray) -> None:
@@ -181,40 +210,41 @@ class SceneSolver:
         """
         self._set_poses(poses)
         if self.scene.bodies:
-            self.scene.place_boxes(self._rows[:-1])
+            self.scene.place_boxes(self._at.rows[:-1])
         pairs, contacts, stale = find_contacts(
-            self._broad_phase, self._solver, self.scene.sizes, self._poses,
+            self._at.broad_phase, self._solver, self.scene.sizes, self._at.poses,
             lambda box: f'pose of {self.scene.names[box]}:', most_near=self._most_near)
-        found = touching_and_near(pairs, contacts, self._solver, self.scene.sizes, self._poses,
+        found = touching_and_near(pairs, contacts, self._solver, self.scene.sizes, self._at.poses,
                                   self.margin)
         return Answer(*found, len(pairs), stale, self.scene, self.revision)
 
-    def parts(self) -> tuple[native.BroadPhase, ContactSolver, float, int, np.ndarray, np.ndarray,
-                             np.ndarray, np.ndarray, np.ndarray]:
+    def _parts(self) -> tuple[native.BroadPhase, ContactSolver, float, int, np.ndarray, np.ndarray,
+                              np.ndarray, np.ndarray, np.ndarray]:
         """Return what native.TickWriter answers ticks of the scene by: its first nine arguments."""
-        scene, solver, sizes = self.scene, self._solver, self.scene.sizes
+        at, scene, solver, sizes = self._at, self.scene, self._solver, self.scene.sizes
         if (sizes[1:] == sizes[:-1]).all():  # model `paper` is in C++ for boxes of one size
             solver = ContactSolver(sizes[0], sizes[0], model=self.model, margin=self.margin)
-        bodies = scene.placement if scene.bodies else (NO_BODIES, self._rows[:0])
-        return (self._broad_phase, solver, self.margin, self._most_near, sizes, self._rows,
-                self._moving, *bodies)
+        bodies = scene.placement if scene.bodies else (NO_BODIES, at.rows[:0])
+        return (at.broad_phase, solver, self.margin, self._most_near, sizes, at.rows,
+                at.moving_rows, *bodies)
 
     def _set_poses(self, poses: Sequence[np.ndarray | None] | ArrayLike) -> None:
         """Take the poses of the boxes and bodies that move."""
-        if native.write_poses(self._rows, self._moving, poses):  # those of every node
+        rows, moving_rows = self._at.rows, self._at.moving_rows
+        if native.write_poses(rows, moving_rows, poses):  # those of every node
             return
         if not isinstance(poses, Sequence) or isinstance(poses, str):
             poses = as_floats(poses, 'poses', 'a list of a pose or None for each box and body that '
                               'moves, or an array (n, 7)', (None, 7))
-        if len(poses) != len(self._moving):
-            raise ValueError(f'{len(poses)} poses, but {len(self._moving)} boxes and bodies move: '
+        if len(poses) != len(moving_rows):
+            raise ValueError(f'{len(poses)} poses, but {len(moving_rows)} boxes and bodies move: '
                              f'{short_repr(list(self.moving))}; give a list of a pose or '
                              'None for each')
         if isinstance(poses, np.ndarray):
-            self._rows[self._moving] = poses
+            rows[moving_rows] = poses
             return
-        for name, index, pose in zip(self.moving, self._moving, poses):
-            self._rows[index] = NOWHERE if pose is None else as_floats(
+        for name, index, pose in zip(self.moving, moving_rows, poses):
+            rows[index] = NOWHERE if pose is None else as_floats(
                 pose, f'pose of {name}', 'a pose (x y z qx qy qz qw)', (7,))
 
 
@@ -222,5 +252,5 @@ def _made_again(scene: Scene, model: str | Model, margin: float, most_near: int,
                 moving: tuple[str, ...], revision: int) -> SceneSolver:
     """Return a solver that was pickled."""
     solver = SceneSolver(scene, model=model, margin=margin, most_near=most_near)
-    solver._take(scene, moving, revision)
+    solver._at = _Revision.of(scene, moving, revision, solver.margin)
     return solver
