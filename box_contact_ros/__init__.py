@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from .models.make_model import make_model
     from .node.contact_node import ContactNode as ContactNode  # noqa: F401
     from .plans.inspect_plan import inspect_plan
-    from .plans.plan import Plan
+    from .plans.inspection import Inspection, Row
+    from .plans.plan import Fault, Plan
     from .plans.read_plan import read_plan
     from .scene.scene import Box, Frame, Pair, Scene
     from .scene.scene_file import read_scene
@@ -27,10 +28,10 @@ if TYPE_CHECKING:
     from .solver.faces import FacePatches, face_patches
     from .stream.read_contacts import ReadContacts, read_contacts
 
-__all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'FacePatches', 'Frame', 'Nearest',
-           'Nearests', 'Pair', 'PatchForces', 'Plan', 'ReadContacts', 'Scene', 'SceneSolver',
-           'contacts_of', 'face_patches', 'inspect_plan', 'make_model', 'patch_area', 'patch_areas',
-           'read_contacts', 'read_plan', 'read_scene']
+__all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'FacePatches', 'Fault', 'Frame',
+           'Inspection', 'Nearest', 'Nearests', 'Pair', 'PatchForces', 'Plan', 'ReadContacts',
+           'Row', 'Scene', 'SceneSolver', 'contacts_of', 'face_patches', 'inspect_plan',
+           'make_model', 'patch_area', 'patch_areas', 'read_contacts', 'read_plan', 'read_scene']
 # `ContactNode` needs ROS, and `import *` does without.
 
 _LOADED_WHEN_USED = {
@@ -38,7 +39,8 @@ _LOADED_WHEN_USED = {
     'models.make_model': ('make_model',),
     'node.contact_node': ('ContactNode',),
     'plans.inspect_plan': ('inspect_plan',),
-    'plans.plan': ('Plan',),
+    'plans.inspection': ('Inspection', 'Row'),
+    'plans.plan': ('Fault', 'Plan'),
     'plans.read_plan': ('read_plan',),
     'scene.scene_file': ('read_scene',),
     'scene.scene': ('Box', 'Frame', 'Pair', 'Scene'),
