@@ -48,11 +48,28 @@ struct Sums {
   Vec<T> impulse, angular_impulse;  // of contacts, since the advance began [N s], [N m s]
 };
 
+// How much finer the sub-steps of a body's island were, as a patch may be lost for a step: see fineness.hpp.
+struct Fineness {
+  double factor = 1.0;
+  double calm = 0.0;    // for how long less was needed [s]
+  double swayed = 0.0;  // for how long it has swayed [s]
+
+  // What rests has not swayed, still bears its load, and is to stay where it is.
+  Fineness at_rest() const { return {factor}; }
+};
+
+// For how long a body's island was slow [s], and the least square of its speed since then [m²/s²].
+struct SlowTime {
+  double time = 0.0, least = 0.0;
+};
+
 // A body in a step, on lines of a cache of its own: other threads may move its neighbours.
 struct alignas(64) Moving : Speeds<double>, Where<double>, Sums<double> {
   int32_t body;
   int32_t side;          // the first group side by side that may have its next block
   double quaternion[4];  // of length 1
+  Fineness fineness;
+  SlowTime slow;
   Motion pushed;         // its velocities before relaxation, at the end of the advance
   double load;           // weights that it bears and its own [N]
   int carriers;          // how many patches bear it

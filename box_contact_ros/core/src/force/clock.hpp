@@ -137,6 +137,7 @@ class Clock {
     bool is_late = frequency_of(late_, period_) < soft_frequency / longest;
     double window = is_late ? longest : std::min(longest / substeps, sub_step_limit);
     int count = SubSteps::count_of(dt, window);
+    window_ = window;
     return {dt,
             dt / count,
             count,
@@ -147,6 +148,8 @@ class Clock {
             period_,
             overdue_periods * std::max(period_, dt)};
   }
+  // That of the last step [s].
+  double window() const { return window_; }
   // Whether contacts are those of answers.
   bool is_told() const { return since_ >= 0.0; }
   // Since the last answer [s]; 0 with contacts of each step.
@@ -163,6 +166,7 @@ class Clock {
     return least;
   }
   LongestStep longest_;
+  double window_ = 0.0;
   double since_ = -1.0;                    // the last answer [s]; below 0: there was none
   double period_ = 0.0;                    // between answers [s]
   double late_ = 0.0;                      // age of the last answer when it came [s]

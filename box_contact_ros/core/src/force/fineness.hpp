@@ -47,34 +47,23 @@ constexpr double lasting_time = 0.5;
 // Contacts are solved anew after so many sub-steps.
 constexpr int parts_of_a_contact = 4;
 
-// Of a body: its island's, as a patch may be lost for a step.
-struct Fineness {
-  double factor = 1.0;
-  double calm = 0.0;    // for how long less was needed [s]
-  double swayed = 0.0;  // for how long it has swayed [s]
-
-  // What rests has not swayed, still bears its load, and is to stay where it is.
-  Fineness at_rest() const { return {factor}; }
-};
-
 // Chooses the factor of an island, and tells for how long it has swayed. Both are kept with its bodies.
 class FinenessOf {
  public:
-  FinenessOf(const std::vector<Body>& bodies, const bc_wrench* outside, double most_depth,
-             std::vector<Patch>& patches, Islands& islands)
-      : bodies_(bodies),
-        outside_(outside),
+  FinenessOf(const bc_wrench* outside, double most_depth, std::vector<Patch>& patches,
+             Islands& islands)
+      : outside_(outside),
         most_depth_(most_depth),
         patches_(patches),
         moving_(islands.moving),
         blocks_(islands.blocks),
         by_height_(islands.by_height) {}
 
-  double operator()(const Island& island, const SubSteps& steps, std::vector<Fineness>& all) const {
+  double operator()(const Island& island, const SubSteps& steps) const {
     double needed = needed_by(island, steps), held = 1.0, calm = calm_time;
-    each_free(island, [&](size_t body) {
-      held = std::max(held, all[body].factor);
-      calm = std::min(calm, all[body].calm);
+    each_free(island, [&](const Moving& moving) {
+      held = std::max(held, moving.fineness.factor);
+      calm = std::min(calm, moving.fineness.calm);
     });
     if (held == 1.0 && needed <= 1.0) return 1.0;
     bool is_spare = spare_factor * needed <= held;
@@ -84,19 +73,18 @@ class FinenessOf {
       factor = std::ceil(std::min(growth * needed, double(finest)));
     else if (is_spare && calm >= calm_time)
       factor = std::max(1.0, held * (1.0 - steps.dt / calm_time));
-    each_free(island, [&](size_t body) {
-      Fineness& fineness = all[body];
-      fineness.factor = factor;
-      fineness.calm = is_spare ? fineness.calm + steps.dt : 0.0;
+    each_free(island, [&](Moving& moving) {
+      moving.fineness.factor = factor;
+      moving.fineness.calm = is_spare ? moving.fineness.calm + steps.dt : 0.0;
     });
     return factor;
   }
   // For how long an island has swayed at the end of a step [s]. Its bodies pass each other at `speed` [m/s].
-  double swayed(const Island& island, double speed, double dt, std::vector<Fineness>& all) const {
+  double swayed(const Island& island, double speed, double dt) const {
     double swayed = 0.0;
-    each_free(island, [&](size_t body) { swayed = std::max(swayed, all[body].swayed); });
+    each_free(island, [&](const Moving& moving) { swayed = std::max(swayed, moving.fineness.swayed); });
     swayed = is_sway(speed, swayed > 0.0) ? swayed + dt : 0.0;
-    each_free(island, [&](size_t body) { all[body].swayed = swayed; });
+    each_free(island, [&](Moving& moving) { moving.fineness.swayed = swayed; });
     return swayed;
   }
 
@@ -104,16 +92,16 @@ class FinenessOf {
   template <class Visit>
   void each_free(const Island& island, const Visit& visit) const {
     for (size_t k = island.body; k < island.body_end; ++k)
-      if (moving_[k].inverse_mass > 0.0) visit(size_t(moving_[k].body));
+      if (moving_[k].inverse_mass > 0.0) visit(moving_[k]);
   }
 
   // The factor that is needed [1]. Below 1, the load could grow by its inverse without one.
   double needed_by(const Island& island, const SubSteps& steps) const {
     Vec<double> total{0.0, 0.0, 0.0};
     double lightest = 0.0;
-    each_free(island, [&](size_t body) {
-      if (outside_) total += vector(outside_[body].force);
-      lightest = std::max(lightest, bodies_[body].inverse_mass);
+    each_free(island, [&](const Moving& moving) {
+      if (outside_) total += vector(outside_[moving.body].force);
+      lightest = std::max(lightest, moving.inverse_mass);
     });
     double weight = length(total), push = 0.0;
     bool is_uneven = false;
@@ -170,7 +158,6 @@ class FinenessOf {
   static int32_t upper(const Block& block) { return block.rises > 0.0 ? block.b : block.a; }
   static int32_t lower(const Block& block) { return block.rises > 0.0 ? block.a : block.b; }
 
-  const std::vector<Body>& bodies_;
   const bc_wrench* outside_;
   double most_depth_;
   std::vector<Patch>& patches_;

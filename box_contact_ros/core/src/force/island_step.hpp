@@ -43,8 +43,7 @@ struct Advance {
 class IslandStep {
  public:
   IslandStep(const Options& options, const std::vector<Body>& bodies, const Advance& step,
-             const BodyStep& body_step, std::vector<Fineness>& fineness,
-             std::vector<Patch>& patches, std::vector<Load>& loads, Islands& islands)
+             const BodyStep& body_step, std::vector<Patch>& patches, std::vector<Load>& loads, Islands& islands)
       : options_(options),
         bodies_(bodies),
         step_(step),
@@ -54,8 +53,7 @@ class IslandStep {
         islands_(islands),
         moving_(islands.moving),
         blocks_(islands.blocks),
-        fineness_(fineness),
-        fineness_of_(bodies, step.given.outside, options.most_depth, patches, islands) {}
+        fineness_of_(step.given.outside, options.most_depth, patches, islands) {}
 
   // Advance all islands. Returns the first body whose numbers are not finite at the end, or −1. No bit depends
   // on the number of threads.
@@ -121,9 +119,9 @@ class IslandStep {
   }
   // Choose how fine its sub-steps are, and how many iterations they take.
   void choose(Island& island) const {
-    double swayed = fineness_of_.swayed(island, island.fastest, step_.steps.dt, fineness_);
+    double swayed = fineness_of_.swayed(island, island.fastest, step_.steps.dt);
     island.rounds = step_.steps.is_late ? 1 : rounds_of(swayed);
-    island.factor = step_.own ? fineness_of_(island, step_.steps, fineness_) : 1.0;
+    island.factor = step_.own ? fineness_of_(island, step_.steps) : 1.0;
   }
   // Advance the islands whose sub-steps are finer by a factor, and that take so many times the iterations.
   void advance(const Chunk& chunk, double factor, int rounds) const {
@@ -257,7 +255,6 @@ class IslandStep {
   Islands& islands_;
   std::vector<Moving>& moving_;
   std::vector<Block>& blocks_;
-  std::vector<Fineness>& fineness_;  // of the bodies
   FinenessOf fineness_of_;
 };
 

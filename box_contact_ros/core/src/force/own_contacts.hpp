@@ -56,10 +56,10 @@ class OwnContacts {
            is_same(pairs.surface, is_given_.surface, asked_.surface) &&
            is_same(pairs.stiffness, is_given_.stiffness, asked_.stiffness);
   }
-  // Take the pairs of a question. Where bodies rest, a pair is new until it was solved once, unless
-  // `is_known(pair)` says that its patch rests. Returns false, and takes none, if a pair comes twice.
+  // Take the pairs of a question. Where bodies sleep, a pair is new until it was solved once, unless
+  // `is_known(pair)` says that its patch sleeps. Returns false, and takes none, if a pair comes twice.
   template <class IsKnown>
-  bool ask(const bc_patches& asked, double friction, bool is_any_at_rest, const IsKnown& is_known) {
+  bool ask(const bc_patches& asked, double friction, bool is_any_asleep, const IsKnown& is_known) {
     auto n = size_t(asked.count);
     next_keys_.clear();
     for (size_t k = 0; k < n; ++k) {
@@ -71,7 +71,7 @@ class OwnContacts {
     auto same = [](const Key& p, const Key& q) { return p.pair == q.pair; };
     if (std::adjacent_find(next_keys_.begin(), next_keys_.end(), same) != next_keys_.end())
       return false;
-    note_new(is_any_at_rest, is_known);
+    note_new(is_any_asleep, is_known);
     resize(n);
     keys_.swap(next_keys_);
     std::copy_n(asked.pairs, 2 * n, asked_.pairs.begin());
@@ -98,10 +98,13 @@ class OwnContacts {
            dot(other, other) == 0.0;
   }
 
-  // Choose which pairs are solved: all but those of which `is_quiet(box)` says that both boxes stay.
+  // Choose which pairs are solved: all but those of which `is_quiet(box)` says that both boxes stay. The
+  // revision of what sleeps tells whether they are chosen already.
   template <class IsQuiet>
-  void choose(bool is_any_at_rest, const IsQuiet& is_quiet) {
-    is_all_ = !is_any_at_rest;
+  void choose(int64_t revision, bool is_any_asleep, const IsQuiet& is_quiet) {
+    if (chosen_for_ == revision) return;
+    chosen_for_ = revision;
+    is_all_ = !is_any_asleep;
     if (is_all_) return;
     rows_.clear();
     placed_.clear();
@@ -119,12 +122,12 @@ class OwnContacts {
       }
     }
   }
-  // All pairs were solved once. Returns whether some were new.
-  bool settle() {
-    if (!is_any_new_) return false;
+  // All pairs were solved once.
+  void settle() {
+    if (!is_any_new_) return;
     std::fill(is_new_.begin(), is_new_.end(), uint8_t(0));
     is_any_new_ = false;
-    return true;
+    chosen_for_ = none_chosen;
   }
 
   // Solve the chosen pairs with the bodies at `poses`. `solve(rows, count, results)` answers rows, and returns
@@ -270,6 +273,7 @@ class OwnContacts {
   void resize(size_t n) {
     asked_.resize(n);
     is_all_ = true;
+    chosen_for_ = none_chosen;
     found_.resize(n);
     make_room();
   }
@@ -283,12 +287,12 @@ class OwnContacts {
   }
   // Note which of the next keys are not among the last ones, or are new there.
   template <class IsKnown>
-  void note_new(bool is_any_at_rest, const IsKnown& is_known) {
+  void note_new(bool is_any_asleep, const IsKnown& is_known) {
     next_is_new_.assign(next_keys_.size(), 0);
     is_any_new_ = false;
     auto last = keys_.begin();
     for (const Key& key : next_keys_) {
-      if (!is_any_at_rest) break;
+      if (!is_any_asleep) break;
       while (last != keys_.end() && last->pair < key.pair) ++last;
       bool was_asked = last != keys_.end() && last->pair == key.pair && !is_new_[last->row];
       next_is_new_[key.row] = !was_asked && !is_known(key.pair);
@@ -336,6 +340,8 @@ class OwnContacts {
   std::vector<uint8_t> is_new_, next_is_new_;  // of them
   bool is_any_new_ = false;
   // Those that are solved, by pair, unless all are.
+  static constexpr int64_t none_chosen = -1;
+  int64_t chosen_for_ = none_chosen;
   bool is_all_ = true;
   Pairs live_;
   std::vector<size_t> rows_;    // theirs among those that are asked for

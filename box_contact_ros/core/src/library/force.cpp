@@ -39,7 +39,7 @@ bool solve_exactly(const PairNumbers& pair, bc_contact& contact) {
   return solve_pair({chosen_kernel(), Model::exact, nullptr}, pair, BC_COVARIANCE, 0.0, contact);
 }
 
-// Solve the contacts of one's own, and take them.
+// Solve the contacts of one's own, and read them.
 bc_status solve_own(Handled& all, double dt, const bc_pose* poses, const bc_wrench* outside) {
   const Kernel* kernel = chosen_kernel();
   if (!kernel) return fail(BC_BAD_ENVIRONMENT, "BOX_CONTACT_INSTRUCTION_SET is unknown");
@@ -63,13 +63,12 @@ bc_status advance(bc_patch_forces* forces, double dt, const Given& given, const 
   if (!read(motion, all)) return fail(BC_BAD_ABI, "motion.size is unknown");
   if (bc_status status = check_step(dt)) return status;
   if (bc_status status = check_changed(changed, self.bodies().size())) return status;
-  self.keep();
-  self.rouse(given, changed, all);
+  self.begin(given, changed, all);
   bc_status status = check_given(self, given);
   if (!status) status = solve_own(handled(forces), dt, given.poses, given.outside);
-  if (!status && self.has_woken()) status = check_given(self, given);
+  if (!status && self.is_waking()) status = check_given(self, given);
   if (status) {
-    self.restore();
+    self.cancel();
     return status;
   }
   int64_t lost = self.advance(dt, given, all, solve_exactly, handled(forces).threads);
