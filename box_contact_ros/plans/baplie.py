@@ -218,13 +218,14 @@ def checked(rows: Iterable[Stowed], faults: list[Fault]) -> list[Placed]:
         size = extents_of(row.kind)
         if row.over:
             faults.append(Fault('dimension', (row.name,), f'reaches beyond its container, which is '
-                                                          f'not judged: {", ".join(row.over)}'))
+                                                          f'not judged: {", ".join(row.over)}',
+                                lacks='shape'))
         if not re.fullmatch('[0-9]{7}', row.slot):
             forms[len(row.slot)].append(row.name)
         elif row.slot in placed:
             faults.append(Fault('twice', (row.slot,), f'{row.number or "a container"} has the slot '
                                                       f'of {placed[row.slot].number or "another"}: '
-                                                      'left out'))
+                                                      'left out', lacks='place'))
         elif size is None:
             unknown[row.kind].append(row.slot)
         else:
@@ -266,7 +267,7 @@ def _mass(row: Stowed, faults: list[Fault]) -> float:
         elif mass > HEAVIEST:
             fault = f'its weight is {number} {unit}, more than any container'
     if fault:
-        faults.append(Fault('mass', (row.slot,), fault))
+        faults.append(Fault('mass', (row.slot,), fault, lacks='sure weight' if mass else 'weight'))
     return mass
 
 
@@ -338,7 +339,7 @@ def _stack(boxes: list[Placed], on_deck: bool, size: np.ndarray, pose: np.ndarra
             elif box.tier > min(begun, default=box.tier):
                 faults.append(Fault('slot', (box.slot,), (
                     f'begins a stack, as others of its bay do at tier {min(begun)}: taken as on '
-                    'the ship')))
+                    'the ship'), verdict='sound', lacks=''))
             bases[blocks[n]].add(box.tier)
         pose[n, 2] = floor + size[n, 2] / 2.0
     return lowest

@@ -24,6 +24,8 @@ from .plan import Fault, Plan
 
 NEAR = 0.1
 """Up to this separation [m], pairs that may not touch are named in the plan."""
+UNMOVED = {'verdict': 'sound', 'lacks': ''}
+"""Of the fault that a shape is no box, where nothing moves."""
 HERE = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 
 
@@ -84,14 +86,17 @@ def plan_of_bodies(solids: Sequence[Solid], fixed: set[Hashable],
     shapes = [solid for solid in solids if solid.kind not in ('box', 'plane')]
     if shapes:
         counts = Counter(solid.kind for solid in shapes)
+        moves = any(solid.body not in fixed for solid in solids)
         faults.append(Fault('shape', tuple(solid.name for solid in shapes), ', '.join(
-            f'{count} {kind}' for kind, count in counts.items()) + ': no box, so left out'))
+            f'{count} {kind}' for kind, count in counts.items()) + ': no box, so left out', **(
+                {} if moves else UNMOVED)))
     unjudged = _unjudged(solids, pairs[touches], fixed, may_touch, places,
                          is_whole and all(solid.size is not None for solid in shapes))
     if unjudged:
         faults.append(Fault('shape', tuple(
             solids[n].name for n in boxes if solids[n].body in unjudged),
-            'touches, or is joined to, what is no box: taken as fixed, and not judged'))
+            'touches, or is joined to, what is no box: taken as fixed, and not judged',
+            lacks='judgement'))
     fixed = fixed | unjudged
     row_of = {n: row for row, n in enumerate(kept)}
     apart = [(row_of[a], row_of[b]) for a, b in pairs.tolist()

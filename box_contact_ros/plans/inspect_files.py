@@ -4,8 +4,8 @@
 """Is a plan sound? A line for each fault, the worst first, and one for the whole plan.
 
 It reads SMDG BAPLIE, SDF, MJCF, URDF, scene files, and packing plans as CSV or JSON. Of several
-files it prints a line each. The exit status is 0 if all are sound, 1 if one is not, and 2 if one
-could not be read.
+files it prints a line each. The exit status is 2 if a file could not be read, else 1 if a plan is
+not sound, else 3 if not all of one was judged, else 0.
 """
 from __future__ import annotations
 
@@ -26,8 +26,9 @@ from .inspect_plan import inspect_plan
 from .inspection import Inspection
 from .read_plan import read_any
 
-SOUND, NOT_SOUND, NOT_READ = 0, 1, 2
-"""Exit statuses."""
+NOT_READ = 2
+STATUSES = {'sound': 0, 'not all judged': 3, 'not sound': 1, 'not read': NOT_READ}
+"""Exit statuses, by verdict; of several files the last of these counts."""
 PATIENT = 5.0  # time [s] after which several files have a progress bar
 COLUMNS = ('file', 'kind', 'boxes', 'text')
 
@@ -40,8 +41,10 @@ def judged(path: str, options: argparse.Namespace) -> Inspection:
         free = np.setdiff1d(np.arange(len(plan)), plan.ground)
         limits[free] = np.minimum(limits[free], options.limit)
     ground = np.arange(len(plan)) if len(plan) == 1 else plan.ground  # it can touch nothing
-    plan = dataclasses.replace(plan, masses=None if options.geometry else plan.masses,
-                               ground=ground, limits=limits)
+    plan = dataclasses.replace(
+        plan, masses=None if options.geometry else plan.masses, ground=ground, limits=limits,
+        faults=tuple(fault for fault in plan.faults
+                     if not (options.geometry and fault.kind == 'mass')))
     try:
         return inspect_plan(plan, tolerance=options.tolerance, acceleration=options.acceleration,
                             bears=options.bears or bears)
@@ -73,7 +76,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Judge files; return the worst exit status."""
+    """Judge files; return the exit status of the worst."""
     parser = _parser()
     options = parser.parse_args(args)
     if options.picture and len(options.files) > 1:
@@ -83,7 +86,7 @@ def main(args: Sequence[str] | None = None) -> int:
     writer = csv.writer(sys.stdout, lineterminator='\n')
     if options.csv:
         writer.writerow(COLUMNS)
-    worst = SOUND
+    worst = 'sound'
     for path in _with_progress(options.files):
         try:
             found = judged(path, options)
@@ -91,9 +94,9 @@ def main(args: Sequence[str] | None = None) -> int:
                 found.plot().savefig(options.picture, dpi=120)
         except (OSError, ValueError, MissingExtra) as error:
             print(one_line(error), file=sys.stderr)
-            worst = NOT_READ
+            worst = 'not read'
             continue
-        worst = max(worst, SOUND if found.sound else NOT_SOUND)
+        worst = max(worst, found.verdict, key=list(STATUSES).index)
         if options.json:
             print(json.dumps({'file': path, **as_json(found)}))
         elif options.csv:
@@ -104,7 +107,7 @@ def main(args: Sequence[str] | None = None) -> int:
         else:
             print(found)
             print(f'To see it in 3D: box_contact_view {path}')
-    return worst
+    return STATUSES[worst]
 
 
 def as_json(found: Inspection) -> dict[str, Any]:
@@ -117,7 +120,8 @@ def as_json(found: Inspection) -> dict[str, Any]:
     del fields['plan']
     for pairs in ('overlaps', 'carried_by'):
         fields[pairs] = [[plan.names[a], plan.names[b]] for a, b in fields[pairs].tolist()]
-    return {'sound': found.sound, 'names': list(plan.names), 'ground': plan.ground.tolist(),
+    return {'verdict': found.verdict, 'sound': found.sound,
+            'names': list(plan.names), 'ground': plan.ground.tolist(),
             'faults': [row._asdict() for row in found.rows()],
             **{name: _plain(value) for name, value in fields.items()}}
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..extras import require
-from .bodies import Solid, Weight, plan_of_bodies, total
+from .bodies import UNMOVED, Solid, Weight, plan_of_bodies, total
 from .plan import Fault, Plan
 
 WELDS = ('mjEQ_CONNECT', 'mjEQ_WELD')
@@ -41,7 +41,8 @@ def read_mjcf(path: Path) -> Plan:
         mujoco.set_mju_user_warning(before)
     tops = _tops(model)
     faults = [Fault('shape', tuple(meshes), f'{len(meshes)} mesh, height field or SDF: no box, so '
-                                            'left out')] if meshes else []
+                                            'left out', **({} if any(tops) else UNMOVED))
+              ] if meshes else []
     solids = []
     for geom in range(model.ngeom):
         kind = mujoco.mjtGeom(model.geom_type[geom]).name.removeprefix('mjGEOM_').lower()

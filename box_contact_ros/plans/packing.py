@@ -192,7 +192,8 @@ def _box(row: Row, number: int, faults: list[Fault]) -> _Box | None:
         value = _number(row[key]) if row.get(key) is not None else None
         if value is not None and not 0.0 <= value <= most:
             faults.append(Fault('mass', (name,), f'{place}{key} is {short_repr(row[key])}: taken '
-                                                 f'as {"0" if key == "mass" else "unknown"}'))
+                                                 f'as {"0" if key == "mass" else "unknown"}',
+                                lacks='weight' if key == 'mass' else 'limit'))
             value = 0.0 if key == 'mass' else None
         amounts.append(value)
     fixed = WORDS.get(str(row.get('fixed', '')).lower())

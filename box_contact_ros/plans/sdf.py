@@ -103,9 +103,9 @@ class _World:
         if a != b:
             self.joined[max(a, b)] = min(a, b)
 
-    def fault(self, kind: str, name: str, text: str) -> None:
+    def fault(self, kind: str, name: str, text: str, lacks: str | None = None) -> None:
         """Name what is wrong with a part."""
-        self.faults.append(Fault(kind, (name,), text))
+        self.faults.append(Fault(kind, (name,), text, lacks=lacks))
 
 
 def read_sdf(root: Element) -> Plan:
@@ -113,12 +113,12 @@ def read_sdf(root: Element) -> Plan:
     places = root.findall('world') or [root]
     world = _World()
     for other in places[1:]:
-        world.fault('shape', other.get('name', WORLD), 'is another world: left out')
+        world.fault('shape', other.get('name', WORLD), 'is another world: left out', 'part')
     for state in places[0].findall('state'):
         _read_state(state, world)
     for part in ('population', 'road'):
         for other in places[0].findall(part):
-            world.fault('shape', other.get('name', part), f'is a <{part}>: not read')
+            world.fault('shape', other.get('name', part), f'is a <{part}>: not read', 'part')
             world.missing += 1
     models = places[0].findall('model')
     if not models and places[0].find('include') is None and not places[0].tag == WORLD:
@@ -167,14 +167,14 @@ def _read_state(state: Element, world: _World) -> None:
                 except Unreadable as error:
                     world.fault(error.kind, path, f'in <state>, {error}')
     for part in state.findall('insertions/model'):
-        world.fault('shape', part.get('name', ''), '<state> inserts it: not read')
+        world.fault('shape', part.get('name', ''), '<state> inserts it: not read', 'part')
         world.missing += 1
 
 
 def _read_includes(place: Element, scope: str, world: _World) -> None:
     for part in place.findall('include'):
         world.fault('shape', scope + (part.findtext('name') or part.findtext('uri') or 'include'),
-                    'is included from another file: not read')
+                    'is included from another file: not read', 'part')
         world.missing += 1
 
 
@@ -184,7 +184,7 @@ def _read_model(model: Element, scope: str, frame: np.ndarray, is_static: bool, 
     name = scope + model.get('name', '')
     is_static = is_static or _flag(model, 'static')
     if name in world.names:
-        world.fault('twice', name, 'two models have this name: the second is left out')
+        world.fault('twice', name, 'two models have this name: the second is left out', 'place')
         return
     world.names.add(name)
     try:
@@ -260,7 +260,7 @@ def _read_joint(joint: Element, scope: str, world: _World) -> None:
         world.fixed.add(known[0])
         if WORLD not in links:
             world.fault('shape', known[0], f'is joined to {", ".join({*links} - {*known})}, which '
-                                           'is not read: taken as fixed')
+                                           'is not read: taken as fixed', 'judgement')
 
 
 def pose_of(part: Element, bases: set[str]) -> tuple[np.ndarray, str]:
@@ -351,7 +351,8 @@ def _bits(part: Element, name: str, world: _World) -> int:
     try:
         return int(text, 0) if text else ALL_BITS
     except ValueError:
-        world.fault('shape', name, f'its collide_bitmask {text!r} is not known: taken as all')
+        world.fault('shape', name, f'its collide_bitmask {text!r} is not known: taken as all',
+                    'judgement')
         return ALL_BITS
 
 

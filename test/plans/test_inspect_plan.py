@@ -213,10 +213,12 @@ def test_boxes_of_a_body_hold_together():
 
 def test_a_fault_of_the_file_is_a_line():
     faults = [Fault('gap', ('a',), 'nothing is below it'), Fault('mass', ('b',), 'has no weight')]
-    for some, sound in ((faults, False), (faults[1:], True)):
+    told = Fault('shape', ('c',), 'a sphere', verdict='sound', lacks='')
+    for some, verdict in ((faults, 'not sound'), (faults[1:], 'not all judged'), ([told], 'sound')):
         found = inspect_plan(plan_of([box(0, 0.5)], [10], faults=some))
-        assert found.sound == sound and str(found).count('\n') == len(some)
-    assert str(found) == ('mass                  b  has no weight\n1 box, 10.0 kg, centre of mass '
+        assert found.verdict == verdict and found.sound == (verdict == 'sound')
+        assert str(found).count('\n') == len(some)
+    assert str(found) == ('shape                 c  a sphere\n1 box, 10.0 kg, centre of mass '
                           '0.000 0.000 0.500 m: sound')
 
 
