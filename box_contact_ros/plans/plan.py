@@ -29,7 +29,7 @@ FAULT_KINDS = {
     'cut': ('not all judged', 'part'), 'slot': ('not all judged', 'place'),
     'size type': ('not all judged', 'place'), 'dimension': ('not all judged', 'place'),
     'pose': ('not all judged', 'place'), 'mass': ('not all judged', 'weight'),
-    'shape': ('not all judged', 'shape')}
+    'shape': ('not all judged', 'shape'), 'column': ('sound', '')}
 """What may be wrong with a row of a file: the best verdict with it, and what it lacks."""
 LACKS = {
     '': ('', ''), 'place': ('1 box was not placed', '{:,} boxes were not placed'),

@@ -6,10 +6,12 @@ from __future__ import annotations
 
 import json
 import os
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from ..solver.checks import short_repr
 from .plan import Plan
 
 FORMATS = ('SMDG BAPLIE, SDF, MJCF, URDF, a scene file (YAML), and packing plans as CSV or JSON')
@@ -87,11 +89,20 @@ def _read_xml(file: Path, data: bytes) -> Plan:
     raise ValueError(f'line 1: <{root.tag}> begins no format that is read: {FORMATS}')
 
 
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return a JSON object. Raises ValueError for a key that comes twice."""
+    document = dict(pairs)
+    if len(document) < len(pairs):
+        twice = next(key for key, count in Counter(key for key, _ in pairs).items() if count > 1)
+        raise ValueError(f'the key {short_repr(twice)} comes twice')
+    return document
+
+
 def _read_json(file: Path, data: bytes) -> Plan:
     from .packing import read_packing
 
     try:
-        document = json.loads(data)
+        document = json.loads(data, object_pairs_hook=_object)
     except json.JSONDecodeError as error:
         raise ValueError(f'line {error.lineno}: it is not JSON: {error.msg}') from None
     plan = read_packing(document)

@@ -26,6 +26,10 @@ from .plan import Fault, Plan
 ALL_BITS, DENSITY, MASS = 0xffff, 1000.0, 1.0
 """Defaults of SDF: of <collide_bitmask>, <density> [kg/m³] and <mass> [kg]."""
 WORLD = 'world'
+COMMENT = b'<!--'
+CLOSING = {COMMENT: b'-->', b'<![CDATA[': b']]>', b'<?': b'?>'}
+"""What ends what is no element."""
+OPENING = re.compile(b'|'.join(map(re.escape, CLOSING)))
 
 
 class Unreadable(ValueError):
@@ -61,18 +65,37 @@ def parse_xml(data: bytes) -> Element:
     require('plans')
     from defusedxml import sax
 
-    # As Gazebo's reader, it takes comments with `--` within, and blanks before the declaration.
-    data = re.sub(rb'<!--.*?-->', lambda found: b'\n' * found[0].count(b'\n'), data,
-                  flags=re.DOTALL)
     tree = _Tree()
     try:
         sax.parseString(data.lstrip(), tree)
         return tree.builder.close()
     except SAXParseException as error:
+        # Gazebo's reader takes comments with `--` within, which XML does not.
+        plain = without_comments(data)
+        if len(plain) < len(data):
+            return parse_xml(plain)
         raise ValueError(f'line {error.getLineNumber()}: it is not XML: {error.getMessage()}'
                          ) from None
     except (SAXException, LookupError, AssertionError) as error:
         raise ValueError(f'it is not XML: {error}') from None
+
+
+def without_comments(data: bytes) -> bytes:
+    """Return XML with the line ends of its comments alone; with a document type it is as it was.
+
+    What looks like a comment in CDATA or in an instruction is none.
+    """
+    if b'<!DOCTYPE' in data:
+        return data
+    parts, end = [], 0
+    while (found := OPENING.search(data, end)) and (
+            close := data.find(CLOSING[found[0]], found.end())) >= 0:
+        start, last = found.start(), close + len(CLOSING[found[0]])
+        parts.append(data[end:start])
+        parts.append(b'\n' * data.count(b'\n', start, last) if found[0] == COMMENT
+                     else data[start:last])
+        end = last
+    return b''.join((*parts, data[end:]))
 
 
 @dataclass
@@ -114,6 +137,10 @@ def read_sdf(root: Element) -> Plan:
     world = _World()
     for other in places[1:]:
         world.fault('shape', other.get('name', WORLD), 'is another world: left out', 'part')
+    for other in root if places[0] is not root else ():
+        if other.tag in ('model', 'include'):
+            world.fault('shape', other.get('name', other.tag), 'is beside the world: left out',
+                        'part')
     for state in places[0].findall('state'):
         _read_state(state, world)
     for part in ('population', 'road'):
