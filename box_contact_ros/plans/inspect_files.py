@@ -22,6 +22,8 @@ import numpy as np
 
 from ..arguments import program_parser, within
 from ..extras import MissingExtra
+from ..solver.contacts_of import TooManyNear
+from .crowd import crowded
 from .inspect_plan import inspect_plan
 from .inspection import Inspection
 from .read_plan import read_any
@@ -48,6 +50,8 @@ def judged(path: str, options: argparse.Namespace) -> Inspection:
     try:
         return inspect_plan(plan, tolerance=options.tolerance, acceleration=options.acceleration,
                             bears=options.bears or bears)
+    except TooManyNear as error:
+        return crowded(plan, error.pairs, options.tolerance, options.acceleration)
     except ValueError as error:
         raise ValueError(f'{path}: {error}') from None
 

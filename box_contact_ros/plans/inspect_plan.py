@@ -16,6 +16,7 @@ from ..solver.contacts_of import contacts_of
 from ..solver.faces import TOLERANCE, FacePatches, as_tolerance, corner_shares, face_patches
 from ..solver.pose import rotation_matrix
 from .bearings import Bearings, on_corners, on_faces
+from .crowd import most_near
 from .inspection import Inspection
 from .plan import Plan
 from .standing import across_of, base_areas, deepest, hull_margins, standing
@@ -45,7 +46,7 @@ def inspect_plan(plan: Plan, *, tolerance: float = TOLERANCE, friction: float = 
     sides: whether boxes beside each other carry by friction.
 
     Loads need the extra `plans`. A plan without masses does without it.
-    Raises ValueError, with field and value, for bad input.
+    Raises ValueError, with field and value, for bad input, and for too many boxes in one place.
     """
     if not isinstance(plan, Plan):
         raise ValueError(f'plan must be a Plan, not {short_repr(plan)}')
@@ -91,7 +92,7 @@ def _meetings(plan: Plan, tolerance: float, felt: np.ndarray, sides: bool, by_co
     fixed = np.zeros(plan.body.max(initial=-1) + 1, bool)
     fixed[plan.body[plan.ground]] = True
     pairs, contacts = contacts_of(plan.sizes, plan.poses, fixed=fixed[plan.body],
-                                  tolerance=tolerance)
+                                  tolerance=tolerance, most_near=most_near(len(plan)))
     rows = plan.body[pairs[:, 0]] != plan.body[pairs[:, 1]]
     if len(plan.apart):
         rows &= ~np.isin(pairs @ (len(plan), 1), np.sort(plan.apart, axis=1) @ (len(plan), 1))

@@ -22,10 +22,12 @@ from ..solver.checks import (
     short_repr,
 )
 
+MOST_BYTES = 2**28
+"""Of a file: 256 MiB, some hundred times the largest ship's plan."""
 VERDICTS = ('not sound', 'not all judged', 'sound')
 """On a plan, from the worst to the best."""
 FAULT_KINDS = {
-    'gap': ('not sound', ''), 'twice': ('not sound', ''),
+    'gap': ('not sound', ''), 'twice': ('not sound', ''), 'overlap': ('not sound', ''),
     'cut': ('not all judged', 'part'), 'slot': ('not all judged', 'place'),
     'size type': ('not all judged', 'place'), 'dimension': ('not all judged', 'place'),
     'pose': ('not all judged', 'place'), 'mass': ('not all judged', 'weight'),

@@ -11,12 +11,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ..resources import read_regular
 from ..solver.checks import short_repr
-from .plan import Plan
+from .plan import MOST_BYTES, Plan
 
 FORMATS = ('SMDG BAPLIE, SDF, MJCF, URDF, a scene file (YAML), and packing plans as CSV or JSON')
-MOST_BYTES = 2**28
-"""Of a file: 256 MiB, some hundred times the largest ship's plan."""
 
 
 class ReadPlan(NamedTuple):
@@ -39,11 +38,13 @@ def read_plan(path: str | os.PathLike[str]) -> Plan:
 def read_any(path: str | os.PathLike[str]) -> ReadPlan:
     """Return the plan of a file as `read_plan` does, and how its boxes stand on each other."""
     file = Path(path)
-    if file.is_file() and file.stat().st_size > MOST_BYTES:
-        raise ValueError(f'{file}: it has more than {MOST_BYTES >> 20} MiB')
-    data = file.read_bytes()
     try:
+        data = read_regular(file, MOST_BYTES)
         return _read(file, data)
+    except OSError as error:
+        if error.filename is not None:
+            raise
+        raise ValueError(f'{file}: {error}') from None
     except RecursionError:
         raise ValueError(f'{file}: it is nested too deeply') from None
     except UnicodeDecodeError as error:
