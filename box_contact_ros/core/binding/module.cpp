@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The library as a Python extension: its functions and types.
-#include "../src/force/patch_forces.hpp"
+#include "../src/force/rectangle.hpp"
+#include "../src/library/force_limits.hpp"
 #include "../src/minimum_depth.hpp"
 #include "broad_phase.hpp"
 #include "faces.hpp"
@@ -118,16 +119,16 @@ PyObject* make_module() {
                              {"OUTPUTS", detail::network_outputs},
                              {"UNITS_MAX", detail::network_units_max},
                              {"THREADS_MAX", detail::threads_max},
-                             {"SUBSTEPS_MAX", force::substeps_max}})
+                             {"SUBSTEPS_MAX", detail::substeps_max}})
     add(name, PyLong_FromLong(value));
   using Real = std::pair<const char*, double>;
   for (auto [name, value] : {Real{"LENGTH_MIN", length_min},
                              {"LENGTH_MAX", length_max},
                              {"QUATERNION_MIN", quaternion_min},
                              {"QUATERNION_MAX", quaternion_max},
-                             {"MASS_MIN", force::mass_min},
-                             {"MASS_MAX", force::mass_max},
-                             {"INERTIA_SLACK", force::inertia_slack},
+                             {"MASS_MIN", detail::mass_min},
+                             {"MASS_MAX", detail::mass_max},
+                             {"INERTIA_SLACK", detail::inertia_slack},
                              {"SQUARE_SLACK", force::square_slack},
                              {"CONTACT_ULPS", contact_ulps},
                              {"DEPTH_FLOOR", depth_floor}})

@@ -100,12 +100,6 @@ struct Asked {
   Vec<T> closing;           // velocities along N, τ1 and τ2 that close the faces: see closing.hpp
   T over_relaxation;        // of pressing and rocking: see iterations.hpp [1]
 };
-// The impulses that it gave in the last window, and that window: see Patch.
-template <class T>
-struct Kept {
-  T window, normal_impulse, torsion_impulse;
-  Vec<T> friction_impulse, rocking_impulse, impulse_arm;
-};
 template <class T>
 struct Arms {
   Vec<T> arm_a, arm_b;  // from the centres of mass to the point
@@ -138,9 +132,6 @@ struct Block : Rows<double> {
       load;  // of its point; of its normal, upward; of the weights above [m], [1], [N]
 };
 
-// Where no rim is faster than this, a block is solved, and not over-relaxed [m/s]: what rests stays solved.
-constexpr double least_over_relaxed = 1e-6;
-
 // Rocking whose centre of pressure is within the span.
 template <class T>
 BC_INLINE T bounded(const SpanOf<T>& per_pressing, T normal, T rocking) {
@@ -164,17 +155,7 @@ inline void take(const Patch& patch, double over_relaxation, Block& block) {
       patch.friction, patch.depth,          patch.stiffness,      patch.late,
       patch.age,      local(patch.asked_a), local(patch.asked_b), Vec<double>{0.0, 0.0, 0.0},
       over_relaxation};
-  static_cast<Kept<double>&>(block) = {patch.window,          patch.normal_impulse,
-                                       patch.torsion_impulse, patch.friction_impulse,
-                                       patch.rocking_impulse, patch.impulse_arm};
-}
-inline void give_back(const Kept<double>& kept, Patch& patch) {
-  patch.window = kept.window;
-  patch.normal_impulse = kept.normal_impulse;
-  patch.torsion_impulse = kept.torsion_impulse;
-  patch.friction_impulse = kept.friction_impulse;
-  patch.rocking_impulse = kept.rocking_impulse;
-  patch.impulse_arm = kept.impulse_arm;
+  static_cast<Kept<double>&>(block) = patch.kept;
 }
 
 // Give B an impulse at the point and an angular impulse, and A the opposite.

@@ -14,37 +14,12 @@
 #include <cmath>
 
 #include "../lanes/lanes.hpp"
+#include "tuning.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// Steps accepted [s]: at least this long, so that a speed divided by one is a number; and shorter than
-// that, as nothing that touches stays within its patch for so long.
-constexpr double step_min = 1e-50, step_limit = 1.0;
-// Sub-steps are no longer [s], unless answers are late: a step of 0.1 s in four would sink a stack of
-// eight by 42 mm.
-constexpr double sub_step_limit = 0.005;
 // A step of so many sub-steps and this share of one has no sub-step more [1]: the share is rounding.
 constexpr double sub_step_slack = 1e-9;
-// Steps are remembered for at least this time [s], and at least so many of them. Frames of several steps
-// repeat within it.
-constexpr double steps_time = 0.5;
-constexpr int steps_count = 32;
-// The longest step lately is forgotten where those since are shorter by more than this factor [1], as a
-// step that is measured varies. It then shrinks by it a step: at once, a tower of ten jumps 1 mm up.
-constexpr double step_shrinkage = 1.25;
-// A step begins with at most this many times the impulses of a window [1]. What iterations leave is as
-// large in a step of 1 ns as in one of 5 ms: divided by the step it would be any force.
-constexpr double most_again = 2.0;
-// Angular frequency of a soft constraint times the window [1]: a quarter turn. A box that rests on a
-// whole face is 0.4·g·window² deep.
-constexpr double soft_frequency = 1.57;
-// The same times half a period and the latency of an answer [1]. With 2 a container at 50 Hz and 5 ms
-// tilts by 0.06°; from 4 on late loads vibrate.
-constexpr double late_frequency = 2.5;
-// An answer that is older than so many periods [1] pushes nothing out.
-constexpr double overdue_periods = 3.0;
-// A period that is not told is the least of so many intervals between answers: some get lost.
-constexpr int intervals_kept = 8;
 
 // The frequency of a patch whose answers are late [1/s].
 template <class T>

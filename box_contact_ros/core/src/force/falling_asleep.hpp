@@ -12,14 +12,6 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// An island is slow while all its bodies are slower than this, by their energies [m/s].
-constexpr double sleep_speed = 1e-4;
-// It is laid down once it was slow for this time [s].
-constexpr double sleep_time = 0.5;
-// Then it is no faster than it was within that time, or than this share of what is slow [1]: what begins
-// to tip gains speed.
-constexpr double calm_share = 0.1;
-
 template <class Visit>
 void each_free(const Island& island, Islands& islands, const Visit& visit) {
   for (size_t k = island.body; k < island.body_end; ++k)

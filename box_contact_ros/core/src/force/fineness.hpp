@@ -19,34 +19,10 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// A patch is judged if its load would move its bodies apart by more than this [m/s²]: some 60 g. Towers of
-// up to 30 boxes alike are not. Among bodies alike the factor grows in proportion to the load beyond it, so that a
-// pile does not pay five times as much for one patch. Where masses are uneven it jumps: else of landed pallets of
-// 0.2 to 100 kg three times as many still move after 6 s.
-constexpr double least_push = 600.0;
-// Masses that differ by this factor or more are uneven [1].
-constexpr double uneven_masses = 10.0;
 inline bool are_uneven(double inverse_mass_a, double inverse_mass_b) {
   double least = min(inverse_mass_a, inverse_mass_b), most = max(inverse_mass_a, inverse_mass_b);
   return least > 0.0 && most >= uneven_masses * least;
 }
-// Which part of the depth that is wanted is aimed at [1]: what moves presses more than what rests, and the
-// depths of a stack add up.
-constexpr double aimed_depth = 0.36;
-// A factor that grows is larger than needed by this share [1], and grows only where less than needed by as
-// much: each change moves what rests.
-constexpr double growth = 1.25;
-// Sub-steps are shorter by this factor at most.
-constexpr int finest = 64;
-// A factor that is this many times what is needed for this time [s] shrinks, by e in the same time: patches then
-// sink softly. Where it was halved at once, a pile of 500 at rest slid by 6 cm.
-constexpr int spare_factor = 4;
-constexpr double calm_time = 1.0;
-// What lasts of a force grows by e in this time [s]. An impact is over before.
-constexpr double lasting_time = 0.5;
-// Contacts are solved anew after so many sub-steps.
-constexpr int parts_of_a_contact = 4;
-
 // Chooses the factor of an island, and tells for how long it has swayed. Both are kept with its bodies.
 class FinenessOf {
  public:
@@ -82,7 +58,8 @@ class FinenessOf {
   // For how long an island has swayed at the end of a step [s]. Its bodies pass each other at `speed` [m/s].
   double swayed(const Island& island, double speed, double dt) const {
     double swayed = 0.0;
-    each_free(island, [&](const Moving& moving) { swayed = std::max(swayed, moving.fineness.swayed); });
+    each_free(island,
+              [&](const Moving& moving) { swayed = std::max(swayed, moving.fineness.swayed); });
     swayed = is_sway(speed, swayed > 0.0) ? swayed + dt : 0.0;
     each_free(island, [&](Moving& moving) { moving.fineness.swayed = swayed; });
     return swayed;

@@ -13,10 +13,6 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// A pair apart is a constraint of a step within so many times g·dt² [1]: what it falls in the first step,
-// and as much again in the next.
-constexpr double gap_share = 2.0;
-
 // How fast an outside wrench speeds a body up along a normal [m/s²].
 inline double pull_along(const Vec<double>& normal, const bc_wrench& outside, double inverse_mass) {
   return std::fabs(dot(vector(outside.force), normal)) * inverse_mass;

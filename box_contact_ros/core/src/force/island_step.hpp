@@ -19,12 +19,6 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// Most sub-steps that may be asked for.
-constexpr int substeps_max = 1000;
-
-// The ends of so many bodies and blocks are written at a time: some 20 µs of work for a thread.
-constexpr size_t ends_per_chunk = 256;
-
 struct Options {
   int substeps, threads;
   double friction, most_depth;
@@ -43,7 +37,8 @@ struct Advance {
 class IslandStep {
  public:
   IslandStep(const Options& options, const std::vector<Body>& bodies, const Advance& step,
-             const BodyStep& body_step, std::vector<Patch>& patches, std::vector<Load>& loads, Islands& islands)
+             const BodyStep& body_step, std::vector<Patch>& patches, std::vector<Load>& loads,
+             Islands& islands)
       : options_(options),
         bodies_(bodies),
         step_(step),
@@ -70,9 +65,9 @@ class IslandStep {
   template <class InThreads>
   void write_ends(InThreads& in_threads) const {
     size_t count = std::max(moving_.size(), blocks_.size());
-    in_threads(options_.threads, long((count + ends_per_chunk - 1) / ends_per_chunk),
+    in_threads(options_.threads, long((count + rows_per_chunk - 1) / rows_per_chunk),
                [&](long, long chunk) {
-                 size_t first = size_t(chunk) * ends_per_chunk, last = first + ends_per_chunk;
+                 size_t first = size_t(chunk) * rows_per_chunk, last = first + rows_per_chunk;
                  for (size_t k = first; k < std::min(last, moving_.size()); ++k)
                    body_step_.write_end(moving_[k]);
                  for (size_t k = first; k < std::min(last, blocks_.size()); ++k) end(blocks_[k]);
@@ -114,7 +109,7 @@ class IslandStep {
       take(patch, island.over_relaxation, block);
       island.fastest = std::max(island.fastest, passing_speed(patch, a, b));
       block.normal_sum = block.friction_sum = {};
-      island.is_new = island.is_new && patch.window == 0.0;
+      island.is_new = island.is_new && patch.kept.window == 0.0;
     });
   }
   // Choose how fine its sub-steps are, and how many iterations they take.
@@ -151,16 +146,8 @@ class IslandStep {
   }
   Work work_of(Islands::Range range, const SubSteps& steps, void* groups, size_t count) const {
     bool counts = step_.motion.wrenches;
-    return {range.first,
-            range.last,
-            bodies_.data(),
-            moving_.data(),
-            blocks_.data(),
-            patches_.data(),
-            groups,
-            count,
-            steps,
-            counts};
+    return {range.first,     range.last, bodies_.data(), moving_.data(), blocks_.data(),
+            patches_.data(), groups,     count,          steps,          counts};
   }
   template <class Visit>
   void each(const Island& island, const Visit& visit) const {
@@ -185,7 +172,7 @@ class IslandStep {
       kernel.end(&work);
       each_island([&](const Island& island) {
         each(island,
-             [](const Block& block, Patch& patch, Moving&, Moving&) { give_back(block, patch); });
+             [](const Block& block, Patch& patch, Moving&, Moving&) { patch.kept = block; });
       });
     };
     // Bodies move side by side where their blocks are solved alone, too.

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "../kernel.hpp"
@@ -15,39 +14,11 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// Blocks that are solved side by side, about: so many fill the lanes of islands of one block each, and a
-// core's second cache has room for them. A thread takes as many at a time: some 100 µs of work.
-constexpr size_t blocks_per_chunk = 128;
-
 // Islands in turn.
 struct Chunk {
   size_t island, island_end;
   size_t block, block_end;
   int64_t lost;  // the first body whose numbers are not finite at the end of an advance, or −1
-};
-
-// Memory for a time. A copy has none of it.
-class Scratch {
- public:
-  Scratch() = default;
-  Scratch(const Scratch&) {}
-  Scratch(Scratch&&) = default;
-  Scratch& operator=(const Scratch&) { return *this; }
-
-  void make_room(size_t bytes) {
-    if (bytes <= lines_ * sizeof(Line)) return;
-    size_t lines = bytes / sizeof(Line) + 1;
-    memory_.reset(new Line[lines]);
-    lines_ = lines;
-  }
-  char* at(size_t byte) { return reinterpret_cast<char*>(memory_.get()) + byte; }
-
- private:
-  struct alignas(64) Line {
-    char bytes[64];
-  };
-  std::unique_ptr<Line[]> memory_;
-  size_t lines_ = 0;
 };
 
 class Islands {
@@ -71,7 +42,8 @@ class Islands {
     by_height.reserve(patches);
     chunks.reserve(bodies);
     rooms_.reserve(patches + bodies);
-    if (side_) groups_.make_room(2 * patches / size_t(side_->lanes) * side_->group_size);
+    if (side_)
+      groups_.resize(2 * patches / size_t(side_->lanes) * side_->group_size / sizeof(Line) + 1);
   }
 
   // awake: the bodies in islands, in turn.
@@ -119,7 +91,7 @@ class Islands {
   const detail::ForceKernel* side() const { return side_; }
   // Memory for groups of a chunk.
   void* groups_of(const Chunk& chunk) {
-    return groups_.at(first_group(chunk.block) * side_->group_size);
+    return groups_[0].bytes + first_group(chunk.block) * side_->group_size;
   }
 
   // Put the blocks of the islands of a chunk that are shared into groups, whose lanes are solved side by
@@ -248,7 +220,10 @@ class Islands {
   Sorted bodies_, patches_;
   const detail::ForceKernel* side_;
   std::vector<Room> rooms_;  // of the groups of each chunk, and one behind them
-  Scratch groups_;
+  struct alignas(64) Line {
+    char bytes[64];
+  };
+  std::vector<Line> groups_;  // memory for them
 };
 
 }  // namespace box_contact::BOX_CONTACT_SET::force

@@ -11,57 +11,19 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// Iterations of a sub-step that push overlaps out, and those that then remove that speed again, at most.
-constexpr int iterations = 4, relaxations = 2;
-
-// A smaller change of a patch's speeds [m/s] does not make its neighbours be solved again. A jittered tower of
-// 20 sways for 3 s at 4 ms; with 1e-6 it sways for 8 s.
-constexpr double least_change = 1e-8;
-
-// An impact goes on being solved while an iteration changes a closing speed by more than this [m/s]. It ends
-// after so many iterations. What is left of a closing speed comes back as an overlap that is pushed out.
-constexpr double impact_change = 0.01;
-constexpr int impact_iterations = 40;
-// In an island that had patches before, the change must also exceed this acceleration times the sub-step
-// [m/s²]. In 1/240 s, the loads of what rolls in a pile change by 0.01 m/s all the time, and are no impact. A
-// pile of 1,000 at 1/60 s takes a third of the time that it takes with 0, and timbers below 24 t rest earlier.
-constexpr double impact_acceleration = 40.0;
 // With late answers no change of a closing speed is an impact [m/s]. Their patches are soft, and slow what
-// closes over several steps. If it were solved at once, 100 on 1 would never rest.
+// closes over several steps.
 constexpr double no_impact = std::numeric_limits<double>::infinity();
-// After every so many of them, all that presses in the island is scaled. A factor between the inverse of the
-// least one and the least one is too near to 1.
-constexpr int scaled_every = 8;
-constexpr double least_factor = 2.0;
 
-// Pressing and rocking are over-relaxed: their impulses change by more than what solves a block alone, by up
-// to this factor (successive over-relaxation, Young, 1954) [1]. The sway of stacks dies away in half of the
-// steps. With 1.4 a real pallet, whose flush sides come and go by nanometres, sways for ever. Late patches are
-// soft, and not over-relaxed.
-constexpr double most_over_relaxation = 1.3;
-
-// The factor in an island of so many blocks: one alone is solved at once [1].
+// The factor of over-relaxation in an island of so many blocks: one alone is solved at once [1].
 inline double over_relaxation(size_t blocks) {
   return 1.0 + (most_over_relaxation - 1.0) * (1.0 - 1.0 / double(blocks));
 }
 
-// Where stacks sway, impulses take more iterations to agree: so many times as many, but not with late answers,
-// whose patches are soft. The fastest of the bodies that touch pass each other at a speed in this range [m/s].
-// Slower, they rest; faster, they fall or slide. Of 60 landings of real pallets of like masses, at 1/60 s and
-// at 4 ms, all rest within 6 s; without it, 18 still move. What does not sway yet begins at a higher speed.
-// Fewer iterations end at impulses that differ a little: where sway ends at 1e-5 m/s, 15 still move.
-// A flush wall that begins is pushed out, which these iterations do not speed up: they are a third of its
-// first second's work. But by a rule that spares it, 42 of 162 scenes and timings rest later.
-constexpr int more_rounds = 3;
-constexpr double least_sway = 1e-7, begun_sway = 1e-4, most_sway = 0.1;
+// Where stacks sway, impulses take more iterations to agree. Slower, they rest; faster, they fall or slide.
 inline bool is_sway(double speed, bool has_swayed) {
   return speed > (has_swayed ? least_sway : begun_sway) && speed < most_sway;
 }
-// A stack takes `more_rounds` times as many at first, and as many more after each such time of sway [s], up to
-// `most_rounds` times. With no more than at first, six of six landings of a real order of 19 boxes sway for
-// ever at 1/60 s.
-constexpr double sway_time = 0.5;
-constexpr int most_rounds = 12;
 // How many times as many iterations an island takes that has swayed for a time [s]; 0: it does not sway.
 inline int rounds_of(double swayed) {
   if (swayed == 0.0) return 1;
@@ -81,13 +43,13 @@ struct Island {
   size_t body, body_end;  // among those that move
   size_t block, block_end;
   double over_relaxation;  // see above
-  double fastest;  // as which its bodies pass each other at the start of an advance [m/s]
-  bool is_new;     // whether it had no patch before this advance
-  int rounds;      // how many times as many iterations it takes
-  double factor;   // by which its sub-steps are finer; 0: its advance is over
-  bool is_shared;  // whether it is advanced with others
-  double impact;   // a larger change of a closing speed is an impact [m/s]
-  bool is_struck;  // whether the last iteration changed a closing speed as in an impact
+  double fastest;          // as which its bodies pass each other at the start of an advance [m/s]
+  bool is_new;             // whether it had no patch before this advance
+  int rounds;              // how many times as many iterations it takes
+  double factor;           // by which its sub-steps are finer; 0: its advance is over
+  bool is_shared;          // whether it is advanced with others
+  double impact;           // a larger change of a closing speed is an impact [m/s]
+  bool is_struck;          // whether the last iteration changed a closing speed as in an impact
 };
 
 // Before iterations begin, no speed has changed.

@@ -14,13 +14,12 @@
 #include "../../include/box_contact/force.h"
 #include "../faces/face_patch.hpp"
 #include "rectangle.hpp"
+#include "rigid_body.hpp"
+#include "tuning.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
 using namespace faces;
-
-// A patch that is at least so wide as a part of its faces stops a turn by itself [1].
-constexpr double wide = 0.5;
 
 inline Span span_along(const Face& face, const Vec<double>& axis) {
   double middle = dot(face.centre, axis);
@@ -45,8 +44,16 @@ struct FacePair {
 // The boxes of a pair, the lower first.
 using BoxPair = std::pair<int32_t, int32_t>;
 
-// The patch of a pair, where it was asked for, and the impulses that its rows gave in the last window:
-// in the last step, and before it if that was short.
+// The impulses that a patch gave in its last window: in the last step, and before it if that was short.
+template <class T>
+struct Kept {
+  T window;                                  // [s]
+  T normal_impulse, torsion_impulse;         // N [N s], m [N m s]
+  Vec<T> friction_impulse, rocking_impulse;  // f [N s], τ [N m s]
+  Vec<T> impulse_arm;                        // from A's centre of mass to where they acted [m]
+};
+
+// The patch of a pair, where it was asked for, and what it gave.
 struct Patch {
   int32_t box_a, box_b;  // box_a < box_b
   int32_t a, b;          // their bodies
@@ -61,12 +68,9 @@ struct Patch {
   double late;          // from the question to the answer [s]
   double age;           // since the answer was taken [s]
 
-  double force;                            // pressing: mean of the last advance [N]
-  double lasting;                          // what of it lasts: a part of an impact is not that [N]
-  double window;                           // in which the impulses were given [s]
-  double normal_impulse, torsion_impulse;  // N [N s], m [N m s]
-  Vec<double> friction_impulse, rocking_impulse;  // f [N s], τ [N m s]
-  Vec<double> impulse_arm;                        // from A's centre of mass to where they acted [m]
+  double force;    // pressing: mean of the last advance [N]
+  double lasting;  // what of it lasts: a part of an impact is not that [N]
+  Kept<double> kept;
 
   BoxPair pair() const { return {box_a, box_b}; }
 
@@ -74,18 +78,14 @@ struct Patch {
   void keep(const Patch& before) {
     force = before.force;
     lasting = before.lasting;
-    window = before.window;
-    normal_impulse = before.normal_impulse;
-    torsion_impulse = before.torsion_impulse;
-    friction_impulse = before.friction_impulse;
-    rocking_impulse = before.rocking_impulse;
-    impulse_arm = before.impulse_arm;
+    kept = before.kept;
   }
   // Keep the impulses of a window that is longer by a factor.
   void scale(double factor) {
-    window *= factor;
-    for (double* impulse : {&normal_impulse, &torsion_impulse}) *impulse *= factor;
-    for (Vec<double>* impulse : {&friction_impulse, &rocking_impulse}) *impulse = factor * *impulse;
+    for (double* each : {&kept.window, &kept.normal_impulse, &kept.torsion_impulse})
+      *each *= factor;
+    for (Vec<double>* each : {&kept.friction_impulse, &kept.rocking_impulse})
+      *each = factor * *each;
   }
 
   // Take the geometry of a contact, whose boxes are where the bodies are. box_axes: see rectangle_of.

@@ -23,10 +23,10 @@ namespace box_contact::BOX_CONTACT_SET::force {
 // What an advance leads from one to another, of what is awake. An advance that fails leaves the one that it began
 // with; bodies and what sleeps are written at its end.
 struct State {
-  std::vector<Patch> patches;      // by pair
-  std::vector<Load> loads;         // of the last advance, by pair
+  std::vector<Patch> patches;  // by pair
+  std::vector<Load> loads;     // of the last advance, by pair
   Clock clock;
-  bool has_loads = true;           // none since bodies or boxes were changed, or patches forgotten
+  bool has_loads = true;  // none since bodies or boxes were changed, or patches forgotten
   bool is_moved_by_wrenches = false;  // whether the caller moves the bodies since the last advance
 };
 
@@ -143,7 +143,7 @@ class PatchForces {
     return held;
   }
   // Whether contacts of one's own are those of these pairs already.
-  bool holds(const bc_patches& pairs) const { return own_.is_asked(pairs); }
+  bool holds(const bc_patches& pairs) const { return own_.is_asked(pairs, options_.friction); }
   // Take pairs whose contacts are solved at the start of each advance. Impulses stay.
   Held hold(const bc_patches& pairs) {
     bool were_told = state_.clock.is_told();
@@ -169,15 +169,16 @@ class PatchForces {
   }
   // Solve the contacts of one's own at the start of a step `dt`, and read them: see OwnContacts::solve.
   template <class Solve, class InThreads>
-  long solve_own(double dt, const bc_pose* poses, const bc_wrench* outside, const Solve& solve,
+  long solve_own(double dt, const Given& given, const Solve& solve, SolvePair solve_pair,
                  InThreads& in_threads, Held& held) {
     held = Held::all;
     if (own_.count() == 0) return -1;
     own_.choose(sleep_.revision(), sleep_.is_any_asleep(),
                 [this](size_t box) { return sleep_.is_quiet(size_t(body_of(int64_t(box)))); });
-    long refused = own_.solve(poses, Gaps(bodies_, boxes(), dt, outside), solve);
+    long refused =
+        own_.solve(given.poses, Gaps(bodies_, boxes(), dt, given.outside), solve, solve_pair);
     if (refused >= 0) return refused;
-    held = read(own_.answer(), poses, true, in_threads);
+    held = read(own_.answer(), given.poses, true, in_threads);
     if (held != Held::all) return refused;
     wake_touched();
     if (!keep_impulses(state_.patches, next_.patches)) is_grouped_ = false;
@@ -270,7 +271,8 @@ class PatchForces {
   // Bodies that fell asleep end where they began.
   void lay_down() {
     for (int32_t k : sleep_.awake())
-      if (sleep_.is_asleep(size_t(k))) ended_[size_t(k)] = {{}, {}, ended_[size_t(k)].fineness.at_rest(), {}};
+      if (sleep_.is_asleep(size_t(k)))
+        ended_[size_t(k)] = {{}, {}, ended_[size_t(k)].fineness.at_rest(), {}};
     sleep_.lay_down(bodies_, state_.patches, state_.loads);
     is_grouped_ = false;
   }
@@ -290,7 +292,7 @@ class PatchForces {
     woken_.reserve(room_);
     sleep_.make_room(bodies_.size(), room_);
     islands_.make_room(bodies_.size(), room_);
-    reader_.make_room(bodies_.size(), size_t(box_count()), room_);
+    reader_.make_room(room_);
   }
   // Loads name boxes, which may be others or none from now on.
   template <class Condition>
@@ -305,8 +307,8 @@ class PatchForces {
   template <class InThreads>
   Held read(const bc_patches& answer, const bc_pose* poses, bool is_own, InThreads& in_threads) {
     std::vector<Patch>& found = next_.patches;
-    reader_.read(
-        {answer, poses, bodies_, boxes(), options_.friction}, size_t(box_count()),
+    reader_.read_rows(
+        {answer, poses, bodies_, boxes(), options_.friction},
         [&](size_t turn) { return is_own ? own_.row(turn) : turn; }, found,
         [&](long count, const auto& work) { in_threads(options_.threads, count, work); });
     for (const Patch& patch : found)
@@ -321,11 +323,11 @@ class PatchForces {
   std::vector<Body> bodies_;
   Options options_;
   OwnContacts own_;
-  std::vector<Ended> ended_;     // of the bodies
-  std::vector<bc_pose> poses_;   // of the bodies at the end of the last advance
-  State state_, next_;           // as the last advance ended, and as the next one will
-  std::vector<Patch> woken_;     // of what wakes in this advance, as it was
-  Sleep sleep_;                  // patches and loads of what is asleep are there
+  std::vector<Ended> ended_;    // of the bodies
+  std::vector<bc_pose> poses_;  // of the bodies at the end of the last advance
+  State state_, next_;          // as the last advance ended, and as the next one will
+  std::vector<Patch> woken_;    // of what wakes in this advance, as it was
+  Sleep sleep_;                 // patches and loads of what is asleep are there
   // Memory that calls use again.
   PatchReader reader_;
   Islands islands_;

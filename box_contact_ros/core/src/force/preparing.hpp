@@ -9,17 +9,6 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// Of pushing out [1]: an overlap shrinks by a ninth a step. With 1, impacts are half as deep again.
-constexpr double soft_damping_ratio = 5.0;
-// The same where answers are late, or a patch has a stiffness of its own.
-constexpr double slow_damping_ratio = 2.0;
-// Speed at which an overlap is pushed out, at most [m/s]. The spring bears as much as without the limit.
-// Speeds add up in a stack, and relaxation leaves some: with 1, eight cubes that overlap by 2 mm jump by
-// 0.8 m.
-constexpr double push_out_limit = 0.1;
-// The same where answers are late, which bear nothing that is as hard.
-constexpr double late_push_out_limit = 1.0;
-
 // How a body turns by an angular impulse. One that no force moves does not.
 template <class T, class Body>
 BC_INLINE Vec<T> turned_by(const Body& body, const Vec<T>& impulse) {

@@ -14,33 +14,13 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// Masses [kg] and moments of inertia [kg m²] accepted: a product of three inverses is a number.
-constexpr double mass_min = 1e-50, mass_max = 1e50;
-// By how much of it a moment of inertia may exceed the sum of the two others [1]: rounding.
-constexpr double inertia_slack = 1e-9;
-// Speeds accepted, at most [m/s], [rad/s]: their squares times a moment of inertia are numbers.
-constexpr double speed_max = 1e50;
-// Forces, torques and impulses accepted, at most [N], [N m], [N s]: those of the largest mass at the
-// largest speed.
-constexpr double wrench_max = 1e100;
-// Times, frictions and stiffnesses accepted, at most [s], [1], [N/m]: their squares are numbers.
-constexpr double amount_max = 1e50;
 // Of a place of a centre of mass [m]: that of a box, and a centre in it.
 constexpr double place_max = 4.0 * length_max;
 
-// NaN fails all of these.
-inline bool are_within(const double* numbers, int64_t count, double limit) {
-  return std::all_of(numbers, numbers + count,
-                     [limit](double number) { return std::fabs(number) <= limit; });
-}
 inline bool is_still(const bc_velocity& velocity) {
-  return are_within(velocity.linear, 3, 0.0) && are_within(velocity.angular, 3, 0.0);
-}
-inline bool is_within(const Vec<double>& a, double limit) { return are_within(a.v, 3, limit); }
-inline bool is_amount(double number) { return number >= 0.0 && number <= amount_max; }
-inline bool is_mass(double number) { return number >= mass_min && number <= mass_max; }
-inline bool is_inertia(const Vec<double>& moments) {
-  return (moments[0] + moments[1]) + moments[2] >= (2.0 - inertia_slack) * largest(moments);
+  auto is_zero = [](double number) { return number == 0.0; };
+  return std::all_of(velocity.linear, velocity.linear + 3, is_zero) &&
+         std::all_of(velocity.angular, velocity.angular + 3, is_zero);
 }
 
 // A body that no force moves has inverses of zero.
@@ -88,37 +68,6 @@ inline bc_pose pose_at(const Placed& placed, const double (&quaternion)[4],
   for (int i = 0; i < 4; ++i) pose.quaternion[i] = scale * quaternion[i];
   return pose;
 }
-
-// Where bodies or boxes are that are asked for: each is found once.
-class PlacedOnce {
- public:
-  void make_room(size_t count) {
-    placed_.reserve(count);
-    asked_.reserve(count);
-    is_asked_.reserve(count);
-  }
-  void forget(size_t count) {
-    placed_.resize(count);
-    asked_.clear();
-    is_asked_.assign(count, 0);
-  }
-  void ask(size_t k) {
-    if (!is_asked_[k]) asked_.push_back(k);
-    is_asked_[k] = 1;
-  }
-  size_t count() const { return asked_.size(); }
-  // Find those from one that was asked for to another, or to the last one.
-  template <class Find>
-  void find(size_t first, size_t last, const Find& find) {
-    for (size_t i = first; i < std::min(last, count()); ++i) placed_[asked_[i]] = find(asked_[i]);
-  }
-  const Placed& operator[](size_t k) const { return placed_[k]; }
-
- private:
-  std::vector<Placed> placed_;
-  std::vector<size_t> asked_;
-  std::vector<uint8_t> is_asked_;
-};
 
 // The pose of a box in the common frame, of a pose in the frame of a body at `body`.
 inline bc_pose in_common_frame(const bc_pose& body, const bc_pose& box) {

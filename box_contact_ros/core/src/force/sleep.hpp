@@ -14,8 +14,6 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// By how much an answer to a patch asleep may differ from the one that it has [m].
-constexpr double settled_gap = 1e-5;
 // What is awake fell asleep then [s].
 constexpr double never = -1e300;
 
@@ -118,7 +116,8 @@ class Sleep {
 
   // Wake the islands that are marked: copy their patches to those that are awake. Impulses are those of a
   // window, as long as it is now. Returns whether there are any.
-  bool wake(const std::vector<Body>& bodies, double window, double age, std::vector<Patch>& patches) {
+  bool wake(const std::vector<Body>& bodies, double window, double age,
+            std::vector<Patch>& patches) {
     if (!is_any_marked_) return false;
     auto wakes = [this](size_t k) { return wakes_of(patches_[k]) == Wakes::soon; };
     merge_rows(patches_, patches, wakes);
@@ -162,9 +161,7 @@ class Sleep {
   void hear(const std::vector<Body>& bodies, const std::vector<Patch>& next, double age,
             const bc_pose* asked) {
     auto told = next.begin();
-    auto is_awake = [&](int32_t k) {
-      return bodies[size_t(k)].is_free() && !is_asleep(size_t(k));
-    };
+    auto is_awake = [&](int32_t k) { return bodies[size_t(k)].is_free() && !is_asleep(size_t(k)); };
     // What moves may have come to touch since the question.
     auto mark_new = [&](const Patch& patch) {
       if (patch.age >= 0.0 && (!is_of_before(patch, age) || is_awake(patch.a) || is_awake(patch.b)))
@@ -292,13 +289,17 @@ class Sleep {
     if (motion.wrenches) motion.wrenches[k] = of_[k].wrench;
   }
 
-  // Whether an answer says of a patch asleep what was known. The first one is of other poses than the patch.
+  // Whether an answer says of a patch asleep what was known. The first one is of poses a little other than
+  // those of the patch.
   bool is_told_again(const Patch& patch, const Patch& next, const bc_pose* asked) const {
     if (!have_same_bits(of_[size_t(patch.a)].pose, asked[patch.a]) ||
         !have_same_bits(of_[size_t(patch.b)].pose, asked[patch.b]) ||
         next.friction != patch.friction || next.stiffness != patch.stiffness ||
         !have_same_bits(next.surface, patch.surface))
       return false;
+    if (have_same_bits(next.asked_a, patch.asked_a) && have_same_bits(next.asked_b, patch.asked_b))
+      return have_same_bits(next.normal, patch.normal) && have_same_bits(next.point, patch.point) &&
+             next.depth == patch.depth;
     return std::fabs(next.depth - patch.depth) <= settled_gap;
   }
   // Whether a question, asked so long ago, is of the time before the bodies of a patch fell asleep: it

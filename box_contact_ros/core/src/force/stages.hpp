@@ -133,9 +133,8 @@ class Stages {
     count *= work.steps.rounds;
     auto solve_all = [&](int iteration, bool is_beyond) {
       bool is_changed = false;
-      each(work, [&](G& group) {
-        is_changed |= solve(work, {is_pushing, iteration, is_beyond}, group);
-      });
+      each(work,
+           [&](G& group) { is_changed |= solve(work, {is_pushing, iteration, is_beyond}, group); });
       return is_changed;
     };
     auto scale_it = [&](const Island& island, int iteration) {

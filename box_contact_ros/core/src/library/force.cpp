@@ -40,7 +40,7 @@ bool solve_exactly(const PairNumbers& pair, bc_contact& contact) {
 }
 
 // Solve the contacts of one's own, and read them.
-bc_status solve_own(Handled& all, double dt, const bc_pose* poses, const bc_wrench* outside) {
+bc_status solve_own(Handled& all, double dt, const Given& given) {
   const Kernel* kernel = chosen_kernel();
   if (!kernel) return fail(BC_BAD_ENVIRONMENT, "BOX_CONTACT_INSTRUCTION_SET is unknown");
   auto solve = [&](const Rows& rows, long count, const Results& results) {
@@ -48,7 +48,7 @@ bc_status solve_own(Handled& all, double dt, const bc_pose* poses, const bc_wren
                       &all.threads);
   };
   PatchForces::Held held;
-  long refused = all.forces.solve_own(dt, poses, outside, solve, all.threads, held);
+  long refused = all.forces.solve_own(dt, given, solve, solve_exactly, all.threads, held);
   if (refused >= 0) return fail(BC_BAD_POSE, "pairs[%ld]: a box is beyond 1e50 m", refused);
   return explain(held);
 }
@@ -65,7 +65,7 @@ bc_status advance(bc_patch_forces* forces, double dt, const Given& given, const 
   if (bc_status status = check_changed(changed, self.bodies().size())) return status;
   self.begin(given, changed, all);
   bc_status status = check_given(self, given);
-  if (!status) status = solve_own(handled(forces), dt, given.poses, given.outside);
+  if (!status) status = solve_own(handled(forces), dt, given);
   if (!status && self.is_waking()) status = check_given(self, given);
   if (status) {
     self.cancel();

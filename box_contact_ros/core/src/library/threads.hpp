@@ -65,8 +65,7 @@ class Threads {
     threads = begin(std::min(threads, chunks));
     if (threads > 1)
       call(
-          threads,
-          [](const void* all, long thread) { (*static_cast<const WorkOn*>(all))(thread); },
+          threads, [](const void* all, long thread) { (*static_cast<const WorkOn*>(all))(thread); },
           &work_on);
     work_on(0L);
     if (threads > 1) await_end();
