@@ -34,7 +34,7 @@ namespace box_contact::BOX_CONTACT_SET::force {
 template <class T>
 struct Speeds {
   Vec<T> linear;
-  T changed;  // the last iteration that changed them
+  T last_change;  // the last iteration that changed them
   Vec<T> angular;
   T inverse_mass;
 };
@@ -55,7 +55,7 @@ struct Fineness {
   double swayed = 0.0;  // for how long it has swayed [s]
 
   // What rests has not swayed, still bears its load, and is to stay where it is.
-  Fineness at_rest() const { return {factor}; }
+  Fineness asleep() const { return {factor}; }
 };
 
 // For how long a body's island was slow [s], and the least square of its speed since then [m²/s²].
@@ -74,7 +74,7 @@ struct alignas(64) Moving : Speeds<double>, Where<double>, Sums<double> {
   double load;           // weights that it bears and its own [N]
   int carriers;          // how many patches bear it
   double speed_squared;  // twice its energy by its mass, at the end of an advance [m²/s²]
-  bool is_held;          // whether friction holds it
+  bool is_supported;     // whether friction holds it
 };
 
 // The bodies of blocks side by side.
@@ -144,8 +144,8 @@ BC_INLINE void bound(Vec<T>& impulses, T limit) {
   if (any(is_beyond)) impulses = select(is_beyond, (limit / sqrt(squared)) * impulses, impulses);
 }
 
-// Take what an answer, and the last window, say of a patch.
-inline void take(const Patch& patch, double over_relaxation, Block& block) {
+// Read what an answer, and the last window, say of a patch.
+inline void read_patch(const Patch& patch, double over_relaxation, Block& block) {
   auto local = [&](const Placed& asked) {
     return transposed_times(asked.axes, patch.point - asked.position);
   };
@@ -160,15 +160,15 @@ inline void take(const Patch& patch, double over_relaxation, Block& block) {
 
 // Give B an impulse at the point and an angular impulse, and A the opposite.
 template <class T, class Body>
-BC_INLINE void apply(const Rows<T>& block, const Vec<T>& impulse, const Vec<T>& turn, Body& a,
+BC_INLINE void apply(const Rows<T>& block, const Vec<T>& impulse, const Vec<T>& angular, Body& a,
                      Body& b) {
   if (any(a.inverse_mass > 0.0)) {
     a.linear = a.linear - a.inverse_mass * impulse;
-    a.angular = a.angular - a.inverse_inertia * (cross(block.arm_a, impulse) + turn);
+    a.angular = a.angular - a.inverse_inertia * (cross(block.arm_a, impulse) + angular);
   }
   if (any(b.inverse_mass > 0.0)) {
     b.linear = b.linear + b.inverse_mass * impulse;
-    b.angular = b.angular + b.inverse_inertia * (cross(block.arm_b, impulse) + turn);
+    b.angular = b.angular + b.inverse_inertia * (cross(block.arm_b, impulse) + angular);
   }
 }
 template <class T, class Body>
@@ -191,12 +191,12 @@ BC_INLINE void count(Rows<T>& block, Sums<T>& a, Sums<T>& b) {
   block.friction_counted = block.friction_impulses;
   Vec<T> impulse =
       normal[0] * block.normal + (friction[0] * shape.axis_1 + friction[1] * shape.axis_2);
-  Vec<T> turn = (normal[1] * shape.axis_1 + normal[2] * shape.axis_2) +
-                (shape.radius * friction[2]) * block.normal;
+  Vec<T> angular = (normal[1] * shape.axis_1 + normal[2] * shape.axis_2) +
+                   (shape.radius * friction[2]) * block.normal;
   a.impulse = a.impulse - impulse;
-  a.angular_impulse = a.angular_impulse - (cross(block.arm_a, impulse) + turn);
+  a.angular_impulse = a.angular_impulse - (cross(block.arm_a, impulse) + angular);
   b.impulse += impulse;
-  b.angular_impulse += cross(block.arm_b, impulse) + turn;
+  b.angular_impulse += cross(block.arm_b, impulse) + angular;
 }
 
 // The impulses of the last window, about the point of this step.
@@ -286,9 +286,9 @@ BC_INLINE T closing_speed(const Rows<T>& block, const Body& a, const Body& b) {
 template <class T, class Body>
 BC_INLINE Vec<T> pressing_speeds(const Rows<T>& block, const NormalRows<T>& rows, const Body& a,
                                  const Body& b) {
-  Vec<T> turns = b.angular - a.angular;
-  return Vec<T>{dot(speed(block, a, b), block.normal), dot(turns, block.shape.axis_1),
-                dot(turns, block.shape.axis_2)} +
+  Vec<T> spin = b.angular - a.angular;
+  return Vec<T>{dot(speed(block, a, b), block.normal), dot(spin, block.shape.axis_1),
+                dot(spin, block.shape.axis_2)} +
          rows.bias;
 }
 

@@ -12,7 +12,7 @@
 #include "block.hpp"
 #include "carriers.hpp"
 #include "clock.hpp"
-#include "turning.hpp"
+#include "rotation.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
@@ -65,7 +65,7 @@ class BodyStep {
                                                    bodies_[k].inverse_inertia);
   }
   // Advance a body without contacts.
-  void advance(Moving& moving) const {
+  void fly(Moving& moving) const {
     for (int number = 1; number <= steps_.count; ++number) {
       drive(moving, number, steps_);
       move(bodies_[size_t(moving.body)], steps_.length, moving);

@@ -33,9 +33,10 @@ struct SubSteps {
   int count, rounds;  // how many, and how many times all iterations are in each
   bool is_late;       // whether answers are late
   double window;      // the time in which the impulses that patches keep are given [s]
-  double share;       // of the window in the longest step [1]: answers are late compared with that
-  double period;      // from one answer to the next [s]
-  double overdue;     // age of an answer that is overdue [s]
+  double
+      window_share;  // of the window in the longest step [1]: answers are late compared with that
+  double period;     // from one answer to the next [s]
+  double overdue;    // age of an answer that is overdue [s]
 
   static int count_of(double dt, double window) {
     return std::max(1, int(std::ceil(dt / window - sub_step_slack)));
@@ -44,7 +45,7 @@ struct SubSteps {
   SubSteps finer(double factor) const {
     SubSteps steps = *this;
     steps.window = window / factor;
-    steps.share = share / factor;
+    steps.window_share = window_share / factor;
     steps.count = count_of(dt, steps.window);
     steps.length = dt / steps.count;
     return steps;

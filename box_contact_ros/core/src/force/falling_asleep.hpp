@@ -56,7 +56,7 @@ class FallingAsleep {
       is_calm = is_calm && moving.speed_squared <= std::max(slow.least, calm);
     });
     if (time < sleep_time) return false;
-    if (is_calm && is_held(island) && has_stayed(island)) return true;
+    if (is_calm && is_supported(island) && has_stayed(island)) return true;
     each_free(island, islands_, [](Moving& moving) { moving.slow = {}; });
     return false;
   }
@@ -85,17 +85,17 @@ class FallingAsleep {
       Placed from = placed_at(given_.poses[moving.body], body.centre);
       double rate = 1.0 / steps_.dt;
       Motion mean{rate * (moving.placed.position - from.position),
-                  rate * turn(from, moving.placed)};
+                  rate * rotation(from, moving.placed)};
       have_all = have_all && speed_squared(body, moving.placed, mean) < limit;
     });
     return have_all;
   }
   // Whether contacts hold all bodies of an island, from those that no force moves on: friction could stop
   // them within the advance. What lies on ice, floats or goes on a belt is not at rest.
-  bool is_held(const Island& island) const {
+  bool is_supported(const Island& island) const {
     std::vector<Moving>& all = islands_.moving;
     for (size_t k = island.body; k < island.body_end; ++k)
-      all[k].is_held = all[k].inverse_mass == 0.0;
+      all[k].is_supported = all[k].inverse_mass == 0.0;
     for (bool goes_on = true; goes_on;) {
       goes_on = false;
       for (size_t k = island.block; k < island.block_end; ++k) {
@@ -103,15 +103,15 @@ class FallingAsleep {
         const Patch& patch = patches_[size_t(block.patch)];
         if (dot(patch.surface, patch.surface) != 0.0 || patch.age > steps_.overdue) return false;
         Moving &a = all[size_t(block.a)], &b = all[size_t(block.b)];
-        if (a.is_held == b.is_held) continue;
-        const Moving& other = a.is_held ? b : a;
+        if (a.is_supported == b.is_supported) continue;
+        const Moving& other = a.is_supported ? b : a;
         double most = block.friction * block.normal_sum[0] * other.inverse_mass;  // [m/s]
         if (most > 0.0 && other.speed_squared <= most * most)
-          a.is_held = b.is_held = goes_on = true;
+          a.is_supported = b.is_supported = goes_on = true;
       }
     }
     return std::all_of(all.begin() + long(island.body), all.begin() + long(island.body_end),
-                       [](const Moving& moving) { return moving.is_held; });
+                       [](const Moving& moving) { return moving.is_supported; });
   }
 
   Islands& islands_;

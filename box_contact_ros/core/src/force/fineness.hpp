@@ -19,10 +19,6 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-inline bool are_uneven(double inverse_mass_a, double inverse_mass_b) {
-  double least = min(inverse_mass_a, inverse_mass_b), most = max(inverse_mass_a, inverse_mass_b);
-  return least > 0.0 && most >= uneven_masses * least;
-}
 // Chooses the factor of an island, and tells for how long it has swayed. Both are kept with its bodies.
 class FinenessOf {
  public:
@@ -36,19 +32,19 @@ class FinenessOf {
         by_height_(islands.by_height) {}
 
   double operator()(const Island& island, const SubSteps& steps) const {
-    double needed = needed_by(island, steps), held = 1.0, calm = calm_time;
+    double needed = needed_by(island, steps), last = 1.0, calm = calm_time;
     each_free(island, [&](const Moving& moving) {
-      held = std::max(held, moving.fineness.factor);
+      last = std::max(last, moving.fineness.factor);
       calm = std::min(calm, moving.fineness.calm);
     });
-    if (held == 1.0 && needed <= 1.0) return 1.0;
-    bool is_spare = spare_factor * needed <= held;
-    bool is_short = needed > (held == 1.0 ? 1.0 : growth * held);
-    double factor = held;
+    if (last == 1.0 && needed <= 1.0) return 1.0;
+    bool is_spare = spare_factor * needed <= last;
+    bool is_short = needed > (last == 1.0 ? 1.0 : growth * last);
+    double factor = last;
     if (is_short)
       factor = std::ceil(std::min(growth * needed, double(finest)));
     else if (is_spare && calm >= calm_time)
-      factor = std::max(1.0, held * (1.0 - steps.dt / calm_time));
+      factor = std::max(1.0, last * (1.0 - steps.dt / calm_time));
     each_free(island, [&](Moving& moving) {
       moving.fineness.factor = factor;
       moving.fineness.calm = is_spare ? moving.fineness.calm + steps.dt : 0.0;
@@ -83,7 +79,7 @@ class FinenessOf {
     double weight = length(total), push = 0.0;
     bool is_uneven = false;
     bool may_be_heavy = weight * 2.0 * lightest > least_push;
-    if (may_be_heavy) add_loads(island, (-1.0 / weight) * total);
+    if (may_be_heavy) hand_down_weights(island, (-1.0 / weight) * total);
     for (size_t k = island.block; k < island.block_end; ++k) {
       Patch& patch = patches_[size_t(blocks_[k].patch)];
       double above = may_be_heavy ? blocks_[k].load : 0.0;
@@ -91,7 +87,8 @@ class FinenessOf {
           std::min(patch.force, std::max(patch.lasting, above) * (1.0 + steps.dt / lasting_time));
       double of_a = moving_[size_t(blocks_[k].a)].inverse_mass,
              of_b = moving_[size_t(blocks_[k].b)].inverse_mass;
-      is_uneven = is_uneven || are_uneven(of_a, of_b);
+      double least = min(of_a, of_b), most = max(of_a, of_b);
+      is_uneven = is_uneven || (least > 0.0 && most >= uneven_masses * least);
       push = std::max(push, std::max(patch.lasting, above) * (of_a + of_b));
     }
     double ratio = steps.window * std::sqrt(push / (aimed_depth * most_depth_)) / soft_frequency;
@@ -100,7 +97,7 @@ class FinenessOf {
   }
 
   // Weights from the top: each body hands what it bears to its patches below, in equal parts.
-  void add_loads(const Island& island, const Vec<double>& up) const {
+  void hand_down_weights(const Island& island, const Vec<double>& up) const {
     for (size_t k = island.body; k < island.body_end; ++k) {
       Moving& moving = moving_[k];
       moving.carriers = 0;

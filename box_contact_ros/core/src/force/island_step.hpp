@@ -26,7 +26,7 @@ struct Options {
 };
 
 // What an advance begins with, and where its end goes.
-struct Advance {
+struct StepInputs {
   SubSteps steps;
   Given given;
   const bc_motion& motion;
@@ -36,7 +36,7 @@ struct Advance {
 
 class IslandStep {
  public:
-  IslandStep(const Options& options, const std::vector<Body>& bodies, const Advance& step,
+  IslandStep(const Options& options, const std::vector<Body>& bodies, const StepInputs& step,
              const BodyStep& body_step, std::vector<Patch>& patches, std::vector<Load>& loads,
              Islands& islands)
       : options_(options),
@@ -53,10 +53,10 @@ class IslandStep {
   // Advance all islands. Returns the first body whose numbers are not finite at the end, or −1. No bit depends
   // on the number of threads.
   template <class InThreads>
-  int64_t advance(InThreads& in_threads) const {
+  int64_t solve_all(InThreads& in_threads) const {
     std::vector<Chunk>& chunks = islands_.chunks;
     in_threads(options_.threads, long(chunks.size()),
-               [&](long, long k) { advance(chunks[size_t(k)]); });
+               [&](long, long k) { solve(chunks[size_t(k)]); });
     for (const Chunk& chunk : chunks)
       if (chunk.lost >= 0) return chunk.lost;
     return -1;
@@ -75,11 +75,11 @@ class IslandStep {
   }
 
  private:
-  void advance(Chunk& chunk) const {
+  void solve(Chunk& chunk) const {
     for (Island& island : islands_.of(chunk)) begin(island);
     // Those with as many iterations, in sub-steps as fine, are advanced together.
     for (const Island& island : islands_.of(chunk))
-      if (island.factor > 0.0) advance(chunk, island.factor, island.rounds);
+      if (island.factor > 0.0) solve_alike(chunk, island.factor, island.rounds);
     chunk.lost = first_lost(chunk);
   }
   // The first body of a chunk whose numbers are not finite at the end, or −1.
@@ -94,7 +94,7 @@ class IslandStep {
     for (size_t k = island.body; k < island.body_end; ++k) body_step_.begin(moving_[k]);
     island.factor = 0.0;
     if (island.block == island.block_end) {
-      for (size_t k = island.body; k < island.body_end; ++k) body_step_.advance(moving_[k]);
+      for (size_t k = island.body; k < island.body_end; ++k) body_step_.fly(moving_[k]);
       return;
     }
     begin_blocks(island);
@@ -106,7 +106,7 @@ class IslandStep {
     island.over_relaxation =
         step_.steps.is_late ? 1.0 : over_relaxation(island.block_end - island.block);
     each(island, [&](Block& block, const Patch& patch, Moving& a, Moving& b) {
-      take(patch, island.over_relaxation, block);
+      read_patch(patch, island.over_relaxation, block);
       island.fastest = std::max(island.fastest, passing_speed(patch, a, b));
       block.normal_sum = block.friction_sum = {};
       island.is_new = island.is_new && patch.kept.window == 0.0;
@@ -119,24 +119,24 @@ class IslandStep {
     island.factor = step_.own ? fineness_of_(island, step_.steps) : 1.0;
   }
   // Advance the islands whose sub-steps are finer by a factor, and that take so many times the iterations.
-  void advance(const Chunk& chunk, double factor, int rounds) const {
+  void solve_alike(const Chunk& chunk, double factor, int rounds) const {
     SubSteps steps = steps_of(factor, rounds);
-    auto advance = [&](Islands::Range range, const detail::ForceKernel& kernel, void* groups,
-                       size_t count) {
+    auto solve_range = [&](Islands::Range range, const detail::ForceKernel& kernel, void* groups,
+                           size_t count) {
       Work work = work_of(range, steps, groups, count);
-      advance_by(kernel, factor, work);
+      take_sub_steps(kernel, factor, work);
     };
     for (Island& island : islands_.of(chunk))
-      island.is_shared = island.factor == factor && island.rounds == rounds;
-    size_t groups = islands_.share(chunk);
+      island.is_due = island.factor == factor && island.rounds == rounds;
+    size_t groups = islands_.group_blocks(chunk);
     if (groups > 0)
-      advance(islands_.of(chunk), *islands_.side(), islands_.groups_of(chunk), groups);
+      solve_range(islands_.of(chunk), *islands_.side(), islands_.groups_of(chunk), groups);
     for (Island& island : islands_.of(chunk)) {
-      if (!island.is_shared) continue;
+      if (!island.is_due) continue;
       island.factor = 0.0;
       if (groups == 0)
-        advance({&island, &island + 1}, Stages<Block>::kernel, &blocks_[island.block],
-                island.block_end - island.block);
+        solve_range({&island, &island + 1}, Stages<Block>::kernel, &blocks_[island.block],
+                    island.block_end - island.block);
     }
   }
   SubSteps steps_of(double factor, int rounds) const {
@@ -158,10 +158,10 @@ class IslandStep {
     }
   }
 
-  void advance_by(const detail::ForceKernel& kernel, double factor, Work& work) const {
+  void take_sub_steps(const detail::ForceKernel& kernel, double factor, Work& work) const {
     auto each_island = [&](const auto& visit) {
       for (const Island* island = work.first; island < work.last; ++island)
-        if (island->is_shared) visit(*island);
+        if (island->is_due) visit(*island);
     };
     auto each_moving = [&](const auto& visit) {
       each_island([&](const Island& island) {
@@ -179,7 +179,8 @@ class IslandStep {
     const detail::ForceKernel& moves = islands_.side() ? *islands_.side() : Stages<Block>::kernel;
     const SubSteps& steps = work.steps;
     // From one answer to the next.
-    double time = factor > 1.0 ? std::min(parts_of_a_contact * steps.length, steps.dt) : steps.dt;
+    double time =
+        factor > 1.0 ? std::min(sub_steps_per_contact * steps.length, steps.dt) : steps.dt;
     each_island([&](const Island& island) {
       each(island, [&](Block& block, const Patch& patch, Moving& a, Moving& b) {
         close(patch, a, b, time, block);
@@ -188,7 +189,7 @@ class IslandStep {
     });
     kernel.load(&work);
     for (int number = 1; number <= steps.count; ++number) {
-      if (factor > 1.0 && number > 1 && number % parts_of_a_contact == 1) {
+      if (factor > 1.0 && number > 1 && number % sub_steps_per_contact == 1) {
         end();
         each_island([&](const Island& island) { ask_again(island, time); });
         kernel.load(&work);
@@ -207,7 +208,7 @@ class IslandStep {
     each(island, [&](Block& block, Patch& patch, Moving& a, Moving& b) {
       step_.own->solve_again(step_.solve_pair, body_step_.pose_of(a), body_step_.pose_of(b),
                              a.placed, b.placed, is_lighter_b(bodies_, patch), patch);
-      take(patch, island.over_relaxation, block);
+      read_patch(patch, island.over_relaxation, block);
       close(patch, a, b, time, block);
     });
   }
@@ -235,7 +236,7 @@ class IslandStep {
   }
   const Options& options_;
   const std::vector<Body>& bodies_;
-  const Advance& step_;
+  const StepInputs& step_;
   const BodyStep& body_step_;
   std::vector<Patch>& patches_;
   std::vector<Load>& loads_;

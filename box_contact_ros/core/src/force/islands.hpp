@@ -14,7 +14,7 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// Islands in turn.
+// Islands in order.
 struct Chunk {
   size_t island, island_end;
   size_t block, block_end;
@@ -46,7 +46,7 @@ class Islands {
       groups_.resize(2 * patches / size_t(side_->lanes) * side_->group_size / sizeof(Line) + 1);
   }
 
-  // awake: the bodies in islands, in turn.
+  // awake: the bodies in islands, in order.
   void group(const std::vector<Body>& bodies, const std::vector<int32_t>& awake,
              const std::vector<Patch>& patches) {
     by_height.resize(patches.size());
@@ -94,20 +94,20 @@ class Islands {
     return groups_[0].bytes + first_group(chunk.block) * side_->group_size;
   }
 
-  // Put the blocks of the islands of a chunk that are shared into groups, whose lanes are solved side by
-  // side. In turn, each goes into the first group with room behind those of its bodies. So bodies see
+  // Put the blocks of the islands of a chunk that are due into groups, whose lanes are solved side by
+  // side. In order, each goes into the first group with room behind those of its bodies. So bodies see
   // their blocks in the order of pairs, and no group has a body twice. Returns the number of groups; 0:
   // about half of the lanes would be empty, and each island is better solved alone.
-  size_t share(const Chunk& chunk) {
+  size_t group_blocks(const Chunk& chunk) {
     if (!side_) return 0;
     Room* rooms = rooms_.data() + chunk.block + size_t(&chunk - chunks.data());
-    int32_t lanes = side_->lanes, count = 0, blocks_shared = 0;
+    int32_t lanes = side_->lanes, count = 0, blocks_due = 0;
     for (int32_t k = 0; k <= int32_t(chunk.block_end - chunk.block); ++k) rooms[k] = {k, 0};
     for (size_t island = chunk.island; island < chunk.island_end; ++island) {
       const Island& here = all[island];
-      if (!here.is_shared) continue;
+      if (!here.is_due) continue;
       for (size_t k = here.body; k < here.body_end; ++k) moving[k].side = 0;
-      blocks_shared += int32_t(here.block_end - here.block);
+      blocks_due += int32_t(here.block_end - here.block);
       for (size_t k = here.block; k < here.block_end; ++k) {
         Moving &a = moving[size_t(blocks[k].a)], &b = moving[size_t(blocks[k].b)];
         int32_t group = first_room(rooms, std::max(a.side, b.side));
@@ -119,7 +119,7 @@ class Islands {
         count = std::max(count, group + 1);
       }
     }
-    return 2 * blocks_shared >= count * (lanes + 1) ? size_t(count) : 0;
+    return 2 * blocks_due >= count * (lanes + 1) ? size_t(count) : 0;
   }
 
  private:
@@ -186,7 +186,7 @@ class Islands {
     return place_[size_t(body)];
   }
 
-  // Places of things in the order of their islands; those of an island stay in turn (counting sort).
+  // Places of things in the order of their islands; those of an island stay in order (counting sort).
   class Sorted {
    public:
     struct Range {

@@ -1,7 +1,7 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// Iterations: the blocks of islands are solved in turn, and what presses in an impact is scaled.
+// Iterations: the blocks of islands are solved in order, and what presses in an impact is scaled.
 #pragma once
 
 #include <algorithm>
@@ -47,14 +47,14 @@ struct Island {
   bool is_new;             // whether it had no patch before this advance
   int rounds;              // how many times as many iterations it takes
   double factor;           // by which its sub-steps are finer; 0: its advance is over
-  bool is_shared;          // whether it is advanced with others
+  bool is_due;             // whether it is among those that are solved now
   double impact;           // a larger change of a closing speed is an impact [m/s]
   bool is_struck;          // whether the last iteration changed a closing speed as in an impact
 };
 
 // Before iterations begin, no speed has changed.
 inline void forget_changes(const Island& island, Moving* moving) {
-  for (size_t k = island.body; k < island.body_end; ++k) moving[k].changed = 0;
+  for (size_t k = island.body; k < island.body_end; ++k) moving[k].last_change = 0;
 }
 
 // A larger change of a closing speed is an impact in a sub-step of this length [m/s].
@@ -93,13 +93,13 @@ inline void scale(const Island& island, bool is_pushing, int iteration, Moving* 
     block.normal_impulses = factor * block.normal_impulses;
     apply_normal(block, block.normal_impulses, a, b);
     if (factor == 1.0) return;
-    if (a.inverse_mass > 0.0) a.changed = iteration;
-    if (b.inverse_mass > 0.0) b.changed = iteration;
+    if (a.inverse_mass > 0.0) a.last_change = iteration;
+    if (b.inverse_mass > 0.0) b.last_change = iteration;
   });
 }
 
-// Solve the blocks of islands in turn, `count` times, each island as if alone. Beyond them only impacts
-// go on. Changes were forgotten. `solve(iteration, is_beyond)`: a turn of all; returns whether a speed
+// Solve the blocks of islands in order, `count` times, each island as if alone. Beyond them only impacts
+// go on. Changes were forgotten. `solve(iteration, is_beyond)`: all of them; returns whether a speed
 // changed, and beyond, whether one did as in an impact. `scale(island, iteration)`: see above.
 template <class Solve, class Scale>
 void iterate(Island* first, Island* last, int count, Moving* moving, const Solve& solve,

@@ -168,8 +168,8 @@ class OwnContacts {
     if (placed.has_area()) patch = placed;
   }
 
-  // The row of an answer that comes in turn by pair.
-  size_t row(size_t turn) const { return is_all_ ? keys_[turn].row : turn; }
+  // The row of an answer at a place by pair.
+  size_t row(size_t place) const { return is_all_ ? keys_[place].row : place; }
   // What was solved last.
   bc_patches answer() const {
     const Pairs& live = chosen();
@@ -232,8 +232,8 @@ class OwnContacts {
       return {nullptr,       separation.data(), normal.data(), point.data(),
               volume.data(), covariance.data(), nullptr,       margin};
     }
-    // Take the patch of a contact; the separation stays.
-    void take_patch(size_t row, const bc_contact& contact) {
+    // Set the patch to that of a contact; the separation stays.
+    void set_patch(size_t row, const bc_contact& contact) {
       volume[row] = contact.volume;
       std::copy_n(contact.normal, 3, &normal[3 * row]);
       std::copy_n(contact.point, 3, &point[3 * row]);
@@ -283,7 +283,7 @@ class OwnContacts {
       detail::PairNumbers pair{poses_[a].position, moved.position, sizes_[a].extent,
                                sizes_[b].extent};
       if (!solve(pair, found)) return long(k);
-      if (found.volume > 0.0) found_.take_patch(k, found);
+      if (found.volume > 0.0) found_.set_patch(k, found);
     }
     return -1;
   }

@@ -66,7 +66,7 @@ struct Patch {
   double stiffness;     // [N/m], up to what step and answers bear; 0: that
   Vec<double> surface;  // velocity of B's surface relative to A's, beside the bodies' own [m/s]
   double late;          // from the question to the answer [s]
-  double age;           // since the answer was taken [s]
+  double age;           // since the answer came [s]
 
   double force;    // pressing: mean of the last advance [N]
   double lasting;  // what of it lasts: a part of an impact is not that [N]
@@ -177,6 +177,27 @@ struct ByPair {
     return p.pair() < q.pair();
   }
 };
+// Merge copies of rows into others, where `goes(place)`. Both are by pair, and there is room.
+template <class Row, class Goes>
+void merge_rows(const std::vector<Row>& from, std::vector<Row>& to, const Goes& goes) {
+  size_t count = 0, old = to.size();
+  for (size_t k = 0; k < from.size(); ++k) count += goes(k);
+  size_t end = old + count;
+  to.resize(end);
+  for (size_t k = from.size(); end > old && k-- > 0;) {
+    if (!goes(k)) continue;
+    while (old > 0 && from[k].pair() < to[old - 1].pair()) to[--end] = to[--old];
+    to[--end] = from[k];
+  }
+}
+template <class Row, class Goes>
+void drop_rows(std::vector<Row>& rows, const Goes& goes) {
+  size_t kept = 0;
+  for (size_t k = 0; k < rows.size(); ++k)
+    if (!goes(k)) rows[kept++] = rows[k];
+  rows.resize(kept);
+}
+
 // The patch of a pair among those that are by pair, or null.
 inline const Patch* find(const std::vector<Patch>& patches, const BoxPair& pair) {
   auto before = [](const Patch& patch, const BoxPair& other) { return patch.pair() < other; };

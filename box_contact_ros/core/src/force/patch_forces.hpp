@@ -32,7 +32,7 @@ struct State {
 
 class PatchForces {
  public:
-  enum class Held { all, pair_twice, no_patch };
+  enum class HoldResult { all, pair_twice, no_patch };
 
   // side: the kernel's, or null.
   PatchForces(std::vector<Body> bodies, const Options& options, const detail::ForceKernel* side)
@@ -131,31 +131,31 @@ class PatchForces {
   // Take an answer, and the poses of its question. Pairs that are missing are forgotten. Nothing changes
   // for a pair that comes twice, and for a patch beyond float64's range. `in_threads` shares chunks of work.
   template <class InThreads>
-  Held hold(const bc_patches& answer, const bc_pose* poses, InThreads& in_threads) {
-    Held held = read(answer, poses, false, in_threads);
-    if (held != Held::all) return held;
+  HoldResult hold(const bc_patches& answer, const bc_pose* poses, InThreads& in_threads) {
+    HoldResult result = read(answer, poses, false, in_threads);
+    if (result != HoldResult::all) return result;
     hear_of_sleep(answer.age, poses);
     if (!keep_impulses(state_.patches, next_.patches)) is_grouped_ = false;
     state_.patches.swap(next_.patches);
     make_room(state_.patches.size() + sleep_.patches().size());
     own_.forget();
     state_.clock.answer(answer.age, answer.period);
-    return held;
+    return result;
   }
   // Whether contacts of one's own are those of these pairs already.
   bool holds(const bc_patches& pairs) const { return own_.is_asked(pairs, options_.friction); }
   // Take pairs whose contacts are solved at the start of each advance. Impulses stay.
-  Held hold(const bc_patches& pairs) {
+  HoldResult hold(const bc_patches& pairs) {
     bool were_told = state_.clock.is_told();
     if (!own_.ask(pairs, options_.friction, sleep_.is_any_asleep(),
                   [this](const BoxPair& pair) { return sleep_.has(pair); }))
-      return Held::pair_twice;
+      return HoldResult::pair_twice;
     state_.clock.answer_each_step();
     make_room(own_.count());
     sleep_.mark_if([&](const Patch& patch) { return were_told || !own_.is_asked(patch); });
     wake();
     if (own_.count() == 0) drop([](const Patch&) { return true; });
-    return Held::all;
+    return HoldResult::all;
   }
   // Begin an advance, which `advance` ends or `cancel`. What sleeps and is not given as it was wakes. An advance
   // that gives the wrenches alone moves all bodies.
@@ -170,16 +170,16 @@ class PatchForces {
   // Solve the contacts of one's own at the start of a step `dt`, and read them: see OwnContacts::solve.
   template <class Solve, class InThreads>
   long solve_own(double dt, const Given& given, const Solve& solve, SolvePair solve_pair,
-                 InThreads& in_threads, Held& held) {
-    held = Held::all;
+                 InThreads& in_threads, HoldResult& result) {
+    result = HoldResult::all;
     if (own_.count() == 0) return -1;
     own_.choose(sleep_.revision(), sleep_.is_any_asleep(),
                 [this](size_t box) { return sleep_.is_quiet(size_t(body_of(int64_t(box)))); });
     long refused =
         own_.solve(given.poses, Gaps(bodies_, boxes(), dt, given.outside), solve, solve_pair);
     if (refused >= 0) return refused;
-    held = read(own_.answer(), given.poses, true, in_threads);
-    if (held != Held::all) return refused;
+    result = read(own_.answer(), given.poses, true, in_threads);
+    if (result != HoldResult::all) return refused;
     wake_touched();
     if (!keep_impulses(state_.patches, next_.patches)) is_grouped_ = false;
     keep_impulses(woken_, next_.patches);
@@ -194,14 +194,14 @@ class PatchForces {
                   InThreads& in_threads) {
     bc_motion all = motion;
     if (!all.poses) all.poses = poses_.data();
-    Advance step{next_.clock.begin(dt, options_.substeps), given, all,
-                 own_.count() > 0 ? &own_ : nullptr, solve_pair};
+    StepInputs step{next_.clock.begin(dt, options_.substeps), given, all,
+                    own_.count() > 0 ? &own_ : nullptr, solve_pair};
     BodyStep body_step(bodies_, step.steps, given, all, state_.is_moved_by_wrenches, ended_);
     if (!is_grouped_) islands_.group(bodies_, sleep_.awake(), next_.patches);
     is_grouped_ = true;
     next_.loads.resize(next_.patches.size());
     IslandStep islands(options_, bodies_, step, body_step, next_.patches, next_.loads, islands_);
-    if (int64_t lost = islands.advance(in_threads); lost >= 0) {
+    if (int64_t lost = islands.solve_all(in_threads); lost >= 0) {
       cancel();
       return lost;
     }
@@ -272,7 +272,7 @@ class PatchForces {
   void lay_down() {
     for (int32_t k : sleep_.awake())
       if (sleep_.is_asleep(size_t(k)))
-        ended_[size_t(k)] = {{}, {}, ended_[size_t(k)].fineness.at_rest(), {}};
+        ended_[size_t(k)] = {{}, {}, ended_[size_t(k)].fineness.asleep(), {}};
     sleep_.lay_down(bodies_, state_.patches, state_.loads);
     is_grouped_ = false;
   }
@@ -305,19 +305,20 @@ class PatchForces {
 
   // Read an answer, by pair.
   template <class InThreads>
-  Held read(const bc_patches& answer, const bc_pose* poses, bool is_own, InThreads& in_threads) {
+  HoldResult read(const bc_patches& answer, const bc_pose* poses, bool is_own,
+                  InThreads& in_threads) {
     std::vector<Patch>& found = next_.patches;
     reader_.read_rows(
         {answer, poses, bodies_, boxes(), options_.friction},
-        [&](size_t turn) { return is_own ? own_.row(turn) : turn; }, found,
+        [&](size_t place) { return is_own ? own_.row(place) : place; }, found,
         [&](long count, const auto& work) { in_threads(options_.threads, count, work); });
     for (const Patch& patch : found)
-      if (patch.age >= 0.0 && !patch.has_area()) return Held::no_patch;
+      if (patch.age >= 0.0 && !patch.has_area()) return HoldResult::no_patch;
     auto same = [](const Patch& p, const Patch& q) { return p.pair() == q.pair(); };
     if (!std::is_sorted(found.begin(), found.end(), ByPair{}))
       std::sort(found.begin(), found.end(), ByPair{});
     bool is_any_twice = std::adjacent_find(found.begin(), found.end(), same) != found.end();
-    return is_any_twice ? Held::pair_twice : Held::all;
+    return is_any_twice ? HoldResult::pair_twice : HoldResult::all;
   }
 
   std::vector<Body> bodies_;

@@ -69,14 +69,14 @@ inline void read(const Answered& all, int64_t k, Patch& patch) {
 class PatchReader {
  public:
   void make_room(size_t patches) { rows_.reserve(patches); }
-  // Read the rows that are patches, `row(turn)` for each turn. `each_chunk(count, work)` shares chunks of
+  // Read the rows that are patches, `row(place)` at each place. `each_chunk(count, work)` shares chunks of
   // work among threads. The age of a stale patch is below zero, and it knows nothing but its pair.
   template <class Row, class EachChunk>
   void read_rows(const Answered& all, const Row& row, std::vector<Patch>& patches,
                  const EachChunk& each_chunk) {
     rows_.clear();
-    for (int64_t turn = 0; turn < all.answer.count; ++turn)
-      if (auto k = int64_t(row(size_t(turn))); all.is_patch(k)) rows_.push_back(k);
+    for (int64_t place = 0; place < all.answer.count; ++place)
+      if (auto k = int64_t(row(size_t(place))); all.is_patch(k)) rows_.push_back(k);
     patches.resize(rows_.size());
     each_chunk(long((rows_.size() + rows_per_chunk - 1) / rows_per_chunk), [&](long, long chunk) {
       size_t first = size_t(chunk) * rows_per_chunk;

@@ -79,8 +79,8 @@ inline bc_pose in_common_frame(const bc_pose& body, const bc_pose& box) {
   return {{at[0], at[1], at[2]}, {turned[0], turned[1], turned[2], turned[3]}};
 }
 
-// The turn of a body between two places, as a vector: sin θ along the axis, for small θ its angle.
-inline Vec<double> turn(const Placed& from, const Placed& to) {
+// The rotation of a body between two places, as a vector: sin θ along the axis, for small θ its angle.
+inline Vec<double> rotation(const Placed& from, const Placed& to) {
   Vec<double> sum{0.0, 0.0, 0.0};
   for (int k = 0; k < 3; ++k) sum = sum + cross(column(from.axes, k), column(to.axes, k));
   return 0.5 * sum;

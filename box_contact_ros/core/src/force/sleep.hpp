@@ -14,36 +14,12 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// What is awake fell asleep then [s].
-constexpr double never = -1e300;
-
 // The bodies of which something may be given otherwise than in the last advance.
 struct Changed {
   bool is_known;  // false: all
   const int64_t* bodies;
   int64_t count;
 };
-
-// Merge copies of rows into others, where `goes(place)`. Both are by pair, and there is room.
-template <class Row, class Goes>
-void merge_rows(const std::vector<Row>& from, std::vector<Row>& to, const Goes& goes) {
-  size_t count = 0, old = to.size();
-  for (size_t k = 0; k < from.size(); ++k) count += goes(k);
-  size_t end = old + count;
-  to.resize(end);
-  for (size_t k = from.size(); end > old && k-- > 0;) {
-    if (!goes(k)) continue;
-    while (old > 0 && from[k].pair() < to[old - 1].pair()) to[--end] = to[--old];
-    to[--end] = from[k];
-  }
-}
-template <class Row, class Goes>
-void drop_rows(std::vector<Row>& rows, const Goes& goes) {
-  size_t kept = 0;
-  for (size_t k = 0; k < rows.size(); ++k)
-    if (!goes(k)) rows[kept++] = rows[k];
-  rows.resize(kept);
-}
 
 class Sleep {
  public:
@@ -270,7 +246,7 @@ class Sleep {
     bc_wrench outside{};
     bc_wrench wrench{};           // of contacts: the loads
     double window = 0.0;          // of its patches' impulses [s]
-    double since = never;         // when that was [s]
+    double since = -1e300;        // when that was; of what is awake, before all time [s]
     int32_t island = -1;          // the lowest body of its island; −1: it is awake
     bool is_fixed_still = false;  // of a body that no force moves
     bool bears = false;           // the same: whether something asleep lies on it

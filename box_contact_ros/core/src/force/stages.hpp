@@ -18,7 +18,7 @@ class Stages {
     if constexpr (!is_alone) {
       const Work& work = work_of(all);
       each(work, [](G& group) { group.filled = group.is_free_a = group.is_free_b = 0; });
-      each_shared(work, [&](Island& island) {
+      each_due(work, [&](Island& island) {
         for (size_t k = island.block; k < island.block_end; ++k) join(work, island, k);
       });
       each(work, [&](G& group) {
@@ -48,7 +48,7 @@ class Stages {
   static void move(void* all) {
     const Work& work = work_of(all);
     if constexpr (is_alone) {
-      each_shared_body(work, [&](size_t k) { force::move(work, work.moving[k]); });
+      each_due_body(work, [&](size_t k) { force::move(work, work.moving[k]); });
     } else {
       int32_t places[G::lanes];
       int filled = 0;
@@ -57,7 +57,7 @@ class Stages {
         force::move<typename G::Type>(work, places, (1u << filled) - 1);
         filled = 0;
       };
-      each_shared_body(work, [&](size_t k) {
+      each_due_body(work, [&](size_t k) {
         places[filled++] = int32_t(k);
         if (filled == G::lanes) move_them();
       });
@@ -99,13 +99,13 @@ class Stages {
     for (size_t k = 0; k < work.group_count; ++k) visit(groups(work)[k]);
   }
   template <class Visit>
-  static void each_shared(const Work& work, const Visit& visit) {
+  static void each_due(const Work& work, const Visit& visit) {
     for (Island* island = work.first; island < work.last; ++island)
-      if (island->is_shared) visit(*island);
+      if (island->is_due) visit(*island);
   }
   template <class Visit>
-  static void each_shared_body(const Work& work, const Visit& visit) {
-    each_shared(work, [&](const Island& island) {
+  static void each_due_body(const Work& work, const Visit& visit) {
+    each_due(work, [&](const Island& island) {
       for (size_t k = island.body; k < island.body_end; ++k) visit(k);
     });
   }

@@ -87,7 +87,7 @@ constexpr double calm_time = 1.0;
 // What lasts of a force grows by e in this time [s]: an impact is over before.
 constexpr double lasting_time = 0.5;
 // Own contacts are solved anew after so many finer sub-steps.
-constexpr int parts_of_a_contact = 4;
+constexpr int sub_steps_per_contact = 4;
 
 // --- gaps ---
 // A pair apart is a constraint within so many times g·dt² [1]: what it falls in this step and the next.

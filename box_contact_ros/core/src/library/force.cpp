@@ -23,13 +23,13 @@ const PatchForces& forces_of(const bc_patch_forces* forces) {
 }
 bc_patch_forces* handle(Handled* forces) { return reinterpret_cast<bc_patch_forces*>(forces); }
 
-bc_status explain(PatchForces::Held held) {
-  switch (held) {
-    case PatchForces::Held::pair_twice:
+bc_status explain(PatchForces::HoldResult result) {
+  switch (result) {
+    case PatchForces::HoldResult::pair_twice:
       return fail(BC_BAD_ARGUMENT, "pairs: a pair of boxes comes twice");
-    case PatchForces::Held::no_patch:
+    case PatchForces::HoldResult::no_patch:
       return fail(BC_BAD_ARGUMENT, "covariance: a patch has no area, or volume / area no number");
-    case PatchForces::Held::all:
+    case PatchForces::HoldResult::all:
       break;
   }
   return BC_OK;
@@ -47,10 +47,10 @@ bc_status solve_own(Handled& all, double dt, const Given& given) {
     return solve_rows({kernel, Model::exact, nullptr}, rows, count, results, all.forces.threads(),
                       &all.threads);
   };
-  PatchForces::Held held;
-  long refused = all.forces.solve_own(dt, given, solve, solve_exactly, all.threads, held);
+  PatchForces::HoldResult result;
+  long refused = all.forces.solve_own(dt, given, solve, solve_exactly, all.threads, result);
   if (refused >= 0) return fail(BC_BAD_POSE, "pairs[%ld]: a box is beyond 1e50 m", refused);
-  return explain(held);
+  return explain(result);
 }
 
 bc_status advance(bc_patch_forces* forces, double dt, const Given& given, const Changed& changed,
@@ -98,11 +98,9 @@ bc_status bc_patch_forces_create(const bc_body* bodies, int64_t count,
     std::vector<Body> read;
     if (bc_status status = read_bodies(bodies, count, read)) return status;
     const Kernel* kernel = chosen_kernel();
-    *forces = handle(
-        new Handled{PatchForces(std::move(read),
-                                {all.substeps, all.threads, all.friction, all.most_depth,
-                                 all.rest != 0},
-                                kernel ? &kernel->side : nullptr)});
+    *forces = handle(new Handled{PatchForces(
+        std::move(read), {all.substeps, all.threads, all.friction, all.most_depth, all.rest != 0},
+        kernel ? &kernel->side : nullptr)});
     return BC_OK;
   });
 }

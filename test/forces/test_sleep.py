@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Rest: what is laid down, what wakes it, and that it then goes on as if it had never been."""
+"""Sleep: what is laid down, what wakes it, and that it then goes on as if it had never been."""
 from __future__ import annotations
 
 from collections.abc import Callable
