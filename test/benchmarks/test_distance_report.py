@@ -48,6 +48,7 @@ def test_fuzz(capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch) ->
     assert len(distance.fuzz('needles', 1, 500)[2]) == 3
 
 
+@pytest.mark.reports
 @pytest.mark.skipif(shutil.which('g++') is None, reason='no compiler')
 def test_all_answer_as_the_judge(tmp_path: Path) -> None:
     """To what their tolerances leave."""

@@ -220,6 +220,7 @@ def test_mlp_is_more_exact_than_mujoco(name: str) -> None:
     assert p99(ours('mlp')) < p99(engine)
 
 
+@pytest.mark.reports
 def test_quick_run(tmp_path: Path) -> None:
     assert frontier.main(['--quick', '--out', str(tmp_path)]) == 0
     with (tmp_path / 'frontier.csv').open() as file:

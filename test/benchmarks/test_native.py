@@ -40,6 +40,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Program:
         return native_calls.compiled(tmp_path_factory.mktemp('native'), 'contact', sets)
 
 
+@pytest.mark.reports
 @needs_compiler
 def test_all_answer_as_exact(program: Program, containers: Pairs) -> None:
     """No verdict differs, and depths agree to what single precision and iterations leave."""
@@ -60,6 +61,7 @@ def test_all_answer_as_exact(program: Program, containers: Pairs) -> None:
     assert max(found['exact covariance, batch'].depth_errors) == 0.0
 
 
+@pytest.mark.reports
 @needs_compiler
 def test_a_copy_has_a_library_of_its_own(program: Program, containers: Pairs,
                                          tmp_path: Path) -> None:
@@ -95,6 +97,7 @@ def test_a_ratio_has_the_range_of_the_copies() -> None:
     assert table.splitlines()[2] == '| stacks | 100 | 1.40 [1.20, 1.50] | – | – |'
 
 
+@pytest.mark.reports
 @needs_compiler
 def test_each_contact_has_its_time(program: Program, containers: Pairs) -> None:
     """Contacts alone, equally many of each set; the table compares with the median of all."""
@@ -131,6 +134,7 @@ def test_a_wrong_verdict_is_counted(containers: Pairs) -> None:
     assert (found.missed, found.invented) == (1, 0)
 
 
+@pytest.mark.reports
 @needs_compiler
 def test_quick_run(tmp_path: Path, program: Program,
                    monkeypatch: pytest.MonkeyPatch) -> None:

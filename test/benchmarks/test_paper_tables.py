@@ -234,6 +234,7 @@ def test_a_part_leaves_the_whole_page_alone(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().out.startswith('paper: tables 1 and 2 ...\n')
 
 
+@pytest.mark.reports
 def test_all_is_written(small, tmp_path, capsys):
     """One command: page, pictures, CSV; the page's numbers are the CSV's."""
     out = tmp_path / 'new'

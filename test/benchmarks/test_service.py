@@ -12,6 +12,7 @@ import pytest
 from benchmarks import service
 
 
+@pytest.mark.reports
 def test_ticks_come_first_beside_a_planner(capfd: pytest.CaptureFixture[str],
                                            monkeypatch: pytest.MonkeyPatch) -> None:
     """A planner that asks for 4,095 contacts without pause leaves a client in lockstep its ticks.

@@ -226,6 +226,7 @@ def test_by_the_compiler_alone(tmp_path: Path) -> None:
         assert example(tmp_path / standard) == EXAMPLE_SAYS
 
 
+@pytest.mark.builds
 def test_without_exceptions(tmp_path: Path) -> None:
     """The header compiles; the words of what would be thrown are printed, and the program ends."""
     source, program = tmp_path / 'one.cpp', tmp_path / 'one'
@@ -412,6 +413,7 @@ add_subdirectory({ROOT} box_contact)
 """
 
 
+@pytest.mark.builds
 @pytest.mark.parametrize('wanted', ['OFF', 'ON'])
 def test_a_part_of_a_project_without_exceptions_and_with_sanitizers(
         tmp_path: Path, wanted: str) -> None:

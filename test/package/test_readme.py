@@ -368,6 +368,7 @@ def test_files_named_in_backticks_exist():
             assert (ROOT / name).is_file(), f'{page.name}: {name}'
 
 
+@pytest.mark.reports
 def test_figures_are_made(tmp_path):
     """The scripts draw all the figures there are; a browser takes the view's."""
     pytest.importorskip('matplotlib')
@@ -497,6 +498,7 @@ def test_cpp_examples(tmp_path):
         for line in re.findall(r'printf\(.*\);  // (.*)$', text, re.MULTILINE)]
 
 
+@pytest.mark.reports
 def test_pages_build_without_a_warning(tmp_path):
     """`make docs`: every page is in a table of contents, and every link and reference leads on."""
     pytest.importorskip('myst_parser')
