@@ -14,14 +14,17 @@ import csv
 import dataclasses
 import json
 import math
+import os
+import shlex
 import sys
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
-from ..arguments import program_parser, within
+from ..arguments import one_line, program_main, program_parser, within
 from ..extras import MissingExtra
+from ..solver.checks import printable
 from ..solver.contacts_of import TooManyNear
 from .crowd import crowded
 from .inspect_plan import inspect_plan
@@ -79,12 +82,15 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+@program_main
 def main(args: Sequence[str] | None = None) -> int:
     """Judge files; return the exit status of the worst."""
     parser = _parser()
     options = parser.parse_args(args)
     if options.picture and len(options.files) > 1:
         parser.error('--picture takes one file')
+    if options.picture and os.path.realpath(options.picture) == os.path.realpath(options.files[0]):
+        parser.error(f'--picture would overwrite {printable(options.picture)}')
     if options.json and options.csv:
         parser.error('--json and --csv exclude each other')
     writer = csv.writer(sys.stdout, lineterminator='\n')
@@ -94,24 +100,35 @@ def main(args: Sequence[str] | None = None) -> int:
     for path in _with_progress(options.files):
         try:
             found = judged(path, options)
-            if options.picture:
-                found.plot().savefig(options.picture, dpi=120)
+            figure = found.plot() if options.picture else None
         except (OSError, ValueError, MissingExtra) as error:
             print(one_line(error), file=sys.stderr)
             worst = 'not read'
             continue
+        if figure:
+            try:
+                figure.savefig(options.picture, dpi=120)
+            except ValueError as error:  # for an ending that is no picture's
+                parser.error(f'--picture: {one_line(error)}')
         worst = max(worst, found.verdict, key=list(STATUSES).index)
         if options.json:
             print(json.dumps({'file': path, **as_json(found)}))
         elif options.csv:
-            writer.writerows((path, row.kind, ' '.join(row.names), row.text)
+            writer.writerows(map(_cell, (path, row.kind, ' '.join(row.names), row.text))
                              for row in found.rows())
         elif len(options.files) > 1:
-            print(f'{path}: {found.summary()}', flush=True)
+            print(f'{printable(path)}: {found.summary()}', flush=True)
         else:
             print(found)
-            print(f'To see it in 3D: box_contact_view {path}')
+            if path.isprintable():
+                shown = path if not path.startswith('-') else f'./{path}'
+                print(f'To see it in 3D: box_contact_view {shlex.quote(shown)}')
     return STATUSES[worst]
+
+
+def _cell(text: str) -> str:
+    """Return a text as a cell that no spreadsheet runs."""
+    return ("'" if text.startswith(tuple('=+-@\t\r')) else '') + printable(text)
 
 
 def as_json(found: Inspection) -> dict[str, Any]:
@@ -147,13 +164,6 @@ def _with_progress(paths: Sequence[str]) -> Iterable[str]:
     from tqdm import tqdm
 
     return tqdm(paths, unit='file', delay=PATIENT, leave=False, disable=None)
-
-
-def one_line(error: Exception) -> str:
-    """Return what went wrong in one line, with the file."""
-    if isinstance(error, OSError) and error.filename is not None:
-        return f'{error.filename}: {error.strerror}'
-    return ' '.join(str(error).split())
 
 
 if __name__ == '__main__':

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..solver.checks import printable
 from .plan import LACKS, VERDICTS, Plan
 
 if TYPE_CHECKING:
@@ -35,8 +36,7 @@ class Row(NamedTuple):
         names = '  '.join(self.names[:MOST_NAMES])
         if len(self.names) > MOST_NAMES:
             names += f' and {len(self.names) - MOST_NAMES:,} more'
-        return ''.join(mark if mark.isprintable() else '?' for mark in
-                       f'{self.kind:<20}  {names}{"  " if names else ""}{self.text}')
+        return printable(f'{self.kind:<20}  {names}{"  " if names else ""}{self.text}')
 
 
 @dataclass(frozen=True, eq=False)

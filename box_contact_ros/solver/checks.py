@@ -34,6 +34,11 @@ _REPR.maxlevel = 3
 _REPR.maxstring = _REPR.maxother = SHOWN
 
 
+def printable(text: str) -> str:
+    """Return a text in which what no terminal shows is a question mark."""
+    return ''.join(mark if mark.isprintable() else '?' for mark in text)
+
+
 def short_repr(value: Any) -> str:
     """Return `repr`, cut short for an error that a person reads."""
     try:

@@ -225,3 +225,45 @@ def test_a_picture(tmp_path):
     out = tmp_path / 'ship.png'
     assert inspect_files.main([str(FILES / 'ship.edi'), '--picture', str(out)]) == 1
     assert out.read_bytes().startswith(b'\x89PNG')
+
+
+def test_a_picture_overwrites_no_input(tmp_path, capsys):
+    path = written(tmp_path, 'a.csv', sheet('a,1,1,1,0,0,0.5'))
+    (tmp_path / 'link.png').symlink_to(path)
+    for out in path, tmp_path / 'link.png':
+        with pytest.raises(SystemExit) as ended:
+            inspect_files.main([str(path), '--picture', str(out)])
+        assert ended.value.code == 2 and 'would overwrite' in capsys.readouterr().err
+    assert path.read_text('utf-8').startswith('name')
+
+
+def test_a_picture_that_cannot_be_written(tmp_path, capsys):
+    """It is not a plan that could not be read."""
+    pytest.importorskip('matplotlib')
+    path = str(written(tmp_path, 'a.csv', sheet('a,1,1,1,0,0,0.5')))
+    assert inspect_files.main([path, '--picture', str(tmp_path / 'none' / 'a.png')]) == 74
+    with pytest.raises(SystemExit):
+        inspect_files.main([path, '--picture', str(tmp_path / 'a.odd')])
+    assert 'Traceback' not in capsys.readouterr().err
+
+
+def test_refusals_and_cells_have_no_control_characters(tmp_path, capsys):
+    path = written(tmp_path, 'a\x1b[31m.csv', 'a\x1b[31m,b')
+    assert inspect_files.main([str(path)]) == 2
+    assert '\x1b' not in capsys.readouterr().err
+    path = written(tmp_path, 'b\x1b.csv', sheet('"=1+1\x1b",1,1,1,0,0,7', '@a,1,1,1,5,0,7'))
+    assert inspect_files.main([str(path), '--csv']) == 1
+    printed = capsys.readouterr().out
+    assert '\x1b' not in printed
+    assert [row['boxes'] for row in csv.DictReader(io.StringIO(printed))] == ["'=1+1?", "'@a"]
+    for paths in [str(path)], [str(path)] * 2:
+        inspect_files.main(paths)
+        assert '\x1b' not in capsys.readouterr().out
+
+
+def test_the_hint_can_be_typed(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for name, shown in (('a b;c.csv', "'a b;c.csv'"), ('-a.csv', './-a.csv')):
+        written(tmp_path, name, sheet('a,1,1,1,0,0,0.5'))
+        assert inspect_files.main(['--', name]) == 0
+        assert capsys.readouterr().out.endswith(f'box_contact_view {shown}\n')
