@@ -174,6 +174,15 @@ def test_a_broad_phase_allocates_no_memory_and_reads_what_changed(tmp_path: Path
     assert run(program).endswith(' 0 failures\n0 wrong answers\n')
 
 
+def test_where_memory_ends_a_call_is_as_if_it_had_not_been(tmp_path: Path) -> None:
+    """At each allocation of create, take_fixed, find, set_boxes, hold, copy and advance in turn."""
+    program = tmp_path / 'no_memory_test'
+    run(tool('g++'), '-std=c++17', *STRICT, INCLUDES, ROOT / 'test/core/no_memory_test.cpp',
+        *LINKED, '-o', program)
+    for line in run(program).splitlines():
+        assert line.endswith(' allocations, 0 faults')
+
+
 @pytest.mark.parametrize('source', ['force_test.c', 'force_test.cpp'])
 def test_forces_have_the_bits_of_python(tmp_path: Path, source: str) -> None:
     """A load that is dropped and pushed: 2,000 steps in C, in C++ and here."""

@@ -188,7 +188,7 @@ class PatchForces {
   }
   // From poses, velocities and outside wrenches at the start of a step `dt` to poses and velocities at
   // its end. Or to the mean wrenches of contacts, with those that push overlaps out. Returns −1, or a
-  // body whose numbers are not finite at the end: then the advance is cancelled.
+  // body whose numbers are not finite at the end: then the advance is to be cancelled.
   template <class InThreads>
   int64_t advance(double dt, const Given& given, const bc_motion& motion, SolvePair solve_pair,
                   InThreads& in_threads) {
@@ -201,10 +201,7 @@ class PatchForces {
     is_grouped_ = true;
     next_.loads.resize(next_.patches.size());
     IslandStep islands(options_, bodies_, step, body_step, next_.patches, next_.loads, islands_);
-    if (int64_t lost = islands.solve_all(in_threads); lost >= 0) {
-      cancel();
-      return lost;
-    }
+    if (int64_t lost = islands.solve_all(in_threads); lost >= 0) return lost;
     sleep_.finish_waking(bodies_);
     bool falls_asleep = options_.rest && motion.poses && motion.velocities &&
                         sleep_.fall_asleep(islands_, bodies_, next_.patches, given, step.steps);

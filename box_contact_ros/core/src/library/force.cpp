@@ -53,6 +53,16 @@ bc_status solve_own(Handled& all, double dt, const Given& given) {
   return explain(result);
 }
 
+// Cancels an advance that is refused, or for which there is no memory.
+struct Advancing {
+  PatchForces& self;
+  bool is_done = false;
+
+  ~Advancing() {
+    if (!is_done) self.cancel();
+  }
+};
+
 bc_status advance(bc_patch_forces* forces, double dt, const Given& given, const Changed& changed,
                   const bc_motion* motion) {
   if (!forces || !motion) return refuse_null(forces ? "motion" : "forces");
@@ -63,16 +73,15 @@ bc_status advance(bc_patch_forces* forces, double dt, const Given& given, const 
   if (!read(motion, all)) return fail(BC_BAD_ABI, "motion.size is unknown");
   if (bc_status status = check_step(dt)) return status;
   if (bc_status status = check_changed(changed, self.bodies().size())) return status;
+  Advancing advancing{self};
   self.begin(given, changed, all);
   bc_status status = check_given(self, given);
   if (!status) status = solve_own(handled(forces), dt, given);
   if (!status && self.is_waking()) status = check_given(self, given);
-  if (status) {
-    self.cancel();
-    return status;
-  }
+  if (status) return status;
   int64_t lost = self.advance(dt, given, all, solve_exactly, handled(forces).threads);
-  if (lost < 0) return BC_OK;
+  advancing.is_done = lost < 0;
+  if (advancing.is_done) return BC_OK;
   return fail(
       BC_BAD_ARGUMENT,
       "bodies[%lld]: in a step of %g s its numbers leave the range of float64; try a shorter "
