@@ -9,7 +9,7 @@ they are first used, so `import box_contact_ros` stays cheap.
 from importlib import import_module as _import_module
 from typing import TYPE_CHECKING, Any
 
-from .solver.contact import Contact, Contacts, patch_area, patch_areas
+from .solver.contact import Contact, Contacts
 from .solver.contact_solver import ContactSolver
 from .solver.nearest import Nearest, Nearests
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 __all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'FacePatches', 'Fault', 'Frame',
            'Inspection', 'Nearest', 'Nearests', 'Pair', 'PatchForces', 'Plan', 'ReadContacts',
            'Row', 'Scene', 'SceneSolver', 'contacts_of', 'face_patches', 'inspect_plan',
-           'make_model', 'patch_area', 'patch_areas', 'read_contacts', 'read_plan', 'read_scene']
+           'make_model', 'read_contacts', 'read_plan', 'read_scene']
 # `ContactNode` needs ROS, and `import *` does without.
 
 _LOADED_WHEN_USED = {

@@ -94,17 +94,17 @@ class KeptMessages:
         self._messages: list[ContactMessage] = []
         self._covariance = np.zeros((most, 6))  # a row for each message, which refers to it
 
-    def fill(self, names: Sequence[tuple[str, str, str]], contacts: Contacts,
+    def fill(self, names: Sequence[tuple[str, str, str]], contacts: Contacts, areas: np.ndarray,
              ) -> list[ContactMessage]:
         """Return the messages of contacts, by the names of their pair and its boxes.
 
-        They are overwritten by the next call.
+        areas: (k,) by which their faces meet [m²]. The next call overwrites the messages.
         """
         while len(self._messages) < len(names):
             row = self._covariance[len(self._messages)]
             self._messages.append(ContactMessage(covariance=row))
         numbers = native.message_numbers(contacts.point, contacts.normal, contacts.separation,
-                                         contacts.volume, contacts.covariance)
+                                         contacts.volume, contacts.covariance, areas)
         covariance = CONTACT['covariance']
         self._covariance[:len(names)] = numbers[:, -covariance:]
         for message, name, row in zip(self._messages, names, numbers[:, :-covariance].tolist()):

@@ -4,8 +4,9 @@
 """The patch of two faces: where the faces by which two boxes meet are within a tolerance.
 
 Of each box it is the face most parallel to the normal. Both are projected along the normal and
-intersected; what is left is cut where the gap of their planes exceeds the tolerance. The overlap of
-boxes at rest is a wedge of a micron, whose moments tell little of this patch.
+intersected; what is left is cut where the gap of their planes exceeds the tolerance. Where edges
+meet, at more than 0.1 rad from both faces, there is no patch. The overlap of boxes at rest is a
+wedge of a micron, whose moments tell little of it.
 """
 from __future__ import annotations
 
@@ -39,7 +40,7 @@ class FacePatches:
     polygon: np.ndarray
     """(k, 9, 3) corners, counter-clockwise about the normal; then the first one again [m]."""
     corner_count: np.ndarray
-    """(k,) how many corners there are: 3 to 9; 0: the faces are apart, and places are NaN."""
+    """(k,) how many corners there are: 3 to 9; 0: there is no patch, and places are NaN."""
     area: np.ndarray
     """(k,) [m²] across the normal."""
     centre: np.ndarray

@@ -31,8 +31,6 @@ static void check_contacts(void) {
   check(contact.normal[2] == 1.0 && fabs(contact.point[2] - 0.75) < 1e-9, "normal, point");
   check(fabs(contact.volume - 2.0) < 1e-9 && fabs(contact.covariance[0][0] - 1.0 / 3.0) < 1e-9,
         "volume, covariance");
-  check(fabs(bc_patch_area(contact.normal, contact.covariance[0]) - 4.0) < 1e-8, "area");
-  check(isnan(bc_patch_area(contact.normal, NULL)), "no area");
   bc_query query = bc_default_query();
   check(query.model == BC_EXACT && query.patch == BC_COVARIANCE, "the default query");
   query.patch = BC_VOLUME;

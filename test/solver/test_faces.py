@@ -52,8 +52,10 @@ def test_areas_of_turned_faces_are_those_of_strips():
 def by_corners(size, pose, normal, tolerance):
     """Return area and centroid of a patch by all points in which two of its nine lines meet.
 
-    And how far rounding may move the line at which the gap is the tolerance.
+    And how far rounding may move the line at which the gap is the tolerance. 0 where edges meet.
     """
+    if max(np.abs(normal @ rotation_matrix(q)).max() for q in pose[:, 3:]) < np.cos(0.1):
+        return 0.0, np.full(3, np.nan), 0.0
     u = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
     u /= np.linalg.norm(u)
     plane = np.stack((u, np.cross(normal, u)))

@@ -34,8 +34,7 @@ inline PyObject* face_patches(PyObject*, PyObject* const* args, Py_ssize_t count
   npy_intp n = pairs.length(0);
   auto normal = read<double>(args[3], "normal", {n, 3});
   double tolerance = number_of(args[4], "tolerance");
-  if (bad_place(pairs.numbers, n, sizes.length(0)) >= 0)
-    fail(PyExc_ValueError, "pairs has a place that no pose has");
+  check_pairs(pairs, sizes.length(0));
   check_normals(normal);
   constexpr npy_intp corners = faces::Polygon::corners_max;
   auto polygon = make<double>({n, corners, 3}), area = make<double>({n});

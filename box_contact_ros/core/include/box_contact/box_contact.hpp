@@ -234,11 +234,6 @@ inline Polygon face_patch(const Box& a, const Box& b, const double (&normal)[3],
   return patch;
 }
 
-// The area [m²] of a contact's patch; NaN without a covariance. See bc_patch_area.
-inline double patch_area(const Contact& contact) {
-  return bc_patch_area(contact.normal, contact.covariance[0]);
-}
-
 // The instruction set of this process: "baseline", "avx2" or "avx512".
 inline std::string instruction_set() {
   const char* name = bc_instruction_set();

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The C interface, and the choice of the instruction set.
-#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <iterator>
@@ -266,18 +265,6 @@ bc_status bc_face_patch(const bc_box* a, const bc_box* b, const double* normal, 
     if (patch->size != sizeof(bc_polygon)) return fail(BC_BAD_ABI, "patch.size is unknown");
     return find_face_patch(*a, *b, normal, tolerance, *patch);
   });
-}
-
-// e₁·e₂ of the covariance C across the normal n is n·adj(C)·n.
-double bc_patch_area(const double* n, const double* c) {
-  if (!n || !c) return NAN;
-  double xx = c[0], xy = c[1], xz = c[2], yy = c[4], yz = c[5], zz = c[8];
-  double product = n[0] * n[0] * (yy * zz - yz * yz) + n[1] * n[1] * (xx * zz - xz * xz) +
-                   n[2] * n[2] * (xx * yy - xy * xy) +
-                   2.0 * (n[0] * n[1] * (xz * yz - xy * zz) + n[0] * n[2] * (xy * yz - xz * yy) +
-                          n[1] * n[2] * (xy * xz - xx * yz));
-  // Rounding may leave a line's product below zero. NaN stays NaN.
-  return 12.0 * std::sqrt(product < 0.0 ? 0.0 : product);
 }
 
 }  // extern "C"
