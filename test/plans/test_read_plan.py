@@ -5,12 +5,14 @@
 from __future__ import annotations
 
 import json
+import re
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from box_contact_ros.plans.inspect_plan import inspect_plan
 from box_contact_ros.plans.packing import means_amount
 from box_contact_ros.plans.plan import Plan
 from box_contact_ros.plans.read_plan import read_any, read_plan
@@ -96,6 +98,11 @@ FAULTS = {
     'number twice': ('p.edi', baplie(PLACED, '0010084 22G1').replace('TEST0000001', 'TEST0000000'),
                      'twice', '0010084', 'TEST0000000 is at 0010082, too'),
     'slot of 6': ('p.edi', baplie(PLACED, '010082 22G1'), 'slot', '010082', 'of 6 characters'),
+    'not stowed': ('p.edi', baplie(PLACED, '9999999 22G1'), 'slot', 'TEST0000001', 'not stowed'),
+    'light': ('p.edi', baplie(PLACED, '0010084 22G1 MEA+WT++KGM:24.500'), 'mass', '0010084',
+              '24.500 KGM, less than any container'),
+    'on breakbulk': ('p.edi', baplie(PLACED, '0010084 22G1', '0010088 22G1').replace(
+        'EQD+CN+TEST0000001', 'EQD+BB+TEST0000001'), 'slot', '0010088', 'stands on what is left'),
     'slot of 8': ('p.edi', baplie(PLACED, '00010082 22G1'), 'slot', '00010082', 'of 8 characters'),
     'slot of signs': ('p.edi', baplie(PLACED, '00100$$ 22G1'), 'slot', '00100$$', '7 digits'),
     'no slot': ('p.edi', baplie(PLACED, '- 22G1'), 'slot', 'TEST0000001', 'without a slot'),
@@ -248,7 +255,8 @@ def test_a_fault_is_a_row(case: str, tmp_path: Path) -> None:
 REFUSED = {
     'nothing': ('p.edi', baplie(), 'it has no container'),
     'other message': ('p.edi', baplie(PLACED, message='MOVINS:D:95B'), 'its message is MOVINS'),
-    'no slot is known': ('p.edi', baplie('010082 22G1'), 'no container can be placed; slot 010082'),
+    'no slot is known': ('p.edi', baplie('00010082 22G1'), 'no container can be placed; slot 0001'
+                         '0082'),
     'no size is known': ('p.edi', baplie('0010082 5EGB'), 'size type 0010082: of the type 5EGB'),
     'empty': ('p.csv', '\n', 'it is empty'),
     'column': ('p.csv', sheet().replace('height', 'hight'),
@@ -319,7 +327,8 @@ def equipment_first(text: str) -> str:
     SHIP.replace('00', '0\n0'), '\ufeff' + SHIP, f"UNA:+.? '{SHIP}",
     'UNA|*,! ~' + SHIP.replace(':', '|').replace('+', '*').replace("'", '~'),
     SHIP.replace('BGM++1', "BGM+?'LOC?+147+1"), equipment_first(SHIP),
-    SHIP.replace('KGM:24000', 'TNE:24'), SHIP.replace('WT++KGM:24000', 'VGM++KGM:24000'),
+    SHIP.replace('KGM:24000', 'TNE:24'), SHIP.replace('KGM:24000', 'KG:24000'),
+    SHIP.replace('KGM:24000', 'T:24'), SHIP.replace('WT++KGM:24000', 'VGM++KGM:24000'),
     SHIP.replace('UNT+30', 'UNT+000030'), SHIP.replace('22G1+', '22G1:102:5+')])
 def test_the_same_ship(changed: str, tmp_path: Path) -> None:
     """However its lines are wrapped, and its segments separated and ordered."""
@@ -461,3 +470,30 @@ def test_comments_without_an_end_take_no_time(tmp_path: Path) -> None:
         with pytest.raises(ValueError, match='it is not XML'):
             read_plan(written(tmp_path, 'a.sdf', f'<sdf><!-- -- -->{some}'))
     assert time.process_time() - start < 1.0
+
+
+def test_slots_of_six_digits(tmp_path: Path) -> None:
+    """BBRRTT, where all have six; blanks around a slot are none of it."""
+    six = baplie('010082 22G1', '010084 22G1', '030082 22G1')
+    seven = baplie('0010082 22G1', '0010084 22G1', '0030082 22G1')
+    assert same(read_plan(written(tmp_path, 'a', six)), read_plan(written(tmp_path, 'b', seven)))
+    blank = seven.replace('+0010084:', '+ 0010084 :')
+    assert same(read_plan(written(tmp_path, 'a', blank)), read_plan(written(tmp_path, 'b', seven)))
+
+
+@pytest.mark.parametrize(('boxes', 'left_out', 'names'), [
+    (['0010082 22G1', '0010084 22G1'], [0], ['0010084']),
+    (['0010082 22G1', '0030082 22G1', '0020084 42G1'], [0], ['0020084']),
+    (['0010082 22G1', '0010084 22G1', '0010086 22G1'], [1], ['0010086']),
+    (['0010182 22G1', '0010082 22G1', '0010084 22G1'], [0], []),
+    (['0010082 22G1', '0030082 22G1', '0010084 22G1'], [1], [])])
+def test_what_stands_on_what_is_left_out_is_not_judged(boxes, left_out, names, tmp_path) -> None:
+    """Be it breakbulk, or of a size that is not known."""
+    for text in (
+            re.sub('|'.join(f'EQD.CN.TEST000000{n}' for n in left_out), 'EQD+BB+X', baplie(*boxes)),
+            baplie(*(f'{box.split()[0]} ZZZZ' if n in left_out else box
+                     for n, box in enumerate(boxes)))):
+        plan, bears = read_any(written(tmp_path, 'a.edi', text))
+        assert [fault.names for fault in plan.faults if 'stands on' in fault.text] == (
+            [tuple(names)] if names else [])
+        assert inspect_plan(plan, bears=bears).verdict == 'not all judged'
