@@ -105,8 +105,7 @@ class TickWriter:
 
 class PatchForces:
     def __init__(self, mass: np.ndarray, inertia: np.ndarray, centre: np.ndarray, substeps: int,
-                 iterations: int, relaxations: int, threads: int, friction: float,
-                 most_depth: float, rest_speed: float, rest: bool, /) -> None: ...
+                 threads: int, friction: float, most_depth: float, rest: bool, /) -> None: ...
     def set_bodies(self, mass: np.ndarray, inertia: np.ndarray, centre: np.ndarray, /) -> None: ...
     def hold(self, pairs: ArrayLike, separation: ArrayLike, normal: ArrayLike, point: ArrayLike,
              volume: ArrayLike, covariance: ArrayLike, poses: ArrayLike,
