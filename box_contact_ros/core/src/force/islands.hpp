@@ -21,6 +21,13 @@ struct Chunk {
   int64_t lost;  // the first body whose numbers are not finite at the end of an advance, or −1
 };
 
+template <class T>
+struct RangeOf {
+  T *first, *last;
+  T* begin() const { return first; }
+  T* end() const { return last; }
+};
+
 class Islands {
  public:
   // side: the instruction set's, or null.
@@ -79,11 +86,7 @@ class Islands {
   }
 
   // The islands of a chunk.
-  struct Range {
-    Island *first, *last;
-    Island* begin() const { return first; }
-    Island* end() const { return last; }
-  };
+  using Range = RangeOf<Island>;
   Range of(const Chunk& chunk) {
     return {all.data() + chunk.island, all.data() + chunk.island_end};
   }
@@ -189,11 +192,6 @@ class Islands {
   // Places of things in the order of their islands; those of an island stay in order (counting sort).
   class Sorted {
    public:
-    struct Range {
-      const int32_t *first, *last;
-      const int32_t* begin() const { return first; }
-      const int32_t* end() const { return last; }
-    };
     void make_room(size_t islands, size_t count) {
       starts_.reserve(islands + 1);
       order_.reserve(count);
@@ -207,7 +205,7 @@ class Islands {
       for (int32_t& start : starts_) start = sum += start;
       for (size_t k = count; k-- > 0;) order_[size_t(--starts_[size_t(island_of(k))])] = int32_t(k);
     }
-    Range of(size_t island) const {
+    RangeOf<const int32_t> of(size_t island) const {
       return {order_.data() + starts_[island], order_.data() + starts_[island + 1]};
     }
 

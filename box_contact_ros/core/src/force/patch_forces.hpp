@@ -20,8 +20,8 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// What an advance leads from one to another, of what is awake. An advance that fails leaves the one that it began
-// with; bodies and what sleeps are written at its end.
+// What an advance leads from one to another, of what is awake. One that fails leaves the first as it is: bodies,
+// and what sleeps, are written at its end.
 struct State {
   std::vector<Patch> patches;  // by pair
   std::vector<Load> loads;     // of the last advance, by pair
@@ -160,7 +160,8 @@ class PatchForces {
   // Begin an advance, which `advance` ends or `cancel`. What sleeps and is not given as it was wakes. An advance
   // that gives the wrenches alone moves all bodies.
   void begin(const Given& given, const Changed& changed, const bc_motion& motion) {
-    if (!(motion.poses && motion.velocities)) sleep_.mark_all();
+    sleep_.cancel_waking(bodies_);  // of an advance that had no memory
+    if (!(motion.poses && motion.velocities)) sleep_.mark_if([](const Patch&) { return true; });
     sleep_.compare(given, changed);
     next_.clock = state_.clock;
     woken_.clear();

@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // Sleep: an island that was slow for a while, and that contacts hold, is laid down. Its bodies keep the
 // poses that were given, without a velocity, and its patches their impulses. Until an input of it
 // differs, nothing of it is solved, looked for or moved.
@@ -80,9 +83,6 @@ class Sleep {
     mark_if([&](const Patch& patch) {
       return is_chosen[size_t(patch.a)] || is_chosen[size_t(patch.b)];
     });
-  }
-  void mark_all() {
-    for (size_t k = 0; k < of_.size(); ++k) mark(k);
   }
   template <class Condition>
   void mark_if(const Condition& condition) {
