@@ -160,7 +160,6 @@ class PatchForces {
   // Begin an advance, which `advance` ends or `cancel`. What sleeps and is not given as it was wakes. An advance
   // that gives the wrenches alone moves all bodies.
   void begin(const Given& given, const Changed& changed, const bc_motion& motion) {
-    sleep_.cancel_waking(bodies_);  // of an advance that had no memory
     if (!(motion.poses && motion.velocities)) sleep_.mark_if([](const Patch&) { return true; });
     sleep_.compare(given, changed);
     next_.clock = state_.clock;
