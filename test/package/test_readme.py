@@ -404,11 +404,7 @@ SOFT, LATE, PARALLEL = (constant(file, name) for file, name in (
 LENGTHS, QUATERNIONS = (
     ' to '.join(constant('poses.hpp', f'{what}_{end}') for end in ('min', 'max'))
     for what in ('length', 'quaternion'))
-MORE, MOST, SWAY = (float(constant(TUNING, name)) for name in (
-    'more_rounds', 'most_rounds', 'sway_time'))
 ITERATIONS = constant(TUNING, 'iterations')
-RELAXATIONS = constant(TUNING, 'relaxations')
-FOLD = {3.0: 'threefold', 12.0: 'twelvefold'}
 HEADER = 'box_contact_ros/core/include/box_contact/box_contact.hpp'
 CERTIFICATE = 'overlap/certificate.hpp'
 ROUNDING = constant(CERTIFICATE, 'centroid_rounding')
@@ -428,20 +424,12 @@ LIMITS = {
     'contributing/testing.md': (f'{sum(HARD):,} cases in {len(HARD)} families',),
     'explanation/force.md': (
         f'{1e3 * float(constant(TUNING, "sub_step_limit")):g} ms at most',
-        f'the last half second and {constant(TUNING, "steps_count")} steps',
-        f'up to {ITERATIONS} times',
-        f'{RELAXATIONS} more iterations ',
         f'{constant("force/rectangle.hpp", "torsion_share")} times the mean',
-        f'last {constant(TUNING, "intervals_kept")} intervals',
-        f'shrinks to 1 / {constant(TUNING, "step_shrinkage")} per step',
-        f'are {FOLD[MORE]}; after {(MOST / MORE - 1.0) * SWAY:g} s of sway, {FOLD[MOST]}',
-        f'{constant(TUNING, "impact_change")} m/s and (in what had patches) '
-        f'{constant(TUNING, "impact_acceleration")} m/s²·sub-step, up to '
-        f'{constant(TUNING, "impact_iterations")} times',
-        f'no more than {constant(TUNING, "gap_share")}·g·dt²',
+        f'up to {constant(TUNING, "finest")} times as many sub-steps',
+        f'grown by {constant(TUNING, "gap_share")}·g·dt²',
+        f'slower than {1e3 * float(constant(TUNING, "sleep_speed")):g} mm/s',
         f'the frequency {SOFT}/window', f'{float(SOFT) ** -2:.1f}·g·h² deep',
-        f'the frequency is {LATE}/T', f'g·T²/{float(LATE) ** 2}',
-        f'faster than {constant(TUNING, "push_out_limit")} m/s',
+        f'If {LATE}/T is less than {SOFT}/step', f'g·T²/{float(LATE) ** 2}',
         f'older than {constant(TUNING, "overdue_periods")} periods'),
     'explanation/mlp.md': (
         f'reads {LAYERS[0][1]} features',
