@@ -133,7 +133,10 @@ def _bodies(plan: Plan, meet: _Meetings) -> Bodies:
     gyration = np.sqrt(sums(masses * ((plan.sizes**2).sum(axis=1) / 12.0 + arm)) / mass)
     heaviest = given[~meet.fixed].max(initial=0.0) or 1.0
     weight = np.linalg.norm(meet.felt) * np.where(given > 0.0, given, WEIGHTLESS * heaviest)
-    return Bodies(weight, centre @ meet.frame.T, gyration, meet.fixed)
+    need = meet.tolerance + deepest(
+        plan.sizes, meet.pairs[meet.carries], meet.separation[meet.carries],
+        plan.body[meet.pairs[meet.carries, 1]], count)
+    return Bodies(weight, centre @ meet.frame.T, gyration, meet.fixed, need)
 
 
 def _mass_centres(plan: Plan) -> np.ndarray:
@@ -192,32 +195,21 @@ def _verdict(plan: Plan, meet: _Meetings, bodies: Bodies, loads: _Loads | None) 
     lower, upper = body[meet.pairs[meet.carries]].T
     hull = meet.bearings.hull[meet.carries] @ meet.frame[:2].T
     margin = hull_margins(hull, upper, bodies.centre[:, :2])
-    need = meet.tolerance + deepest(plan.sizes, meet.pairs[meet.carries],
-                                    meet.separation[meet.carries], upper, count)
     hangs = np.bincount(body[meet.met[meet.on_top, 1]], minlength=count) == 0
+    slides = np.zeros(count, bool)
     if loads is None:
         loaded = np.full(count, np.nan)
-        stands = standing(lower, upper, margin > need, fixed)
-        slides = np.zeros(count, bool)
+        stands = standing(lower, upper, margin > bodies.need, fixed)
     else:
-        pressing, at = loads.rest.load, loads.centre @ meet.frame[:2].T
-        on_it = meet.carries & (pressing > 0.0)
-        total = np.bincount(body[meet.pairs[on_it, 1]], pressing[on_it], count)
-        centre = np.stack([np.bincount(body[meet.pairs[on_it, 1]], (pressing * column)[on_it],
-                                       count) for column in at.T], axis=1)
-        loaded = np.where(total > 0.0, hull_margins(
-            hull, upper, centre / np.where(total > 0.0, total, 1.0)[:, None]), -np.inf)
-        missing = np.abs(loads.rest.missing)
+        loaded, missing = loads.rest.margin, np.abs(loads.rest.missing)
         slides = np.hypot(missing[:, 0], missing[:, 1]) > missing[:, 2:].max(axis=1)
-        beside = body[meet.pairs[~meet.carries & (pressing > 0.0)]]
-        is_held = np.bincount(beside.ravel(), minlength=count) > 0
+        beside = body[meet.pairs[~meet.carries & (loads.rest.load > 0.0)]]
         stands = _resting(np.vstack((np.stack((lower, upper), axis=1), beside, beside[:, ::-1])),
-                          ~loads.rest.falls & (is_held | (loaded > need)), fixed)
-    carried = np.bincount(upper[stands[lower]], minlength=count) > 0
+                          ~loads.rest.falls, fixed)
+    goes = np.bincount(upper[~stands[lower]], minlength=count) > 0
     cause = np.select(
-        [stands, hangs, margin <= need, ~carried, slides, loaded <= need],
-        ['', 'hangs', 'unsupported', 'goes with what falls', 'slides', 'tips under its load'],
-        'goes with what falls')
+        [stands, hangs, margin <= bodies.need, goes, slides],
+        ['', 'hangs', 'unsupported', 'goes with what falls', 'slides'], 'tips under its load')
     return _Verdict(stands, cause, np.where(fixed, np.inf, margin),
                     np.where(fixed & (loads is not None), np.inf, loaded))
 

@@ -86,6 +86,32 @@ def test_what_falls_has_a_cause(boxes, masses, cause):
     assert np.array_equal(found.stands, found.cause == '')
 
 
+def test_what_beds_press_to_the_rim_stands():
+    """A light box bears on its edge before its neighbour bears all; that one can."""
+    sizes = [(0.23, 0.12, 0.2), (0.23, 0.12, 0.2), (0.31, 0.17, 0.43), (0.31, 0.17, 0.23),
+             (0.18, 0.2, 0.25), (0.19, 0.22, 0.1)]
+    places = [(0.68, 0.66, 0.1), (0.68, 0.54, 0.1), (0.645, 0.45, 0.215), (0.645, 0.63, 0.315),
+              (0.54, 0.51, 0.555), (0.51, 0.51, 0.73)]
+    masses = np.array([0, 0, 0, 0.3, 0.75, 4.8])
+    plan = Plan(sizes, [(*place, *LEVEL) for place in places], masses, ground=[0, 1, 2])
+    found = inspect_plan(plan)
+    assert found.sound and (found.loaded_margin[3:] > found.tolerance).all()
+    load = loads(found)
+    assert load[3, 4] + load[2, 4] == pytest.approx(5.55) and load[4, 5] == pytest.approx(4.8)
+    heavier = Plan(sizes, plan.poses, [0, 0, 0, 0.3, 0.75, 48], ground=[0, 1, 2])
+    assert inspect_plan(heavier).sound  # the post carries any
+
+
+@pytest.mark.parametrize('friction, cause', [
+    (0.5, ['', '', '']), (0.05, ['unsupported', 'unsupported', 'goes with what falls'])])
+def test_friction_holds_an_arch(friction, cause):
+    """Two cubes lean over an edge by 2 cm; the stone across them, held by friction, keeps them."""
+    tables = [((1, 1, 1), (x, 0, 0.5, *LEVEL)) for x in (-1.5, 1.5)]
+    boxes = [box(-0.98, 1.5), box(0.98, 1.5), box(0, 2.5, (1.98, 1, 1))]
+    plan = Plan(*zip(*tables, *boxes), [0, 0, 10, 10, 2], ground=[0, 1])
+    assert inspect_plan(plan, friction=friction).cause[2:].tolist() == cause
+
+
 def test_geometry_alone_does_not_see_a_load_that_holds():
     """A plank that overhangs by 0.6 m, below 30 kg on its inner end."""
     found = inspect_plan(plan_of([box(0, 0.5), box(0.6, 1.5, (2, 1, 1)),
