@@ -617,7 +617,7 @@ def test_boxes_that_come_and_go_in_a_browser():
     """The page draws the boxes of the newest scene, as ~/set_boxes makes it, and no others."""
     stack = Box(CUBE, ORIGIN)
     both = Scene({'crane': Box(CUBE), 'stack': stack}, patterns=(('crane', 'stack*'),),
-                 pose_array=True)
+                 poses='array')
     crane_alone = both.changed({'stack': None})
     with (closing(Page('127.0.0.1', 8450, SceneRows(crane_alone))) as page,
           open_page(page.url, 640, 360) as tab):
