@@ -220,7 +220,7 @@ def grow(counts: Sequence[int], rounds: int) -> list[Grown]:
             solver = SceneSolver(scene, model='exact')
             rng = np.random.default_rng(1)
             places = [boxes.shaken(rng) for _ in range(PLACES)]
-            phase = solver._broad_phase
+            phase = solver._at.broad_phase
             times: list[tuple[float, float]] = []
             for turn in range(PLACES + rounds):
                 took, answer = cpu_milliseconds(solver, places[turn % PLACES])

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linprog
+import scipy  # loads scipy.optimize where it is called
 
 SAME = 1e-6  # [m] heights that are one
 LEAST = 1e-4  # [m] what two boxes must share at least
@@ -70,8 +70,9 @@ class Upright:
         matrix, wanted, _ = self.equations(boxes)
         eye = np.eye(len(wanted))
         forces = matrix.shape[1]
-        found = linprog(np.repeat((0.0, 1.0), (forces, 2 * len(eye))),
-                        A_eq=np.hstack((matrix, eye, -eye)), b_eq=wanted, method='highs')
+        found = scipy.optimize.linprog(
+            np.repeat((0.0, 1.0), (forces, 2 * len(eye))),
+            A_eq=np.hstack((matrix, eye, -eye)), b_eq=wanted, method='highs')
         return float(found.fun / self.masses[boxes].sum())
 
     def holds(self, boxes: list[int]) -> bool:
@@ -86,6 +87,7 @@ class Upright:
             cost = np.zeros(matrix.shape[1])
             cost[4 * column:4 * column + 4] = 1.0
             found[tuple(self.pairs[pair].tolist())] = tuple(
-                sign * linprog(sign * cost, A_eq=matrix, b_eq=wanted, method='highs').fun
+                sign * scipy.optimize.linprog(
+                    sign * cost, A_eq=matrix, b_eq=wanted, method='highs').fun
                 for sign in (1, -1))
         return found

@@ -47,6 +47,9 @@ FIRST = (
     'test_dataset.py')
 """The longest files, longest first. Begun late, one would leave the other workers idle."""
 
+APART = {'arm', 'builds', 'network', 'reports', 'training'}
+"""Markers of tests that have a make target of their own."""
+
 _modules = count()
 _claims: list[int] = []
 """The open socket whose name claims this module's domain, as other runs on this host can see."""
@@ -118,7 +121,7 @@ EXTRAS = {
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Put the longest files first; leave out what has a make target of its own, unless -m asks."""
-    for marker in {'arm', 'network', 'training'} - set(config.option.markexpr.split()):
+    for marker in APART - set(config.option.markexpr.split()):
         apart = [item for item in items if item.get_closest_marker(marker)]
         config.hook.pytest_deselected(items=apart)
         items[:] = [item for item in items if item not in apart]

@@ -42,7 +42,7 @@ class CheckAnswerer:
         """Fill in contacts; raise ValueError, with field and value, for what is refused."""
         check_frame(request.header.frame_id, self.solver.scene)
         boxes = request.boxes
-        found = self._check(
+        found, areas = self._check(
             [box.name for box in boxes], [pose_of(box) for box in boxes],
             [size_of(box) for box in boxes],
             [(pair.box_a, pair.box_b) for pair in request.pairs], request.margin)
@@ -54,7 +54,7 @@ class CheckAnswerer:
         listed.header, listed.epoch = request.header, self._epoch
         listed.revision = self.solver.revision
         listed.contacts = self._kept.fill([names_of(a, b) for a, b in found.pairs.tolist()],
-                                          found.contacts)
+                                          found.contacts, areas)
         listed.near = near_messages([names_of(a, b) for a, b in found.near_pairs.tolist()],
                                     found.near)
 

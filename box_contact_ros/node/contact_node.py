@@ -34,7 +34,7 @@ from std_srvs.srv import Trigger
 
 from box_contact_msgs.srv import Check, GetBoxes, SetBoxes
 
-from ..arguments import parse_command_line
+from ..arguments import parse_command_line, program_main
 from ..core import LENGTH_MAX
 from ..models.make_model import MODELS, check_model, make_model, most_near
 from ..scene.scene import CONTAINER, Scene, two_boxes
@@ -397,6 +397,7 @@ def run(node_type: type[ContactNode], doc: str | None, args: Sequence[str] | Non
     return run_node(started, args)
 
 
+@program_main
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM."""
     return run(ContactNode, __doc__, args)

@@ -4,7 +4,6 @@
 """The service ~/set_boxes: boxes and bodies that come, go and are joined while the node runs."""
 from __future__ import annotations
 
-import re
 from collections.abc import Generator, Iterator, Sequence
 from typing import Any
 
@@ -14,16 +13,13 @@ from box_contact_msgs.srv import SetBoxes
 
 from ..scene.scene import Box, Frame, KeyPath, Scene, SceneError
 from ..scene.scene_solver import SceneSolver
-from ..solver.checks import nearest_name, short_repr
+from ..solver.checks import name_fault, nearest_name, short_repr
 from .messages import check_frame, pose_of, size_of
 from .paced_service import Kind
 
 MOST_REQUESTED = 1000
 """Boxes and names of a request. rclpy reads one of 1,000 boxes in 16 ms, which cannot be sliced."""
 STEP = 100  # boxes that are read in one step, in about 2 ms
-NAME = re.compile('[A-Za-z_][A-Za-z0-9_]*')
-"""Of a box, as msg_schemas/scene.json has it."""
-
 
 def changing(solver: SceneSolver, request: SetBoxes.Request,
              ) -> Generator[None, None, tuple[SceneSolver, list[str]]]:
@@ -76,8 +72,8 @@ def changes_of(scene: Scene, request: SetBoxes.Request | Boxes,
         if name in places:
             raise SceneError(path, f'{short_repr(name)} is the name of '
                                    f'{_dotted(places[name])}, too')
-        if name not in scene.row_of and not NAME.fullmatch(name):
-            raise SceneError(path, f'{short_repr(name)} is no name of letters, digits and _')
+        if name not in scene.row_of and (fault := name_fault(name, of_box=True)):
+            raise SceneError(path, f'{short_repr(name)} {fault}')
         places[name] = path
 
     for number, body in enumerate(request.bodies):

@@ -4,15 +4,13 @@
 """Where patches bear: all over, or at the corners of a box, as containers do."""
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..solver.faces import FacePatches
 from ..solver.pose import rotation_matrix
 
-NEGLIGIBLE = 1e-9
-"""Share of a patch's stiffness that a point may lack: of triangles with an edge of a micron."""
 CASTING = 0.178
 """Length of a corner casting [m] (ISO 1161): as far apart two of them still meet."""
 FORTY_FEET = 12.192
@@ -29,6 +27,10 @@ class Bearings:
     """(k, m) 0 where no point is: an area [m²] of a face, a share of the patch's of a corner."""
     hull: np.ndarray
     """(k, h, 3) the first points, which span the others; some may come twice [m]."""
+
+    def in_frame(self, axes: np.ndarray) -> Bearings:
+        """Return the same in a frame with these axes, as rows (3, 3)."""
+        return replace(self, point=self.point @ axes.T, hull=self.hull @ axes.T)
 
 
 def on_faces(patches: FacePatches) -> Bearings:
@@ -50,8 +52,8 @@ def on_corners(sizes: np.ndarray, poses: np.ndarray, carried_by: np.ndarray, nor
                patches: FacePatches, slack: float, fixed: np.ndarray) -> Bearings:
     """Return the corners of the upper boxes that are within patches, up to `slack` [m].
 
-    Only where the lower box has a casting, but that `fixed` ones bear everywhere. Where there are
-    none, they are those of the lower box, and else those of the rectangle.
+    Only where the lower box has a casting, but that `fixed` ones (n,) bear everywhere. Where there
+    are none, they are those of the lower box, and else those of the rectangle.
     """
     point = patches.rectangle.copy()
     within = np.ones(point.shape[:2], bool)

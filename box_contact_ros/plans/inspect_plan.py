@@ -11,14 +11,15 @@ from numpy.typing import ArrayLike
 
 from ..core import native
 from ..extras import require
-from ..forces.support import across_of, base_areas, deepest, hull_margins, standing
 from ..solver.checks import as_floats, as_number, short_repr
 from ..solver.contacts_of import contacts_of
 from ..solver.faces import TOLERANCE, FacePatches, as_tolerance, corner_shares, face_patches
 from ..solver.pose import rotation_matrix
-from .bearings import NEGLIGIBLE, Bearings, on_corners, on_faces
+from .bearings import Bearings, on_corners, on_faces
+from .crowd import most_near
 from .inspection import Inspection
 from .plan import Plan
+from .standing import across_of, base_areas, deepest, hull_margins, standing
 from .statics import Beds, Bodies, Rest, settle
 
 BESIDE = np.sqrt(0.5)
@@ -45,7 +46,7 @@ def inspect_plan(plan: Plan, *, tolerance: float = TOLERANCE, friction: float = 
     sides: whether boxes beside each other carry by friction.
 
     Loads need the extra `plans`. A plan without masses does without it.
-    Raises ValueError, with field and value, for bad input.
+    Raises ValueError, with field and value, for bad input, and for too many boxes in one place.
     """
     if not isinstance(plan, Plan):
         raise ValueError(f'plan must be a Plan, not {short_repr(plan)}')
@@ -91,7 +92,7 @@ def _meetings(plan: Plan, tolerance: float, felt: np.ndarray, sides: bool, by_co
     fixed = np.zeros(plan.body.max(initial=-1) + 1, bool)
     fixed[plan.body[plan.ground]] = True
     pairs, contacts = contacts_of(plan.sizes, plan.poses, fixed=fixed[plan.body],
-                                  tolerance=tolerance)
+                                  tolerance=tolerance, most_near=most_near(len(plan)))
     rows = plan.body[pairs[:, 0]] != plan.body[pairs[:, 1]]
     if len(plan.apart):
         rows &= ~np.isin(pairs @ (len(plan), 1), np.sort(plan.apart, axis=1) @ (len(plan), 1))
@@ -101,7 +102,7 @@ def _meetings(plan: Plan, tolerance: float, felt: np.ndarray, sides: bool, by_co
     slope = contacts.normal @ up
     normal = np.where(slope[:, None] > 0.0, contacts.normal, -contacts.normal)
     pairs = np.where(slope[:, None] > 0.0, pairs, pairs[:, ::-1])
-    patches = face_patches(plan.sizes, plan.poses, pairs, normal, tolerance)
+    patches = face_patches(plan.sizes, plan.poses, pairs, normal, tolerance=tolerance)
     on_top = np.abs(slope) >= BESIDE
     # Boxes beside each other may overlap by the tolerance: a strip that wide carries nothing.
     bear = np.flatnonzero((patches.width > tolerance) & (on_top | sides))
@@ -111,7 +112,7 @@ def _meetings(plan: Plan, tolerance: float, felt: np.ndarray, sides: bool, by_co
         contacts.separation, on_top, pairs[bear], on_top[bear],
         contacts.separation[bear], normal[bear],
         patches, on_corners(plan.sizes, plan.poses, pairs[bear], normal[bear], patches, tolerance,
-                            fixed) if by_corners else on_faces(patches), by_corners)
+                            fixed[plan.body]) if by_corners else on_faces(patches), by_corners)
 
 
 def _bodies(plan: Plan, meet: _Meetings) -> Bodies:
@@ -154,16 +155,13 @@ def _loads(plan: Plan, meet: _Meetings, bodies: Bodies, friction: float) -> _Loa
     require('plans')
     from tqdm import tqdm
 
-    patches, frame, bearings = meet.patches, meet.frame, meet.bearings
+    patches, frame = meet.patches, meet.frame
     sides = patches.rectangle[:, (1, 3)] - patches.rectangle[:, :1]
-    patch, place = np.nonzero(bearings.stiffness > NEGLIGIBLE * patches.area[:, None])
     beds = Beds(
         pairs=plan.body[meet.pairs], carries=meet.carries, normal=meet.normal @ frame.T,
         centre=patches.centre @ frame.T, area=patches.area,
-        radius=np.sqrt((sides**2).sum(axis=(1, 2)) / 12.0), hull=bearings.hull @ frame.T,
-        point=bearings.point[patch, place] @ frame.T, patch=patch,
-        stiffness=bearings.stiffness[patch, place],
-        spans=place < bearings.hull.shape[1])
+        radius=np.sqrt((sides**2).sum(axis=(1, 2)) / 12.0),
+        bearings=meet.bearings.in_frame(frame))
     with tqdm(total=int((~meet.fixed).sum()), unit='box', desc='loads', leave=False,
               disable=len(plan) <= MANY) as bar:
         rest = settle(bodies, beds, friction, bar.update)

@@ -4,25 +4,24 @@
 """What is wrong with a plan, and what each of its boxes carries: the answer of `inspect_plan`."""
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .plan import Plan
+from ..solver.checks import printable
+from .plan import LACKS, VERDICTS, Plan
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-UNSOUND_FAULTS = ('gap', 'twice', 'cut')
-"""Faults of a file with which a plan is not sound. The others are told."""
 CAUSES = ('hangs', 'unsupported', 'tips under its load', 'slides', 'goes with what falls',
           'overloaded')
 """What may be wrong with a box, the worst first."""
 MOST_NAMES = 3
 """Names that a line shows of a fault with more."""
-LEFT_OUT = ('slot', 'size type', 'pose', 'dimension')
-"""Faults for which a box is not in the plan."""
 
 
 class Row(NamedTuple):
@@ -37,8 +36,7 @@ class Row(NamedTuple):
         names = '  '.join(self.names[:MOST_NAMES])
         if len(self.names) > MOST_NAMES:
             names += f' and {len(self.names) - MOST_NAMES:,} more'
-        return ''.join(mark if mark.isprintable() else '?' for mark in
-                       f'{self.kind:<20}  {names}{"  " if names else ""}{self.text}')
+        return printable(f'{self.kind:<20}  {names}{"  " if names else ""}{self.text}')
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,10 +85,17 @@ class Inspection:
     """(3,) [m]."""
 
     @property
+    def verdict(self) -> str:
+        """Return 'not sound' for what is certainly wrong, else 'not all judged', or 'sound'."""
+        faults = {fault.verdict for fault in self.plan.faults}
+        if len(self.overlaps) or (self.cause != '').any():
+            faults.add('not sound')
+        return next((verdict for verdict in VERDICTS if verdict in faults), 'sound')
+
+    @property
     def sound(self) -> bool:
-        """Whether all boxes stand, none overlaps or is overloaded, and the file is whole."""
-        return not (len(self.overlaps) or (self.cause != '').any()
-                    or any(fault.kind in UNSOUND_FAULTS for fault in self.plan.faults))
+        """Whether all was judged, all boxes stand, and none overlaps or is overloaded."""
+        return self.verdict == 'sound'
 
     @property
     def verdicts(self) -> np.ndarray:
@@ -107,8 +112,9 @@ class Inspection:
     def rows(self) -> list[Row]:
         """Return what is wrong with a plan, the worst first; a box is in one row, its worst."""
         plan, names = self.plan, self.plan.names
-        told = [Row(fault.kind, fault.names, fault.text) for fault in plan.faults]
-        rows = [row for kind in UNSOUND_FAULTS for row in told if row.kind == kind]
+        told = {verdict: [Row(fault.kind, fault.names, fault.text) for fault in plan.faults
+                          if fault.verdict == verdict] for verdict in VERDICTS}
+        rows = told['not sound']
         for n in np.argsort(-self.depths, kind='stable').tolist():
             a, b = self.overlaps[n].tolist()
             rows.append(Row('overlap', (names[a], names[b]), f'{1e3 * self.depths[n]:.1f} mm deep'))
@@ -124,7 +130,7 @@ class Inspection:
                     text += f', under its load {_side(self.loaded_margin[box])}'
                 if names[box] not in seen:
                     rows.append(Row(cause, (names[box],), text))
-        return rows + [row for row in told if row.kind not in UNSOUND_FAULTS]
+        return rows + told['not all judged'] + told['sound']
 
     def summary(self) -> str:
         """Return one line on the whole plan."""
@@ -136,12 +142,24 @@ class Inspection:
                 f'{self.mass / 1e3:,.0f} t' if self.mass >= 1e4 else f'{self.mass:,.1f} kg')
             if np.isfinite(self.centre_of_mass).all():
                 words.append('centre of mass {:.3f} {:.3f} {:.3f} m'.format(*self.centre_of_mass))
-        lost = {name for fault in plan.faults if fault.kind in LEFT_OUT for name in fault.names}
-        if lost := lost.difference(plan.names):
-            words.append(f'{len(lost):,} left out')
         if len(plan) < 2 or not boxes:
             words.append('nothing can touch')
-        return f'{", ".join(words)}: {"sound" if self.sound else "not sound"}'
+        verdict, lacks = self.verdict, ', '.join(self._lacks())
+        if verdict == 'not all judged':
+            verdict += '; what was read is sound'
+            lacks = lacks and f', but {lacks}'
+        else:
+            lacks = lacks and f'; {lacks}'
+        return f'{", ".join(words)}: {verdict}{lacks}'
+
+    def _lacks(self) -> Iterator[str]:
+        """Yield how many boxes or parts of the file lack what a verdict needs."""
+        counts: Counter[str | None] = Counter()
+        for fault in self.plan.faults:
+            counts[fault.lacks] += max(1, len(fault.names))
+        for lack, (one, more) in LACKS.items():
+            if lack and counts[lack]:
+                yield one if counts[lack] == 1 else more.format(counts[lack])
 
     def plot(self) -> Figure:
         """Return a figure of the plan, coloured by verdict, with the load on each box in kN.

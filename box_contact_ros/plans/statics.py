@@ -26,7 +26,8 @@ from typing import Any
 import numpy as np
 
 from ..core import native
-from ..forces.support import hull_margins
+from .bearings import Bearings
+from .standing import hull_margins
 
 FALLS = 1e-5
 """Missing part of its weight from which a body falls [1]: above what the solver leaves."""
@@ -34,6 +35,8 @@ DOUBTFUL = 1e-2
 """Missing part up to which a body is asked again to hold, with the others falling [1]."""
 LEVEL = 1e-9
 """Up to 1 − LEVEL, a cosine is that of a normal that is not along gravity: 4e-5 rad."""
+NEGLIGIBLE = 1e-9
+"""Share of a patch's stiffness that a point may lack: of triangles with an edge of a micron."""
 SOFTNESS = 1e-7
 """Of beds while what falls is found [1]: the energy of loads in that of missing wrenches."""
 STIFFNESS = 1e9
@@ -84,16 +87,8 @@ class Beds:
     """(k,) of gyration about the normal [m]."""
     area: np.ndarray
     """(k,) [m²]."""
-    hull: np.ndarray
-    """(k, h, 3) points between which the patch can press; some may come twice [m]."""
-    point: np.ndarray
-    """(q, 3) where it presses [m]."""
-    patch: np.ndarray
-    """(q,) of each point, rising."""
-    stiffness: np.ndarray
-    """(q,) [m²]."""
-    spans: np.ndarray
-    """(q,) bool: the point is one of those between which the others are."""
+    bearings: Bearings
+    """(k,) where they press; between the points of the hull is all that they can."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +127,8 @@ def settle(bodies: Bodies, beds: Beds, friction: float,
     report(int((~rests[group[group >= 0]]).sum()))
     is_level = np.bincount(of_patch[np.abs(beds.normal[left, 2]) <= 1.0 - LEVEL],
                            minlength=count) == 0
-    inside = hull_margins(beds.hull[left, :, :2], beds.pairs[left, 1], bodies.centre[:, :2]) > 0.0
+    hull = beds.bearings.hull[left, :, :2]
+    inside = hull_margins(hull, beds.pairs[left, 1], bodies.centre[:, :2]) > 0.0
     is_sure = np.bincount(group[(group >= 0) & ~inside], minlength=count) == 0
     size = np.bincount(group[group >= 0], minlength=count)
     for flat, sure in product((True, False), repeat=2):
@@ -193,7 +189,7 @@ def add_up(bodies: Bodies, beds: Beds, friction: float, load: np.ndarray, centre
         row = bed[box]
         normal, at = beds.normal[row], moment[box] / weight[box, None]
         at[:, 2] += ((beds.centre[row] - at) * normal).sum(axis=1) / normal[:, 2]
-        hull = np.ascontiguousarray(beds.hull[row, :, :2])
+        hull = np.ascontiguousarray(beds.bearings.hull[row, :, :2])
         inside = native.hull_depths(hull.reshape(-1, 2),
                                     np.arange(len(row) + 1) * hull.shape[1],
                                     np.ascontiguousarray(at[:, :2]))
@@ -225,13 +221,12 @@ class _Programme:
         self.weight = bodies.weight[members] / self.unit
         place = np.full(len(bodies.weight), -1)
         place[members] = np.arange(len(members))
-        row_of = np.full(len(beds.pairs), -1)
-        row_of[rows] = np.arange(len(rows))
-        points = np.flatnonzero(row_of[beds.patch] >= 0)
-        self.patch = row_of[beds.patch[points]]
-        self.point, self.spans = beds.point[points], np.flatnonzero(beds.spans[points])
+        stiffness, area = beds.bearings.stiffness[rows], beds.area[rows]
+        self.patch, column = np.nonzero(stiffness > NEGLIGIBLE * area[:, None])
+        self.point = beds.bearings.point[rows[self.patch], column]
+        self.spans = np.flatnonzero(column < beds.bearings.hull.shape[1])
         # A patch as large as the mean one has a stiffness of 1.
-        self.stiffness = beds.stiffness[points] / beds.area[rows].mean()
+        self.stiffness = stiffness[self.patch, column] / area.mean()
         self.bodies = place[beds.pairs[rows]]
         self.centre, self.gyration = bodies.centre[members], bodies.gyration[members]
         self.keep = np.array([2, 3, 4]) if flat else np.arange(6)

@@ -613,7 +613,7 @@ def _check_kinds(scene: Scene) -> None:
                         (('bodies',), scene.bodies)):
         for name in names:
             if fault := name_fault(name):
-                raise SceneError(path, fault)
+                raise SceneError(path, f'{short_repr(name)} {fault}')
 
 
 def _check_bodies(scene: Scene) -> None:
@@ -638,7 +638,7 @@ def _check_pairs(scene: Scene) -> None:
         path = ('pairs', number)
         fault = name_fault(pair.name)
         if fault and pair.name != f'{pair.a}_{pair.b}':
-            raise SceneError((*path, 'name'), fault)
+            raise SceneError((*path, 'name'), f'{short_repr(pair.name)} {fault}')
         for side, name in (('a', pair.a), ('b', pair.b)):
             if name not in boxes:
                 raise SceneError((*path, side), f'{short_repr(name)} is ' + (

@@ -81,7 +81,7 @@ class SceneCheck:
 
     def __call__(self, names: Sequence[str], poses: Sequence[Row], sizes: Sequence[Row],
                  pairs: Sequence[tuple[str, str]] = (), margin: float = 0.0,
-                 ) -> Found:
+                 ) -> tuple[Found, np.ndarray]:
         """Return which boxes touch, and which are apart by the distance `margin` [m] at most.
 
         names, poses (n, 7), sizes (n, 3): of the boxes and bodies of a question. A size of zeros is
@@ -89,6 +89,7 @@ class SceneCheck:
         the scene's.
         pairs: those that are asked for. Without, the scene's pairs of these boxes are. Guests meet
         all boxes of the question and all fixed ones. `names_of` tells the names of the answer.
+        With it come the areas (k,) by which the faces of what touches meet [m²].
         Raises ValueError, with field and value, for what is refused.
         """
         margin = as_margin(margin)
@@ -106,10 +107,11 @@ class SceneCheck:
                                  'matter')
             contacts = solver.batch(self._poses, sizes=self._sizes, pairs=places)
             found = touching_and_near(places, contacts, solver, self._sizes, self._poses, margin)
+            areas = native.face_areas(self._sizes, self._poses, found.pairs)
         finally:
             native.write_poses(self._rows, moving, [None] * len(moving))
             self._place_bodies()
-        return found
+        return found, areas
 
     def names_of(self, a: int, b: int) -> tuple[str, str, str]:
         """Return the name of a pair of the last answer, and those of its boxes."""
@@ -137,7 +139,7 @@ class SceneCheck:
         resized: dict[int, Row] = {}  # sizes by row, where they differ from those before
         for number, (name, pose, size) in enumerate(zip(names, poses, sizes)):
             if fault := name_fault(name):
-                raise ValueError(f'boxes[{number}].name: {fault}')
+                raise ValueError(f'boxes[{number}].name: {short_repr(name)} {fault}')
             if name in rows:
                 raise ValueError(f'boxes[{number}]: {short_repr(name)} is the name of '
                                  f'boxes[{names.index(name)}], too')

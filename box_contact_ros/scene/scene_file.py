@@ -12,12 +12,11 @@ import os
 import re
 from collections.abc import KeysView, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import yaml
 
-from ..resources import find_file, resource_path
+from ..resources import find_file, read_regular, resource_path
 from ..solver.checks import SHOWN, short_repr
 from .scene import Box, Frame, KeyPath, Pair, Scene, SceneError
 
@@ -68,7 +67,7 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
     if not isinstance(path, str | os.PathLike) or not _is_name(os.fspath(path)):
         raise SceneError(('path',), f'must be that of a file, not {short_repr(path)}')
     try:
-        text = _read(find_file(path))
+        text = read_regular(find_file(path), MOST_BYTES).decode('utf-8')
         _check_yaml(text)
         return _scene_of(yaml.load(text, Loader=_Loader))
     except OSError as error:
@@ -80,17 +79,6 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
         if len(reason) > 2 * SHOWN:  # it shows what is refused
             reason = f'{reason[:SHOWN]} ... {reason[-SHOWN:]}'
         raise SceneError(fault.path, reason, f'{path}') from error
-
-
-def _read(path: Path) -> str:
-    """Return the text of a regular file, or raise OSError or ValueError."""
-    if path.exists() and not path.is_file():  # a pipe would be waited for
-        raise OSError('it is not a regular file')
-    with path.open('rb') as file:
-        content = file.read(MOST_BYTES + 1)
-    if len(content) > MOST_BYTES:
-        raise OSError(f'it has more than {MOST_BYTES} bytes')
-    return content.decode('utf-8')
 
 
 @dataclass

@@ -66,6 +66,28 @@ class Answer(NamedTuple):
         return [self.scene.pair_of(a, b) for a, b in self.stale.tolist()]
 
 
+class _Revision(NamedTuple):
+    """A revision of a scene, and what finds its pairs."""
+
+    scene: Scene
+    number: int
+    rows: np.ndarray  # (m, 7) poses of boxes and of bodies
+    moving_rows: np.ndarray  # (l,) of what moves
+    broad_phase: native.BroadPhase
+
+    @classmethod
+    def of(cls, scene: Scene, number: int, margin: float) -> _Revision:
+        """Begin without poses."""
+        moving_rows = np.array([scene.row_of[name] for name in scene.moving], np.int64)
+        return cls(scene, number, scene.fixed_poses(), moving_rows, native.BroadPhase(
+            scene.sizes, scene.is_fixed, margin, scene.rows, *scene.groups, scene.body_of))
+
+    @property
+    def poses(self) -> np.ndarray:
+        """(n, 7) of the boxes."""
+        return self.rows[:len(self.scene.boxes)]
+
+
 class SceneSolver:
     """Contacts of all pairs of a scene, one tick at a time.
 
@@ -86,26 +108,24 @@ class SceneSolver:
         self._most_near = as_whole(most_near, 'most_near', 0, sys.maxsize)
         self.model = model
         self._solver = ContactSolver(model=model, margin=self.margin)
-        self._take(scene, 0)
+        self._at = _Revision.of(scene, 0, self.margin)
         self._refuse_sizes(*(np.unique(sizes, axis=0)
                              for sizes in (scene.sizes, scene.sizes[scene.rows].reshape(-1, 6))))
         self([None] * len(self.moving))
 
-    def _take(self, scene: Scene, revision: int) -> None:
-        """Begin anew with a scene."""
-        self.scene = scene
-        self.revision = revision
+    @property
+    def scene(self) -> Scene:
+        """The scene as it is now."""
+        return self._at.scene
+
+    @property
+    def revision(self) -> int:
         """How often the scene has been changed."""
-        self._rows = scene.fixed_poses()
-        """Poses of boxes and of bodies."""
-        self._poses = self._rows[:len(scene.boxes)]
-        self._moving = np.array([scene.row_of[name] for name in scene.moving], np.int64)
-        self._broad_phase = native.BroadPhase(scene.sizes, scene.is_fixed, self.margin, scene.rows,
-                                              *scene.groups, scene.body_of)
+        return self._at.number
 
     @property
     def moving(self) -> tuple[str, ...]:
-        """Return whose poses a call takes, in their order."""
+        """Whose poses a call takes, in their order."""
         return self.scene.moving
 
     def __reduce__(self) -> tuple[Callable[..., SceneSolver], tuple[Any, ...]]:
@@ -122,11 +142,12 @@ class SceneSolver:
         yield
         scene, kept = self.scene.changed(*changes)
         yield
-        solver = object.__new__(SceneSolver)
-        vars(solver).update(vars(self))
-        solver._take(scene, self.revision + 1)
+        later = _Revision.of(scene, self.revision + 1, self.margin)
         yield
-        solver._broad_phase.take_fixed(self._broad_phase, kept)
+        later.broad_phase.take_fixed(self._at.broad_phase, kept)
+        solver = object.__new__(SceneSolver)
+        solver.model, solver.margin, solver._at = self.model, self.margin, later
+        solver._most_near, solver._solver = self._most_near, self._solver
         sizes = np.array([box.size for box in changes.boxes.values() if box is not None])
         listed = ([] if scene.listed_names.isdisjoint(changes.boxes) else
                   scene.sizes[scene.rows])
@@ -152,8 +173,8 @@ class SceneSolver:
         new boxes are in the pairs whose patterns match. A body whose last box goes is gone.
         Raises SceneError, a ValueError with field and value.
         """
-        vars(self).update(vars(finished(self.changing(
-            fixed=fixed, moving=moving, parts=parts, bodies=bodies, absent=absent))))
+        self._at = finished(self.changing(fixed=fixed, moving=moving, parts=parts, bodies=bodies,
+                                          absent=absent))._at
         return self.revision
 
     def _refuse_sizes(self, sizes: np.ndarray, listed: np.ndarray) -> None:
@@ -182,40 +203,41 @@ class SceneSolver:
         """
         self._set_poses(poses)
         if self.scene.bodies:
-            self.scene.place_boxes(self._rows)
+            self.scene.place_boxes(self._at.rows)
         pairs, contacts, stale = find_contacts(
-            self._broad_phase, self._solver, self.scene.sizes, self._poses,
+            self._at.broad_phase, self._solver, self.scene.sizes, self._at.poses,
             lambda box: f'pose of {self.scene.names[box]}:', most_near=self._most_near)
-        found = touching_and_near(pairs, contacts, self._solver, self.scene.sizes, self._poses,
+        found = touching_and_near(pairs, contacts, self._solver, self.scene.sizes, self._at.poses,
                                   self.margin)
         return Answer(*found, len(pairs), stale, self.scene, self.revision)
 
-    def parts(self) -> tuple[native.BroadPhase, ContactSolver, float, int, np.ndarray, np.ndarray,
-                             np.ndarray, np.ndarray, np.ndarray]:
+    def _parts(self) -> tuple[native.BroadPhase, ContactSolver, float, int, np.ndarray, np.ndarray,
+                              np.ndarray, np.ndarray, np.ndarray]:
         """Return what native.TickWriter answers ticks of the scene by: its first nine arguments."""
-        scene, solver, sizes = self.scene, self._solver, self.scene.sizes
+        at, scene, solver, sizes = self._at, self.scene, self._solver, self.scene.sizes
         if (sizes[1:] == sizes[:-1]).all():  # model `paper` is in C++ for boxes of one size
             solver = ContactSolver(sizes[0], sizes[0], model=self.model, margin=self.margin)
-        bodies = scene.placement if scene.bodies else (NO_BODIES, self._rows[:0])
-        return (self._broad_phase, solver, self.margin, self._most_near, sizes, self._rows,
-                self._moving, *bodies)
+        bodies = scene.placement if scene.bodies else (NO_BODIES, at.rows[:0])
+        return (at.broad_phase, solver, self.margin, self._most_near, sizes, at.rows,
+                at.moving_rows, *bodies)
 
     def _set_poses(self, poses: Sequence[np.ndarray | None] | ArrayLike) -> None:
         """Take the poses of the boxes and bodies that move."""
-        if native.write_poses(self._rows, self._moving, poses):  # those of every node
+        rows, moving_rows = self._at.rows, self._at.moving_rows
+        if native.write_poses(rows, moving_rows, poses):  # those of every node
             return
         if not isinstance(poses, Sequence) or isinstance(poses, str):
             poses = as_floats(poses, 'poses', 'a list of a pose or None for each box and body that '
                               'moves, or an array (n, 7)', (None, 7))
-        if len(poses) != len(self._moving):
-            raise ValueError(f'{len(poses)} poses, but {len(self._moving)} boxes and bodies move: '
+        if len(poses) != len(moving_rows):
+            raise ValueError(f'{len(poses)} poses, but {len(moving_rows)} boxes and bodies move: '
                              f'{short_repr(list(self.moving))}; give a list of a pose or '
                              'None for each')
         if isinstance(poses, np.ndarray):
-            self._rows[self._moving] = poses
+            rows[moving_rows] = poses
             return
-        for name, index, pose in zip(self.moving, self._moving, poses):
-            self._rows[index] = NOWHERE if pose is None else as_floats(
+        for name, index, pose in zip(self.moving, moving_rows, poses):
+            rows[index] = NOWHERE if pose is None else as_floats(
                 pose, f'pose of {name}', 'a pose (x y z qx qy qz qw)', (7,))
 
 
@@ -232,5 +254,5 @@ def _made_again(scene: Scene, model: str | Model, margin: float, most_near: int,
                 ) -> SceneSolver:
     """Return a solver that was pickled."""
     solver = SceneSolver(scene, model=model, margin=margin, most_near=most_near)
-    solver._take(scene, revision)
+    solver._at = _Revision.of(scene, revision, solver.margin)
     return solver

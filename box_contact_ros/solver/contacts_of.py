@@ -34,14 +34,19 @@ class Found(NamedTuple):
 
 
 class TooManyNear(ValueError):
-    """More pairs near each other than were to be answered."""
+    """More pairs near each other than were to be answered; `pairs` (k, 2) are the first ones."""
 
     reason = 'too many pairs near'
+
+    def __init__(self, most: int, pairs: np.ndarray) -> None:
+        super().__init__(f'more than {most} pairs are near each other, and so many are not '
+                         'answered')
+        self.pairs = pairs
 
 
 def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = None, *,
                 fixed: ArrayLike | None = None, margin: float = 0.0, tolerance: float = 0.0,
-                threads: int = 1,
+                threads: int = 1, most_near: int = sys.maxsize,
                 ) -> tuple[np.ndarray, Contacts]:
     """Return which boxes touch, as rows (k, 2) of their indices a and b, and the k contacts.
 
@@ -52,6 +57,7 @@ def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = No
     margin: pairs apart are listed too, behind those in contact, up to this separation [m].
     tolerance: the gap up to which boxes touch [m]. Above 0, contacts are those of boxes that are
     larger by it, with the separation and the volume of the boxes as they are.
+    most_near: raise TooManyNear, a ValueError, for more pairs whose bounding boxes are this near.
 
     Raises ValueError, with the field and the value, for what is not a size, a pose, a pair, a
     margin or a tolerance.
@@ -70,7 +76,7 @@ def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = No
                                     np.full(count, -1, np.int32))
     solver = ContactSolver(margin=margin)
     near, contacts, _ = find_contacts(broad_phase, solver, grown, poses, 'poses[{}]'.format,
-                                      threads=threads)
+                                      most_near=most_near, threads=threads)
     near, contacts = in_contact(near, contacts, margin)
     if not tolerance:
         return near, contacts
@@ -110,8 +116,7 @@ def find_contacts(broad_phase: native.BroadPhase, solver: ContactSolver, sizes: 
     if refused >= 0:
         raise ValueError(f'{name_of(refused)} {pose_fault(poses[refused])}')
     if len(pairs) > most_near:
-        raise TooManyNear(f'more than {most_near} pairs are near each other, and so many are not '
-                          'answered')
+        raise TooManyNear(most_near, pairs)
     return pairs, solver.batch(poses, sizes=sizes, pairs=pairs, threads=threads), stale
 
 

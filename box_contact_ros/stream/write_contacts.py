@@ -35,7 +35,7 @@ class TickWriter:
         watched = [(*map(index.__getitem__, pair),
                     *(place.get(scene.mover(box), -1) for box in pair)) for pair in known]
         self._write = native.TickWriter(
-            *solver.parts(), scene.names, scene.rows, tuple(pair.label for pair in scene.pairs),
+            *solver._parts(), scene.names, scene.rows, tuple(pair.label for pair in scene.pairs),
             np.array(watched, np.int64).reshape(-1, 4), tuple(known.values()), scene.frame_id,
             epoch, solver.revision)
 

@@ -114,6 +114,7 @@ def sigterm_is_handled() -> Iterator[None]:
     signal.signal(signal.SIGTERM, before)
 
 
+@pytest.mark.reports
 @pytest.mark.usefixtures('sigterm_is_handled')
 def test_a_run_writes_table_and_rows(tmp_path, monkeypatch, capsys):
     """One landing of the grid, and one added; the picture is of a real one."""

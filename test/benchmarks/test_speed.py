@@ -26,6 +26,7 @@ def test_forces_by_two_threads_have_the_poses_of_one() -> None:
     assert speed.shared_table(rows).startswith('|  | one thread [ms] | two threads / one |')
 
 
+@pytest.mark.reports
 def test_quick_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip('mujoco')
     assert speed.main(['--quick', '--out', str(tmp_path)]) == 0

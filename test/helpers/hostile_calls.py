@@ -54,8 +54,7 @@ def exact() -> Any:
 
 def forces(n: int = 2) -> Any:
     """Return the forces on n bodies of 1 kg."""
-    return native.PatchForces(np.ones(n), np.ones((n, 3)), np.zeros((n, 3)), 2, 5, 2, 1, 0.5, 1e-3,
-                              1e-4, True)
+    return native.PatchForces(np.ones(n), np.ones((n, 3)), np.zeros((n, 3)), 2, 1, 0.5, 1e-3, True)
 
 
 def held(pairs: int = 1) -> list[Any]:
@@ -351,10 +350,11 @@ def random_calls(seed: int, rounds: int) -> None:
         (native.TickWriter(*writer_arguments()), [list(STAMPED)], {}),
         (native.TickWriter(*writer_arguments()), [[odd(rng, STAMPED[0]), STAMPED[1]]], {}),
         (native.message_numbers, [np.ones((4, 3)), np.ones((4, 3)), np.ones(4), np.ones(4),
-                                  np.ones((4, 3, 3))], {}),
-        (native.patch_areas, [np.ones((4, 3)), np.ones((4, 3, 3))], {}),
-        (native.PatchForces, [np.ones(2), np.ones((2, 3)), np.zeros((2, 3)), 2, 5, 2, 1, 0.5, 1e-3,
-                              1e-4, True], {}),
+                                  np.ones((4, 3, 3)), np.ones(4)], {}),
+        (native.face_areas, [boxes, rows(), places], {}),
+        (native.face_patches, [boxes, rows(), places, np.eye(3)[:2], 1e-4], {}),
+        (native.PatchForces,
+         [np.ones(2), np.ones((2, 3)), np.zeros((2, 3)), 2, 1, 0.5, 1e-3, True], {}),
         (law.hold, held(), {}), (law.forget, [[1]], {}),
         (law.advance, [0.001, rows(2), np.zeros((2, 6)), None], {})]
     answered = 0

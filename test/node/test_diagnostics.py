@@ -229,5 +229,6 @@ def test_the_same_topic_in_another_namespace_is_named():
     topics._subscriptions = {box: Mock(topic_name=f'/{box}/pose', msg_type=PoseStamped)
                              for box in ('box_a', 'box_c')}
     assert topics.why_silent('box_c') == 'nobody publishes /box_c/pose'
-    assert topics.why_silent('box_a') == ('nobody publishes /box_a/pose, but /crane_1/box_a/pose is '
-                                          'published: remap the one to the other')
+    assert topics.why_silent('box_a') == (
+        'nobody publishes /box_a/pose, but /crane_1/box_a/pose is published: remap the one to the '
+        'other')

@@ -33,7 +33,7 @@ from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
 from box_contact_ros.node.topics import LATCHED, pose_qos
 from box_contact_ros.resources import resource_path
-from box_contact_ros.solver.checks import MOST_NAME_BYTES
+from box_contact_ros.solver.checks import MOST_NAME_BYTES, NAME
 from box_contact_ros.stream.streams import ALL_BOXES
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -169,6 +169,8 @@ def test_limits_are_the_codes():
                  scene['properties']['frame_id'], shared['header']['properties']['frame_id'],
                  shared['box']['properties']['name']):
         assert text['maxLength'] == MOST_NAME_BYTES
+    # JavaScript's $ is the end of the text, Python's also before a last line break.
+    assert scene['$defs']['name']['pattern'] == f'^{NAME.pattern}$(?![\\s\\S])'
 
 
 # --- live messages --------------------------------------------------------------------------------

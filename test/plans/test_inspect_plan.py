@@ -167,6 +167,13 @@ def test_containers_bear_on_their_corners():
     assert np.isnan(inspect_plan(plan, bears='corners').pressure[1:3]).all()
 
 
+def test_boxes_of_a_body_bear_on_their_corners():
+    """Four boxes in one body, and a fifth on it: the ground is fixed, and none of these."""
+    plan = plan_of([box(0, 0.5 + k) for k in range(5)], [10] * 5, body=[0, 1, 1, 1, 1, 2])
+    found = inspect_plan(plan, bears='corners')
+    assert found.sound and loads(found) == pytest.approx({(0, 1): 50, (4, 5): 10})
+
+
 def test_pressure_is_the_greatest_below_a_load():
     """N / A in the middle, and N / A · (1 + 6 e / a) off it; then a triangle."""
     for off, factor in ((0.0, 1.0), (0.1, 1.6), (0.3, 2 / (3 * 0.2))):
@@ -206,10 +213,12 @@ def test_boxes_of_a_body_hold_together():
 
 def test_a_fault_of_the_file_is_a_line():
     faults = [Fault('gap', ('a',), 'nothing is below it'), Fault('mass', ('b',), 'has no weight')]
-    for some, sound in ((faults, False), (faults[1:], True)):
+    told = Fault('shape', ('c',), 'a sphere', verdict='sound', lacks='')
+    for some, verdict in ((faults, 'not sound'), (faults[1:], 'not all judged'), ([told], 'sound')):
         found = inspect_plan(plan_of([box(0, 0.5)], [10], faults=some))
-        assert found.sound == sound and str(found).count('\n') == len(some)
-    assert str(found) == ('mass                  b  has no weight\n1 box, 10.0 kg, centre of mass '
+        assert found.verdict == verdict and found.sound == (verdict == 'sound')
+        assert str(found).count('\n') == len(some)
+    assert str(found) == ('shape                 c  a sphere\n1 box, 10.0 kg, centre of mass '
                           '0.000 0.000 0.500 m: sound')
 
 

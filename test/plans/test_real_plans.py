@@ -74,9 +74,13 @@ def test_planted_verdicts_are_found(monkeypatch, capsys):
     assert capsys.readouterr().out.count('benchmarks.random_plans.examine(1, ') == falling
 
 
-@pytest.mark.parametrize('order', PALLETS)
-def test_unique_loads_are_those_of_a_simulation(order):
-    """Of what stands, after a second of PatchForces; and loads are within their ranges."""
+@pytest.mark.parametrize('order, count', [
+    ('00100408', 25), ('00100001', 7), ('00100002', 6), ('00100003', 16), ('00100004', 13)])
+def test_unique_loads_are_those_of_a_simulation(order, count):
+    """Of what stands, after a second of PatchForces; and loads are within their ranges.
+
+    Of two pallets so much falls that no more than 7 and 6 loads are left, all unique.
+    """
     plan = pallet(order)
     while not (found := inspect_plan(plan)).sound:  # what falls may have held others down
         kept = np.flatnonzero(found.stands)
@@ -103,7 +107,7 @@ def test_unique_loads_are_those_of_a_simulation(order):
         if high - low < 0.01:
             unique += 1
             assert force / G == pytest.approx(loads[pair], abs=0.1)
-    assert unique >= 5
+    assert unique == count
 
 
 @pytest.fixture(scope='module')

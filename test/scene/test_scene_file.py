@@ -297,3 +297,16 @@ pairs: all
         'hook_ground', 'c1_ground']
     with pytest.raises(SceneError, match="boxes.c1.body: 'crane' is none of the bodies"):
         scene_of('boxes: {c1: {size: [1, 1, 1], body: crane}}\npairs: all')
+
+
+def test_names_may_be_those_of_containers(scene_of):
+    """No topic has such a name, and the node refuses to make one."""
+    scene = scene_of("""
+poses: named
+boxes: {MSKU-123: {size: [1, 1, 1]}, 20ft_1: {size: [1, 1, 1]}}
+pairs: all
+""")
+    assert [pair.label for pair in scene.every_pair()] == ['MSKU-123_20ft_1']
+    for name in ('a/b', 'a b', "''", 'ö', 'a~'):
+        with pytest.raises(SceneError):
+            scene_of(f'boxes: {{{name}: {{size: [1, 1, 1]}}, b: {{size: [1, 1, 1]}}}}\npairs: all')

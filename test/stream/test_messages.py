@@ -31,7 +31,7 @@ from typed_messages import (
 )
 
 from box_contact_msgs.msg import Contacts as ContactsMessage
-from box_contact_ros import ContactSolver
+from box_contact_ros import ContactSolver, face_patches
 from box_contact_ros.core import native
 from box_contact_ros.models.make_model import make_model
 from box_contact_ros.node.messages import KeptMessages, make_header
@@ -287,7 +287,7 @@ def typed(scene, poses, *, model='exact', margin=0.0, topics=None):
     frame_id = known[0].frame_id
     message = make_contacts(make_header(max(pose.stamp for pose in known), frame_id),
                             answer.named(), [pair.label for pair in answer.named_stale()],
-                            answer.named_near())
+                            answer.named_near(), areas_of(solver, answer))
     of_pairs = []
     for pair, contact in answer.named():
         if (pair.a, pair.b) in (topics or {}):
@@ -298,6 +298,15 @@ def typed(scene, poses, *, model='exact', margin=0.0, topics=None):
             of_pairs.append((topics[pair.a, pair.b], as_bytes(make_point(header, contact)),
                              as_bytes(make_normal(header, contact))))
     return as_bytes(message), of_pairs, answer.touching, list(map(tuple, answer.stale.tolist()))
+
+
+def areas_of(solver, answer):
+    """Return the areas (k,) by which faces meet, by the normals of `exact`; 0 of boxes apart."""
+    sizes, at = solver.scene.sizes, solver._at.poses
+    exact = ContactSolver().batch(at, sizes=sizes, pairs=answer.pairs)
+    areas, hit = np.zeros(len(exact)), exact.colliding
+    areas[hit] = face_patches(sizes, at, answer.pairs[hit], exact.normal[hit]).area
+    return areas.tolist()
 
 
 class Told:
@@ -475,11 +484,30 @@ def test_no_field_of_a_contact_is_left_out():
              StampedPose((0.3, 0.4, 1.2, 0.1, 0.2, 0.3, 0.9), 'map', STAMP)]
     data = written(two_boxes((2, 3, 1), (1, 2, 2)), poses)[0]
     message = deserialize_message(data, ContactsMessage)
-    kept, = KeptMessages(1).fill([('p', 'a', 'b')], Contacts.of([a_contact()]))
+    kept, = KeptMessages(1).fill([('p', 'a', 'b')], Contacts.of([a_contact()]), np.ones(1))
     assert unset(type(kept)()) and unset(message.contacts[0]) == unset(kept) == []
     read = read_contacts(data).contacts
     for name in TOLD:
         assert np.all(getattr(read, name)), name
+
+
+def area_of(a, b, model):
+    """Return `area` of a tick of two cubes, by the bytes and by rclpy."""
+    data = written(two_boxes((1, 1, 1), (1, 1, 1)), [StampedPose(pose, 'map', STAMP) for pose in (
+        a, b)], model=make_model(model))[0]
+    contact, = deserialize_message(data, ContactsMessage).contacts
+    return contact.area
+
+
+@pytest.mark.parametrize('model', ['exact', 'mlp', 'paper', 'soup-4'])
+def test_the_area_is_that_of_the_faces_that_meet(model):
+    """By any model: at rest, where the overlap is a wedge; and 0 where edges cross."""
+    area = area_of((0, 0, 0, 0, 0, 0, 1), (0.3, 0.2, 1 - 2e-6, 1e-6, 2e-6, 0, 1), model)
+    assert area == pytest.approx(0.7 * 0.8, rel=1e-4)
+    edge, eighth = np.sqrt(2) - 0.01, np.pi / 8
+    area = area_of((0, 0, 0, np.sin(eighth), 0, 0, np.cos(eighth)),
+                   (0, 0, edge, 0, np.sin(eighth), 0, np.cos(eighth)), model)
+    assert area == 0.0
 
 
 def test_contacts_in_the_other_order_of_bytes_are_read():

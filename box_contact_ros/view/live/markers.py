@@ -21,7 +21,7 @@ from rclpy.context import Context
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ...arguments import parse_command_line
+from ...arguments import parse_command_line, program_main
 from ...node.messages import make_header, set_pose
 from ...node.runtime import run_node
 from ...node.topics import contact_qos
@@ -153,6 +153,7 @@ class MarkersNode(Listener):
         self._markers.publish(MarkerArray(markers=markers + gone))
 
 
+@program_main
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM."""
     parse_command_line('markers', __doc__, SCENE_PARAMETERS, args)

@@ -5,13 +5,14 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <vector>
 
 #include "../minimum_depth.hpp"
-#include "faces.hpp"
+#include "polygon.hpp"
 
-namespace box_contact::BOX_CONTACT_SET::force {
+namespace box_contact::BOX_CONTACT_SET::faces {
 
 // Write the corners of the hull of points, counter-clockwise: the monotone chain. It sorts the points.
 inline void make_hull(std::vector<Point>& points, std::vector<Point>& hull) {
@@ -59,4 +60,4 @@ inline double depth_inside(const std::vector<Point>& hull, const Point& at) {
   return n > 2 && inside >= 0.0 ? inside : -outside;
 }
 
-}  // namespace box_contact::BOX_CONTACT_SET::force
+}  // namespace box_contact::BOX_CONTACT_SET::faces

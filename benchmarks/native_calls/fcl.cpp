@@ -1,23 +1,23 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// FCL through its C++ interface: the distance of two boxes by libccd, with nearest points. The program loads
-// this file as a library.
+// FCL through its C++ interface: the distance of two boxes by libccd, with nearest points. The program
+// loads this file as a library.
 #include <fcl/geometry/shape/box.h>
 #include <fcl/narrowphase/distance.h>
 
-#include "../native_calls/contestants.hpp"
+#include "contestants.hpp"
 
 namespace {
 
-struct Query {
+struct Pairs {
   fcl::Boxd box_a{1, 1, 1}, box_b{1, 1, 1};
   fcl::DistanceRequestd request{true};
   fcl::DistanceResultd result;
   std::vector<fcl::Transform3d> at_a, at_b;
   std::vector<fcl::Vector3d> size_a, size_b;
 
-  explicit Query(const Poses& poses) {
+  explicit Pairs(const Poses& poses) {
     auto add = [](const PlacedBox& box, std::vector<fcl::Transform3d>& at,
                   std::vector<fcl::Vector3d>& size) {
       fcl::Transform3d pose = fcl::Transform3d::Identity();
@@ -36,10 +36,11 @@ struct Query {
 
 }  // namespace
 
-extern "C" void add_fcl(const Poses& poses, size_t calls, Contestants& all) {
-  Query& q = *new Query(poses);
+void add_fcl(Query query, const Poses& poses, size_t calls, Contestants& all) {
+  if (query != Query::distance) return;
+  Pairs& q = *new Pairs(poses);
   auto distance = [&q](size_t i) {
-    // call: FCL distance
+    // distance: FCL distance
     q.box_a.side = q.size_a[i];
     q.box_b.side = q.size_b[i];
     q.result.clear();

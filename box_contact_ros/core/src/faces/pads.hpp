@@ -12,9 +12,10 @@
 #include <utility>
 #include <vector>
 
-#include "faces.hpp"
+#include "beds.hpp"
+#include "face_patch.hpp"
 
-namespace box_contact::BOX_CONTACT_SET::force {
+namespace box_contact::BOX_CONTACT_SET::faces {
 
 // Normals of pads differ by an angle whose cosine is 1 less this, at most [1]: 1.4 mrad.
 constexpr double level_slack = 1e-6;
@@ -72,4 +73,4 @@ inline void share_by_normal(std::vector<Pad*> pads) {
   }
 }
 
-}  // namespace box_contact::BOX_CONTACT_SET::force
+}  // namespace box_contact::BOX_CONTACT_SET::faces

@@ -32,16 +32,16 @@ BC_INLINE Mat<T> inverse_inertia_of(const Vec<T>& inverse_inertia, const Mat<T>&
 }
 
 // A body that turns less at a time [rad] keeps its angular velocity: the change is beyond its digits.
-constexpr double least_turn = 0x1p-40;
+constexpr double least_rotation = 0x1p-40;
 
 // A body turns by no more than this at a time [rad], and so often at most: its energy then swings by
 // 4e-5, before it is put right.
-constexpr double turn_limit = 0.05;
-constexpr int turns_max = 1000;
+constexpr double rotation_limit = 0.05;
+constexpr int rotations_max = 1000;
 
 // Turn a body with the quaternion q by t = tan(θ / 2) about its own axis x.
 template <class T>
-BC_INLINE void turn_about(int x, T t, T (&q)[4]) {
+BC_INLINE void rotate_about(int x, T t, T (&q)[4]) {
   int y = (x + 1) % 3, z = (x + 2) % 3;
   T w = q[3], at_x = q[x], at_y = q[y], at_z = q[z], norm = 1.0 / sqrt(1.0 + t * t);
   q[x] = norm * (at_x + t * w);
@@ -75,7 +75,7 @@ BC_INLINE void keep_energy(const Vec<T>& inverse_inertia, T energy, T most, T (&
   momentum = select(turns, turned, momentum);
 }
 
-// Turn those bodies, on which nothing acts, for a time h: about each of their own axes in turn, there and back
+// Turn those bodies, on which nothing acts, for a time h: about each of their own axes after each other, there and back
 // (Dullweber, Leimkuhler and McLachlan, "Symplectic splitting methods for rigid body molecular dynamics",
 // 1997). Their angular momenta in the common frame stay the same to rounding, and so do their energies.
 // `momentum`: in their own frames.
@@ -84,7 +84,7 @@ BC_INLINE void tumble(const Vec<T>& inverse_inertia, Mask<T> chosen, double h, T
                       Vec<T>& momentum) {
   Vec<T> speed = momentum * inverse_inertia;
   T energy = dot(momentum, speed), angle = length(speed) * h;
-  T turns = select<T>(chosen, ceil(min<T>(angle / turn_limit, splat<T>(turns_max))), T{});
+  T turns = select<T>(chosen, ceil(min<T>(angle / rotation_limit, splat<T>(rotations_max))), T{});
   for (int done = 0; any(turns > double(done)); ++done) {
     T turned[4] = {q[0], q[1], q[2], q[3]};
     Vec<T> after = momentum;
@@ -96,7 +96,7 @@ BC_INLINE void tumble(const Vec<T>& inverse_inertia, Mask<T> chosen, double h, T
       T along_y = after[y], along_z = after[z];
       after[y] = cosine * along_y + sine * along_z;
       after[z] = cosine * along_z - sine * along_y;
-      turn_about(x, t, turned);
+      rotate_about(x, t, turned);
     };
     about(0, 0.5);
     about(1, 0.5);
@@ -108,15 +108,16 @@ BC_INLINE void tumble(const Vec<T>& inverse_inertia, Mask<T> chosen, double h, T
     momentum = select(goes_on, after, momentum);
   }
   for (int newton = 0; newton < 2; ++newton)
-    keep_energy<T>(inverse_inertia, energy, turn_limit * min<T>(angle, splat<T>(1.0)), q, momentum);
+    keep_energy<T>(inverse_inertia, energy, rotation_limit * min<T>(angle, splat<T>(1.0)), q,
+                   momentum);
 }
 
 // Turn bodies for a time h, and change their angular velocities in the common frame as they do by themselves.
 template <class T>
-BC_INLINE void turn_freely(const Vec<T>& inverse_inertia, Mask<T> is_free, double h, T (&q)[4],
-                           Mat<T>& axes, Vec<T>& angular) {
+BC_INLINE void rotate_freely(const Vec<T>& inverse_inertia, Mask<T> is_free, double h, T (&q)[4],
+                             Mat<T>& axes, Vec<T>& angular) {
   T most = largest(abs(angular));
-  Mask<T> turns = most != 0.0, tumbles = turns & is_free & (h * most >= least_turn);
+  Mask<T> turns = most != 0.0, tumbles = turns & is_free & (h * most >= least_rotation);
   if (!any(turns)) return;
   T spun[4] = {q[0], q[1], q[2], q[3]}, tumbled[4] = {q[0], q[1], q[2], q[3]};
   if (bits(turns) & ~bits(tumbles)) spin(spun, angular, h);
@@ -138,7 +139,7 @@ BC_INLINE void move(const Vec<T>& inverse_inertia, double h, T (&q)[4], Speeds<T
                     Where<T>& at) {
   Mask<T> is_free = speeds.inverse_mass > 0.0;
   at.placed.position += h * speeds.linear;
-  turn_freely<T>(inverse_inertia, is_free, h, q, at.placed.axes, speeds.angular);
+  rotate_freely<T>(inverse_inertia, is_free, h, q, at.placed.axes, speeds.angular);
   put<T>(is_free, inverse_inertia_of(inverse_inertia, at.placed.axes), at.inverse_inertia);
 }
 inline void move(const Body& body, double h, Moving& moving) {

@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Rest: what is laid down, what wakes it, and that it then goes on as if it had never been."""
+"""Sleep: what is laid down, what wakes it, and that it then goes on as if it had never been."""
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from helpers.worlds import FLOOR, World, turned
 
-from box_contact_ros import Body, ContactSolver, PatchForces
+from box_contact_ros import Body, ContactSolver
 from box_contact_ros.forces.patch_forces import GRAVITY
 
 DT = 1 / 240  # [s]
@@ -447,19 +447,6 @@ def test_another_integrator_gets_wrenches_of_what_is_awake(twins: tuple[World, W
     given = [world.forces.wrenches(DT, world.poses, world.velocities, world.outside)
              for world in (resting, awake)]
     assert given[0] == pytest.approx(given[1], abs=0.01)
-
-
-def test_rest_speed_is_a_choice() -> None:
-    steps = []
-    for rest_speed in (0.1, 1e-4, 1e-9):
-        world, count = World(FLOOR, cube(5, 0, 0, 0.3), rest_speed=rest_speed), 0
-        while world.step(DT).awake[1]:
-            count += 1
-        steps.append(count)
-    assert 120 < steps[0] < steps[1] < steps[2]
-    for wrong in (-1.0, np.nan):
-        with pytest.raises(ValueError, match='rest_speed'):
-            PatchForces([], rest_speed=wrong)
 
 
 class Told(World):
