@@ -165,7 +165,8 @@ class ContactNode(GuardedNode, LifecycleNode):
         # On a clock of its own: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(DIAGNOSTICS_SECONDS, self._report_soon, clock=steady)
-        self._overdue = self.create_timer(TICK_SECONDS, self._report, clock=steady)
+        self._is_due = False  # whether a report waits for a tick
+        self._overdue = self.create_timer(TICK_SECONDS, self._report_at_last, clock=steady)
         self._overdue.cancel()
         self._jumps = self.get_clock().create_jump_callback(
             JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1),
@@ -356,13 +357,20 @@ class ContactNode(GuardedNode, LifecycleNode):
 
     def _report_soon(self) -> None:
         """Report once the next tick is answered: no tick waits for it then. Or without ticks."""
+        self._is_due = True
         if self._answerer is not None:
             self._answerer.after = self._report
         self._overdue.reset()
 
+    def _report_at_last(self) -> None:
+        """Report if no tick came meanwhile. If another callback cancels the timer, rclpy raises."""
+        self._overdue.cancel()
+        if self._is_due:
+            self._report()
+
     def _report(self) -> None:
         """Publish diagnostics."""
-        self._overdue.cancel()
+        self._is_due = False
         if self._answerer is not None:
             self._answerer.after = None
         state = lifecycle_state(self)

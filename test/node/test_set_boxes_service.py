@@ -238,7 +238,7 @@ def test_a_hundred_requests_at_once_have_answers(client: YardClient, scene: str)
                     fixed=[a_box(f'c{k}', ORIGIN, CUBE) for k in range(400)])),
                 (GetBoxes, 'get_boxes', GetBoxes.Request()),
                 (Check, 'check', Check.Request(header=Header(frame_id='map'), boxes=[
-                    a_box(f'g{k}', ORIGIN, CUBE) for k in range(60)]))):
+                    a_box(f'g{k}', AWAY, CUBE) for k in range(60)]))):
             service = client.node.create_client(
                 service_type, f'contact_node/{name}', qos_profile=paced_service.REQUESTS)
             assert client.spin(service.service_is_ready)

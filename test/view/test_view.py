@@ -618,11 +618,12 @@ def test_boxes_that_come_and_go_in_a_browser():
     stack = Box(CUBE, ORIGIN)
     both = Scene({'crane': Box(CUBE), 'stack': stack}, patterns=(('crane', 'stack*'),),
                  poses='array')
-    crane_alone = both.changed({'stack': None})
+    crane_alone, _ = both.changed({'stack': None}, {})
     with (closing(Page('127.0.0.1', 8450, SceneRows(crane_alone))) as page,
           open_page(page.url, 640, 360) as tab):
         tab.wait_for('document.querySelector("canvas") != null')
-        for scene in (crane_alone, both, crane_alone, crane_alone.changed({'stack2': stack})):
+        again, _ = crane_alone.changed({'stack2': stack}, {})
+        for scene in (crane_alone, both, crane_alone, again):
             rows, deadline = SceneRows(scene), time.monotonic() + PATIENCE
             placed = np.where(np.isnan(rows.poses), (0, 0, 3, 0, 0, 0, 1), rows.poses)
             shares = [0.0, 0.0]  # of crane and stack
