@@ -106,7 +106,7 @@ def scene_of(boxes: Boxes, pairs: np.ndarray | None = None) -> Scene:
                  boxes.size.tolist(), boxes.pose.tolist(), boxes.fixed))}
     listed = () if pairs is None else tuple(
         Pair.between(f'b{a}', f'b{b}') for a, b in pairs.tolist())
-    return Scene(named, listed, pose_array=True, patterns=EVERY_PAIR if pairs is None else ())
+    return Scene(named, listed, poses='array', patterns=EVERY_PAIR if pairs is None else ())
 
 
 class MuJoCo:

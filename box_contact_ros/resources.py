@@ -44,7 +44,12 @@ def resource_path(*parts: str) -> Path:
 
 
 def find_file(name: str | os.PathLike[str]) -> Path:
-    """Return the path that a user names, of one of the package's own where it leads nowhere."""
+    """Return the path that a user names, of one of the package's own where it leads nowhere.
+
+    `~` is the user's home, as a launch file or a parameter has it, which no shell has replaced.
+    """
+    with contextlib.suppress(RuntimeError):  # of a user that is not there
+        name = Path(name).expanduser()
     path = Path(name)
     if not path.is_absolute() and not path.exists():
         with contextlib.suppress(FileNotFoundError):

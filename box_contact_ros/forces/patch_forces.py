@@ -256,7 +256,8 @@ class PatchForces:
         Without contacts, they are one's own: `exact` solves the pairs at the start of each
         `advance`. That needs `set_boxes`, and no poses, age or period. Holding the same pairs at
         each step wakes nobody.
-        A contact whose separation is NaN is stale: the patch of its pair stays.
+        A contact whose separation is NaN is stale: the patch of its pair stays. Contacts of boxes
+        that are of one body by now are passed over.
         friction: μ (k,).
         surface_velocity: (k, 3) of B's surface relative to A's [m/s], as of a belt. That of the
         bodies is added.

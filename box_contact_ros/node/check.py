@@ -19,9 +19,9 @@ MOST_CONTACTS = 4096
 class CheckAnswerer:
     """Answers requests with the scene and the model of a node. It keeps nothing of a request."""
 
-    def __init__(self, solver: SceneSolver, model: str = 'exact') -> None:
-        """Take the scene and the model, by its name too."""
-        self.solver = solver
+    def __init__(self, solver: SceneSolver, model: str = 'exact', epoch: int = 0) -> None:
+        """Take the scene and the model, by its name too, and the node's epoch."""
+        self.solver, self._epoch = solver, epoch
         self._check = SceneCheck(solver, most_near=most_near(model))
         self._kept = KeptMessages(MOST_CONTACTS)
 
@@ -51,7 +51,8 @@ class CheckAnswerer:
             raise ValueError(f'contacts: {count} pairs touch or are near, and a response has '
                              f'at most {MOST_CONTACTS}: ask for fewer boxes, or name pairs')
         listed, names_of = response.contacts, self._check.names_of
-        listed.header, listed.revision = request.header, self.solver.revision
+        listed.header, listed.epoch = request.header, self._epoch
+        listed.revision = self.solver.revision
         listed.contacts = self._kept.fill([names_of(a, b) for a, b in found.pairs.tolist()],
                                           found.contacts, areas)
         listed.near = near_messages([names_of(a, b) for a, b in found.near_pairs.tolist()],

@@ -141,10 +141,11 @@ def _is_name(path: str | bytes) -> bool:
 def _scene_of(data: Any) -> Scene:
     """Return the scene that data means, or raise SceneError."""
     _check_schema(data)
-    boxes = {name: _box(entry, ('boxes', name)) for name, entry in data.get('boxes', {}).items()}
+    boxes = {name: _box(entry, ('boxes', name), entry.get('body', ''))
+             for name, entry in data.get('boxes', {}).items()}
     bodies = data.get('bodies', {})
     for body, parts in bodies.items():
-        for part, entry in parts['boxes'].items():
+        for part, entry in parts.get('boxes', {}).items():
             name, place = f'{body}_{part}', ('bodies', body, 'boxes', part)
             if name in boxes:
                 raise SceneError(place, f'{short_repr(name)} is the name of another box')
@@ -160,7 +161,7 @@ def _scene_of(data: Any) -> Scene:
         scene = Scene(
             boxes, tuple(Pair(entry.get('name', f'{entry["a"]}_{entry["b"]}'), entry['a'],
                               entry['b']) for entry in listed.values()),
-            data.get('frame_id', ''), data.get('poses') == 'array',
+            data.get('frame_id', ''), data.get('poses', 'topics'),
             tuple((entry['a'], entry['b']) for entry in patterns.values()),
             {name: _frame(name, entry) for name, entry in bodies.items()})
     except SceneError as fault:  # the file has both in one list
@@ -168,9 +169,9 @@ def _scene_of(data: Any) -> Scene:
         if part in ('pairs', 'patterns') and path:
             path[0] = list(listed if part == 'pairs' else patterns)[int(path[0])]
         raise SceneError(('pairs' if part == 'patterns' else part, *path), fault.reason) from None
-    if not scene.pose_array and len(scene.moving) > MOST_STREAMS:
+    if not scene.in_one_message and len(scene.moving) > MOST_STREAMS:
         raise SceneError(('boxes',), f'{len(scene.moving)} boxes and bodies have a topic of their '
-                                     f'own, and at most {MOST_STREAMS} may: set poses: array')
+                                     f'own, and at most {MOST_STREAMS} may: set poses: named')
     return scene
 
 

@@ -10,7 +10,7 @@ somebody asks for them.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ from ..solver.contacts_of import find_contacts, touching_and_near
 from ..solver.model import Model
 from ..solver.nearest import Nearest, Nearests
 from .changes import checked_changes
-from .scene import NOWHERE, Box, Pair, Scene
+from .scene import NOWHERE, Box, Frame, Pair, Scene
 
 NO_BODIES = np.zeros(0, np.int64)
 """The bodies of boxes, where a scene has none."""
@@ -71,23 +71,15 @@ class _Revision(NamedTuple):
 
     scene: Scene
     number: int
-    moving: tuple[str, ...]
-    """Whose poses a call takes, in their order. What moves no more has a row still, which is not
-    read."""
-    rows: np.ndarray
-    """(m, 7) poses of boxes, of bodies, and of what moves no more."""
-    moving_rows: np.ndarray
-    """(l,) of what moves."""
+    rows: np.ndarray  # (m, 7) poses of boxes and of bodies
+    moving_rows: np.ndarray  # (l,) of what moves
     broad_phase: native.BroadPhase
 
     @classmethod
-    def of(cls, scene: Scene, moving: Sequence[str], number: int, margin: float) -> _Revision:
+    def of(cls, scene: Scene, number: int, margin: float) -> _Revision:
         """Begin without poses."""
-        rows = scene.fixed_poses(spare=1)
-        is_moving = set(scene.moving)
-        moving_rows = np.array([scene.row_of[name] if name in is_moving else len(rows) - 1
-                                for name in moving], np.int64)
-        return cls(scene, number, tuple(moving), rows, moving_rows, native.BroadPhase(
+        moving_rows = np.array([scene.row_of[name] for name in scene.moving], np.int64)
+        return cls(scene, number, scene.fixed_poses(), moving_rows, native.BroadPhase(
             scene.sizes, scene.is_fixed, margin, scene.rows, *scene.groups, scene.body_of))
 
     @property
@@ -116,7 +108,7 @@ class SceneSolver:
         self._most_near = as_whole(most_near, 'most_near', 0, sys.maxsize)
         self.model = model
         self._solver = ContactSolver(model=model, margin=self.margin)
-        self._at = _Revision.of(scene, scene.moving, 0, self.margin)
+        self._at = _Revision.of(scene, 0, self.margin)
         self._refuse_sizes(*(np.unique(sizes, axis=0)
                              for sizes in (scene.sizes, scene.sizes[scene.rows].reshape(-1, 6))))
         self([None] * len(self.moving))
@@ -134,54 +126,55 @@ class SceneSolver:
     @property
     def moving(self) -> tuple[str, ...]:
         """Whose poses a call takes, in their order."""
-        return self._at.moving
+        return self.scene.moving
 
     def __reduce__(self) -> tuple[Callable[..., SceneSolver], tuple[Any, ...]]:
         """Pickle what makes the solver."""
-        return _made_again, (self.scene, self.model, self.margin, self._most_near, self.moving,
-                             self.revision)
+        return _made_again, (self.scene, self.model, self.margin, self._most_near, self.revision)
 
-    def changed(self, *, fixed: Mapping[str, Box] | None = None,
-                moving: Mapping[str, Box] | None = None, absent: Collection[str] = (),
-                ) -> SceneSolver:
-        """Return the solver of the scene that `set_boxes` makes; this one stays as it is."""
-        changes = checked_changes(self.scene, fixed or {}, moving or {}, absent)
-        # A box that moves again has its former row.
-        scene = self.scene.changed(changes)
-        kept = np.arange(len(self.scene.boxes))
-        index = self.scene.index_of
-        kept[[index[name] for name in changes if name in index]] = -1
-        if gone := [index[name] for name, box in changes.items() if box is None]:
-            kept = np.delete(kept, gone)
-        kept = np.concatenate((kept, np.full(len(scene.boxes) - len(kept), -1)))
-        rows = (*self.moving, *(name for name in moving or {} if name not in self.moving))
-        later = _Revision.of(scene, rows, self.revision + 1, self.margin)
+    def changing(self, *, fixed: Mapping[str, Box] | None = None,
+                 moving: Mapping[str, Box] | None = None, parts: Mapping[str, Box] | None = None,
+                 bodies: Mapping[str, Frame] | None = None, absent: Collection[str] = (),
+                 ) -> Generator[None, None, SceneSolver]:
+        """Return, in steps, the solver of the scene that `set_boxes` makes; this one stays."""
+        changes = checked_changes(self.scene, fixed or {}, moving or {}, parts or {}, bodies or {},
+                                  absent)
+        yield
+        scene, kept = self.scene.changed(*changes)
+        yield
+        later = _Revision.of(scene, self.revision + 1, self.margin)
+        yield
         later.broad_phase.take_fixed(self._at.broad_phase, kept)
         solver = object.__new__(SceneSolver)
         solver.model, solver.margin, solver._at = self.model, self.margin, later
         solver._most_near, solver._solver = self._most_near, self._solver
-        sizes = np.array([box.size for box in changes.values() if box is not None]).reshape(-1, 3)
-        listed = [] if scene.listed_names.isdisjoint(changes) else scene.sizes[scene.rows]
-        solver._refuse_sizes(sizes, np.reshape(listed, (-1, 6)))
+        sizes = np.array([box.size for box in changes.boxes.values() if box is not None])
+        listed = ([] if scene.listed_names.isdisjoint(changes.boxes) else
+                  scene.sizes[scene.rows])
+        solver._refuse_sizes(sizes.reshape(-1, 3), np.reshape(listed, (-1, 6)))
         return solver
 
     def with_model(self, model: str | Model, most_near: int = sys.maxsize) -> SceneSolver:
         """Return a solver of the same scene by another model."""
-        return _made_again(self.scene, model, self.margin, most_near, self.moving, self.revision)
+        return _made_again(self.scene, model, self.margin, most_near, self.revision)
 
     def set_boxes(self, *, fixed: Mapping[str, Box] | None = None,
-                  moving: Mapping[str, Box] | None = None, absent: Collection[str] = ()) -> int:
+                  moving: Mapping[str, Box] | None = None, parts: Mapping[str, Box] | None = None,
+                  bodies: Mapping[str, Frame] | None = None, absent: Collection[str] = ()) -> int:
         """Change boxes of the scene, all or none; return the new `revision`.
 
         fixed: boxes with poses, by name: new ones, or ones that replace those of the scene.
-        moving: boxes without poses, which move from now on, in a scene with `pose_array`. Those of
-        the scene that moved before keep their places in `moving`; others come last.
-        absent: names of boxes that are there no more.
+        moving: boxes without poses, which move from now on.
+        parts: boxes with a `body` of the scene or of `bodies`, which they become parts of.
+        bodies: new ones by name, or ones that start or stop to move.
+        absent: names of boxes that are there no more, or of bodies with all their boxes.
 
-        Listed pairs, patterns and bodies stay; new boxes are in the pairs whose patterns match.
+        What moves changes with `poses` of the scene 'named' alone. Listed pairs and patterns stay;
+        new boxes are in the pairs whose patterns match. A body whose last box goes is gone.
         Raises SceneError, a ValueError with field and value.
         """
-        self._at = self.changed(fixed=fixed, moving=moving, absent=absent)._at
+        self._at = finished(self.changing(fixed=fixed, moving=moving, parts=parts, bodies=bodies,
+                                          absent=absent))._at
         return self.revision
 
     def _refuse_sizes(self, sizes: np.ndarray, listed: np.ndarray) -> None:
@@ -210,7 +203,7 @@ class SceneSolver:
         """
         self._set_poses(poses)
         if self.scene.bodies:
-            self.scene.place_boxes(self._at.rows[:-1])
+            self.scene.place_boxes(self._at.rows)
         pairs, contacts, stale = find_contacts(
             self._at.broad_phase, self._solver, self.scene.sizes, self._at.poses,
             lambda box: f'pose of {self.scene.names[box]}:', most_near=self._most_near)
@@ -248,9 +241,18 @@ class SceneSolver:
                 pose, f'pose of {name}', 'a pose (x y z qx qy qz qw)', (7,))
 
 
-def _made_again(scene: Scene, model: str | Model, margin: float, most_near: int,
-                moving: tuple[str, ...], revision: int) -> SceneSolver:
+def finished(steps: Generator[None, None, Any]) -> Any:
+    """Return what steps make, after all of them."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            return end.value
+
+
+def _made_again(scene: Scene, model: str | Model, margin: float, most_near: int, revision: int,
+                ) -> SceneSolver:
     """Return a solver that was pickled."""
     solver = SceneSolver(scene, model=model, margin=margin, most_near=most_near)
-    solver._at = _Revision.of(scene, moving, revision, solver.margin)
+    solver._at = _Revision.of(scene, revision, solver.margin)
     return solver

@@ -26,8 +26,8 @@ SHOWN = 200  # characters of a refused value that an error shows
 MOST_NAME_BYTES = 255
 """Of the name of a box or pair, and of a frame_id, in UTF-8; ROS's own names have no more. A
 response may repeat a name thousands of times."""
-TOKEN = re.compile('[A-Za-z_][A-Za-z0-9_]*')
-"""Of a topic's name: the name of a box or body."""
+NAME = re.compile('[A-Za-z0-9_-]+')
+"""Of a box or body, as containers have them: MSKU-123. A topic takes no `-`, and no digit first."""
 _REPR = reprlib.Repr()
 _REPR.maxlist = _REPR.maxtuple = 8  # a pose, and whether there is more
 _REPR.maxlevel = 3
@@ -58,13 +58,13 @@ def nearest_name(name: object, known: Iterable[str]) -> str:
     return nearest and f' (did you mean {spelled[nearest]}?)'
 
 
-def name_fault(name: str, *, token: bool = False) -> str | None:
+def name_fault(name: str, *, of_box: bool = False) -> str | None:
     """Return what follows a text that is no name or frame_id, as to why; or None.
 
-    token: names are letters, digits and _, as those of boxes in msg_schemas/scene.json.
+    of_box: names are letters, digits, _ and -, as in msg_schemas/scene.json.
     """
-    if token and not TOKEN.fullmatch(name):
-        return 'is no name of letters, digits and _'
+    if of_box and not NAME.fullmatch(name):
+        return 'is no name of letters, digits, _ and -'
     size = len(name.encode(errors='surrogatepass'))
     return f'has {size} bytes, more than {MOST_NAME_BYTES}' if size > MOST_NAME_BYTES else None
 

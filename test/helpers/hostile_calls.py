@@ -77,7 +77,16 @@ def writer_arguments(n: int = 4) -> list[Any]:
     return [native.BroadPhase(*phase_arguments(n)), ContactSolver(), 0.1, 9, np.ones((n, 3)),
             rows(n + 1), np.array([n - 1, n]), np.array([n] * (n - 1) + [-1]), rows(n),
             tuple('abcd'), np.array([[1, 0]]), ('named',), np.array([[1, 0, 1, 1]]), (None,),
-            'map', 3]
+            'map', 2, 3]
+
+
+def some_names(rng: np.random.Generator) -> bytes:
+    """Return a MultiDOFJointState of two names, in which some bytes are others."""
+    message = bytearray(b'\0\1\0\0' + bytes(8) + b'\1\0\0\0' + bytes(4) + b'\2\0\0\0'
+                        + b'\2\0\0\0a\0\0\0' + b'\2\0\0\0b\0\0\0' + b'\2\0\0\0' + bytes(120))
+    for at in rng.integers(len(message), size=rng.integers(4)):
+        message[at] = rng.integers(256)
+    return bytes(message[:rng.integers(len(message)) if rng.random() < 0.3 else None])
 
 
 STAMPED = [(POSE, 'map', 5), (POSE, 'map', 7)]
@@ -346,6 +355,8 @@ def random_calls(seed: int, rounds: int) -> None:
          [native.BroadPhase(*phase_arguments()), np.array([1, 0, -1, 3])], {}),
         (native.BroadPhase(*phase_arguments()).resize, [np.arange(4), np.ones((4, 3))], {}),
         (native.read_pose, [rng.bytes(int(rng.integers(90)))], {}),
+        (native.NamedPoses, [tuple('abcd')], {}),
+        (native.NamedPoses(tuple('abcd')).read, [some_names(rng)], {}),
         (native.TickWriter, writer_arguments(), {}),
         (native.TickWriter(*writer_arguments()), [list(STAMPED)], {}),
         (native.TickWriter(*writer_arguments()), [[odd(rng, STAMPED[0]), STAMPED[1]]], {}),

@@ -17,10 +17,12 @@ from geometry_msgs.msg import (
     PoseArray,
     PoseStamped,
     Quaternion,
+    Transform,
     Vector3,
     Vector3Stamped,
 )
 from rclpy.serialization import serialize_message
+from sensor_msgs.msg import MultiDOFJointState
 from std_msgs.msg import Header
 
 from box_contact_msgs.msg import Box, BoxPair, Contacts
@@ -49,6 +51,16 @@ def pose_stamped(numbers: Iterable[float], frame_id: str, stamp: int) -> PoseSta
 def pose_array(rows: Iterable[Iterable[float]], frame_id: str, stamp: int) -> PoseArray:
     """Return the message of poses (n, 7); stamp [ns]."""
     return PoseArray(header=make_header(stamp, frame_id), poses=[_pose(row) for row in rows])
+
+
+def joint_state(poses: Mapping[str, Iterable[float]], frame_id: str, stamp: int,
+                ) -> MultiDOFJointState:
+    """Return the message of poses by name; stamp [ns]."""
+    moved = [_pose(row) for row in poses.values()]
+    return MultiDOFJointState(
+        header=make_header(stamp, frame_id), joint_names=list(poses),
+        transforms=[Transform(translation=Vector3(x=p.position.x, y=p.position.y, z=p.position.z),
+                              rotation=p.orientation) for p in moved])
 
 
 def a_box(name: str, pose: Iterable[float], size: Iterable[float] = (0.0, 0.0, 0.0)) -> Box:

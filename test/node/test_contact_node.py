@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+import traceback
 from contextlib import closing
 
 import numpy as np
@@ -77,6 +78,23 @@ def test_poses_pair_by_stamp_in_any_order(node, client):
     for stamp in stamps:
         contact = contacts_by_pair(client.contacts[stamp])[PAIR]
         assert -contact.separation == pytest.approx(2 - heights[stamp], abs=1e-14)
+
+
+def test_reports_come_behind_a_tick(node, client, monkeypatch):
+    """So no tick waits for one; without ticks they come, too."""
+    behind = []
+
+    def report(*args, report=node._diagnostics.report):
+        files = [frame.filename for frame in traceback.extract_stack()]
+        behind.append(any(file.endswith('tick.py') for file in files))
+        report(*args)
+
+    monkeypatch.setattr(node._diagnostics, 'report', report)
+    assert client.spin(lambda: len(behind) > 2)
+    assert not any(behind)
+    behind.clear()
+    assert client.spin(lambda: len(behind) > 3 or client.ask(ORIGIN, APART) and False)
+    assert all(behind[1:])
 
 
 def test_two_nodes_on_the_same_topics(node, client, capfd):

@@ -191,7 +191,7 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: scene(FIXED), 'pairs[0]', 'leave `pose` out of a box that moves, and give its'),
     (lambda: scene(FIXED, (), patterns=(('*', '*'),)), 'patterns[0]', 'ask contacts_of'),
     (lambda: scene(frame_id=5), 'frame_id', '5'),
-    (lambda: scene(pose_array='no'), 'pose_array', "'no'"),
+    (lambda: scene(poses='no'), 'poses', "'no'"),
     (lambda: SceneSolver(None), 'scene', 'None'),
     (lambda: SceneSolver(scene(), margin='x'), 'margin', "'x'"),
     (lambda: SceneSolver(scene(), most_near=1.5), 'most_near', '1.5'),

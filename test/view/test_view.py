@@ -617,12 +617,13 @@ def test_boxes_that_come_and_go_in_a_browser():
     """The page draws the boxes of the newest scene, as ~/set_boxes makes it, and no others."""
     stack = Box(CUBE, ORIGIN)
     both = Scene({'crane': Box(CUBE), 'stack': stack}, patterns=(('crane', 'stack*'),),
-                 pose_array=True)
-    crane_alone = both.changed({'stack': None})
+                 poses='array')
+    crane_alone, _ = both.changed({'stack': None}, {})
     with (closing(Page('127.0.0.1', 8450, SceneRows(crane_alone))) as page,
           open_page(page.url, 640, 360) as tab):
         tab.wait_for('document.querySelector("canvas") != null')
-        for scene in (crane_alone, both, crane_alone, crane_alone.changed({'stack2': stack})):
+        again, _ = crane_alone.changed({'stack2': stack}, {})
+        for scene in (crane_alone, both, crane_alone, again):
             rows, deadline = SceneRows(scene), time.monotonic() + PATIENCE
             placed = np.where(np.isnan(rows.poses), (0, 0, 3, 0, 0, 0, 1), rows.poses)
             shares = [0.0, 0.0]  # of crane and stack

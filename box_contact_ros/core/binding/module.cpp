@@ -9,6 +9,7 @@
 #include "faces.hpp"
 #include "forces.hpp"
 #include "message_numbers.hpp"
+#include "named_poses.hpp"
 #include "pair_solver.hpp"
 #include "pose_faults.hpp"
 #include "read_pose.hpp"
@@ -111,6 +112,7 @@ PyObject* make_module() {
   broad_phase_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&broad_phase_spec)));
   add("PairSolver", Py_NewRef(solver_type));
   add("BroadPhase", Py_NewRef(broad_phase_type));
+  add("NamedPoses", PyType_FromSpec(&named_poses_spec));
   add("TickWriter", PyType_FromSpec(&tick_writer_spec));
   add("PatchForces", PyType_FromSpec(&forces_spec));
   using Whole = std::pair<const char*, long>;

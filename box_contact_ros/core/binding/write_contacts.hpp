@@ -178,6 +178,7 @@ class TickWriter {
                   const ContactRows& contacts) {
     Owned heads(made(PyList_New(0)));
     message_.begin(newest_, frame_id_);
+    message_.number(uint32_t(scene_.epoch));
     message_.number(uint64_t(scene_.revision));
     auto touching = std::count_if(colliding, colliding + count, [](Flag flag) { return flag; });
     message_.number(uint32_t(touching));
@@ -287,7 +288,8 @@ inline PyObject* tick_writer_call(PyObject* self, PyObject* args, PyObject* keyw
 inline PyType_Slot tick_writer_slots[] = {
     {Py_tp_doc,
      const_cast<char*>("TickWriter(broad_phase, solver, margin, most_near, sizes, poses, moving, "
-                       "bodies, local, names, listed, labels, watched, topics, frame_id, revision)"
+                       "bodies, local, names, listed, labels, watched, topics, frame_id, epoch, "
+                       "revision)"
                        "\n--\n\n"
                        "Answer ticks of a scene as the bytes of messages; see write_contacts.hpp.")},
     {Py_tp_new, slot<tick_writer_new>()},

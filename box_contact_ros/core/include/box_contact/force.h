@@ -147,7 +147,8 @@ BC_API bc_status bc_patch_forces_forget(bc_patch_forces* forces, const int64_t* 
 BC_API void bc_patch_forces_reset(bc_patch_forces* forces);
 
 /* Take an answer, asked for at `poses` (one for each body; not read for contacts of one's own, which
- * need set_boxes). Pairs that are left out are forgotten.
+ * need set_boxes). Pairs that are left out are forgotten. Contacts of boxes that are of one body by now
+ * are passed over.
  * BC_BAD_ARGUMENT, and nothing changes, for numbers beyond the limits above, a contact without a patch
  * and a pair that comes twice. */
 BC_API bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches* answer,

@@ -22,11 +22,13 @@ struct Answered {
   double friction;                        // where the answer has none
 
   bool is_stale(int64_t k) const { return answer.separation[k] != answer.separation[k]; }
-  // Whether something moves of the pair of row k, which touches, or has a stale contact.
+  // Whether something moves of the pair of row k, which touches, or has a stale contact. Boxes may have
+  // been joined since the question: those of one body are no pair.
   bool is_patch(int64_t k) const {
     const int64_t* pair = answer.pairs + 2 * k;
-    return (is_stale(k) || answer.volume[k] > 0.0) && (bodies[size_t(body_of(pair[0]))].is_free() ||
-                                                       bodies[size_t(body_of(pair[1]))].is_free());
+    int32_t a = body_of(pair[0]), b = body_of(pair[1]);
+    return a != b && (is_stale(k) || answer.volume[k] > 0.0) &&
+           (bodies[size_t(a)].is_free() || bodies[size_t(b)].is_free());
   }
   int32_t body_of(int64_t box) const {
     return int32_t(boxes.empty() ? box : boxes[size_t(box)].body);
