@@ -6,8 +6,7 @@
 `python -m benchmarks.fuzz --plans 1000` draws plans of KINDS in turn. All boxes of a group stand,
 or no loads exist for it, with friction or without (upright_statics.py). It is wrong that all stand
 if patches as they are have no loads. It is wrong that one falls if patches that are pulled in by
-what a box needs, and by RIM more, have some. It is told where those pulled in by ROBUST have some,
-too.
+what a box needs, and by RIM more, have some; it is told where by ROBUST more they still have.
 
 Lengths in m, masses in kg.
 """

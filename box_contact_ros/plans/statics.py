@@ -6,14 +6,13 @@
 Each patch is a bed of equal stiffness per area that does not pull. Two quadratic programmes follow
 each other:
 
-    what falls: the least missing wrench     min Σ W·|m|²     G·f + m = w,  f ≥ 0,  E·f ≥ 0
-    the loads: the least energy              min Σ f²/k       G·f = w − m,  f ≥ 0,  E·f ≥ 0
+    what falls: the least missing wrench     min Σ W·|m|²     G·f + m = w,  f ≥ 0
+    the loads: the least energy              min Σ f²/k       G·f = w − m,  f ≥ 0
 
 f are forces at points of the patches, k the stiffness of a point, G the wrenches of unit forces, W
-the weights of bodies, and w their wrenches. E·f ≥ 0 keeps the centre of pressure of each body
-within the hull of what carries it, pulled in by what the body needs. m is Gauss's principle: m·g
-are the accelerations with which the bodies begin to move, so bodies with an m fall.
-docs/explanation/statics.md has the rest.
+the weights of bodies, and w their wrenches. The points are within the hull of what carries a body,
+pulled in by what the body needs. m is Gauss's principle: m·g are the accelerations with which the
+bodies begin to move, so bodies with an m fall. docs/explanation/statics.md has the rest.
 
 All is in a frame whose z axis is against what the bodies feel as gravity. Wrenches are in units of
 a body's weight, and of that times its radius of gyration.
@@ -34,6 +33,8 @@ FALLS = 1e-5
 """Missing part of its weight from which a body falls [1]: above what the solver leaves."""
 DOUBTFUL = 1e-2
 """Missing part up to which a body is asked again to hold, with the others falling [1]."""
+FELL = 1e-4
+"""Missing part from which a body that was asked again, and lacked some again, falls [1]."""
 LEVEL = 1e-9
 """Up to 1 − LEVEL, a cosine is that of a normal that is not along gravity: 4e-5 rad."""
 NEGLIGIBLE = 1e-9
@@ -52,6 +53,8 @@ ROUGH = 0.9
 """Radius at which friction resists a spin, divided by that of gyration of a rectangle [1]."""
 SEEN = 2.0 * FALLS
 """How far a hull is pulled in at least [of a radius of gyration], so that what is missing tells."""
+MOVES, SLACK = 50, 0.1
+"""Steps by which points are moved into a hull, and the part of the need that they may lack."""
 SAME_HEIGHT = 1e-3
 """Step of heights [m]: friction at two of them can turn a body."""
 SURE, ASKED, GRIPPING = 'sure', 'asked', 'gripping'
@@ -139,7 +142,7 @@ def settle(bodies: Bodies, beds: Beds, friction: float,
     size = np.bincount(group[free], minlength=1)
 
     def any_of(bodies_or_patches: np.ndarray, of: np.ndarray) -> np.ndarray:
-        return np.bincount(of[bodies_or_patches], minlength=len(size)) > 0
+        return np.asarray(np.bincount(of[bodies_or_patches], minlength=len(size)) > 0)
 
     rests = any_of(bodies.fixed[beds.pairs[left]].any(axis=1), of_patch)
     is_level = ~any_of(np.abs(beds.normal[left, 2]) <= 1.0 - LEVEL, of_patch)
@@ -150,29 +153,34 @@ def settle(bodies: Bodies, beds: Beds, friction: float,
         for flat in (True, False):
             for some in _batches(np.flatnonzero(groups & (is_level == flat)), size):
                 rows, members = left[np.isin(of_patch, some)], np.flatnonzero(np.isin(group, some))
-                part = _Programme(bodies, beds, members, rows, flat and way != GRIPPING)
+                part = _Programme(bodies, beds, members, rows, flat and way != GRIPPING,
+                                  is_tight | (way == GRIPPING))
                 load[rows], centre[rows], missing[members] = part.settle(friction, way)
 
-    # Of most groups the first loads that are found will do.
     inside = hull_margins(beds.bearings.hull[left, :, :2], beds.pairs[left, 1],
                           bodies.centre[:, :2])
-    is_sure = ~any_of(inside[free] <= bodies.need[free], group[free])
-    solve(rests & is_sure, SURE)
-    report(int(is_sure[group[free]].sum()))
-    margin = pressed_margins(beds, load, centre, len(own))
-    holds = (np.abs(missing).max(axis=1) <= FALLS) & (is_beside | (margin > bodies.need))
-    lacks = rests & any_of(~holds[free], group[free])
-    solve(lacks, ASKED)
+    is_tight = (group >= 0) & (inside <= bodies.need) & ~is_beside
+    asked, todo, reported = any_of(is_tight[free], group[free]), rests.copy(), ~rests
+    while todo.any():
+        solve(todo & ~asked, SURE)
+        solve(todo & asked, ASKED)
+        report(int((todo & ~reported)[group[free]].sum()))
+        # Of most bodies the centre of pressure is well inside, so that they need no rows.
+        margin = pressed_margins(beds, load, centre, len(own))
+        is_new = (group >= 0) & (margin <= bodies.need) & ~is_tight & ~is_beside
+        falls = (np.abs(missing) > FALLS).any(axis=1)
+        reported, is_tight = reported | todo, is_tight | is_new
+        todo &= any_of(is_new[free], group[free]) | ~asked & any_of(falls[free], group[free])
+        asked |= todo
     falls = (np.abs(missing) > FALLS).any(axis=1)
     # Friction can turn a box that has others on it; whether it falls decides on what it carries.
     lower, upper = beds.pairs[left].T
     has_others = np.bincount(lower, minlength=len(group)) > 0
     is_first = np.bincount(upper[falls[lower]], minlength=len(group)) == 0
-    lacks &= any_of((falls & is_first & (has_others | (inside > bodies.need)))[free], group[free])
+    may_turn = falls & is_first & (has_others | (inside > bodies.need))
     if friction:
-        solve(lacks & is_level & (size <= MOST_GRIPPING) & _have_rings(
-            bodies, beds, left, of_patch, size), GRIPPING)
-    report(int((~is_sure)[group[free]].sum()))
+        solve(rests & any_of(may_turn[free], group[free]) & is_level & (size <= MOST_GRIPPING)
+              & _have_rings(bodies, beds, left, of_patch, size), GRIPPING)
     return Rest(load, centre, missing, pressed_margins(beds, load, centre, len(own)))
 
 
@@ -274,10 +282,11 @@ class _Programme:
     """The quadratic programmes of some groups.
 
     flat: all normals are along gravity, so that three equations a body are enough, and no friction.
+    is_tight: bodies (n,) that nothing presses outside of their hulls, pulled in by what they need.
     """
 
     def __init__(self, bodies: Bodies, beds: Beds, members: np.ndarray, rows: np.ndarray,
-                 flat: bool) -> None:
+                 flat: bool, is_tight: np.ndarray) -> None:
         self.flat, self.members, self.rows, self.beds = flat, members, rows, beds
         self.unit = bodies.weight[members].mean()
         self.weight = bodies.weight[members] / self.unit
@@ -291,7 +300,8 @@ class _Programme:
         self.stiffness = stiffness[self.patch, column] / area.mean()
         self.bodies = place[beds.pairs[rows]]
         self.centre, self.gyration = bodies.centre[members], bodies.gyration[members]
-        self.need = np.maximum(bodies.need[members], SEEN * self.gyration)
+        self._pull_in(np.flatnonzero(is_tight[members]),
+                      np.maximum(bodies.need[members], SEEN * self.gyration))
         self.keep = np.array([2, 3, 4]) if flat else np.arange(6)
         self.wanted = np.tile((self.keep == 2).astype(float), len(members))  # against gravity
         self.pressing = self._wrenches(self.patch, self.point, beds.normal[rows][self.patch])
@@ -328,10 +338,9 @@ class _Programme:
         """Return loads (k,), centres of pressure (k, 3), and what is missing (n, 6)."""
         bound = np.zeros(len(self.rows))
         at = self.beds.centre[self.rows]
-        inner = None if way == SURE else self._inner()
         for _ in range(1 if self.flat or way == GRIPPING else PASSES_MAX):
             rubs = self._gripping(friction) if way == GRIPPING else self._rubbing(bound, at)
-            force, missing = self._solve(rubs, inner)
+            force, missing = self._solve(rubs, way == SURE)
             load = np.bincount(self.patch, force, minlength=len(self.rows))
             moment = np.stack([np.bincount(self.patch, force * self.point[:, axis],
                                            minlength=len(self.rows)) for axis in range(3)], axis=1)
@@ -345,56 +354,67 @@ class _Programme:
         whole[:, self.keep] = missing
         return np.where(presses, load, 0.0) * self.unit, at, whole
 
-    def _solve(self, rubs: _Friction, inner: Any) -> tuple[np.ndarray, np.ndarray]:
+    def _solve(self, rubs: _Friction, sure: bool) -> tuple[np.ndarray, np.ndarray]:
         """Return forces (q,) at points and what is missing (n, equations), with friction.
 
-        inner: rows of what the forces keep above 0; None: all bodies may be expected to hold.
+        sure: all bodies may be expected to hold, so that their loads are looked for at once.
         """
-        from scipy.sparse import csc_matrix, hstack
+        from scipy.sparse import hstack
 
         cost = 1.0 / self.stiffness
         metric = np.repeat(self.weight, len(self.keep))
-        missing = np.zeros(len(self.wanted))
-        if inner is not None:
+        missing = soft = np.zeros(len(self.wanted))
+        if not sure:
             # Whether loads exist depends on where patches end alone.
             some = rubs.of(self.spans)
-            _, missing = _least(
+            _, soft = _least(
                 hstack((self.pressing[:, self.spans], some.wrenches), format='csc'), self.wanted,
-                SOFTNESS * np.append(cost[self.spans], some.cost), metric, some,
-                inner[:, self.spans])
-            missing[np.abs(missing) < DOUBTFUL] = 0.0
+                SOFTNESS * np.append(cost[self.spans], some.cost), metric, some)
+            missing = np.where(np.abs(soft) < DOUBTFUL, 0.0, soft)
         given = hstack((self.pressing, rubs.wrenches), format='csc')
-        force, more = _least(given, self.wanted - missing, np.append(cost, rubs.cost),
-                             STIFFNESS * metric, rubs,
-                             csc_matrix((0, len(cost))) if inner is None else inner)
-        if inner is None and not self.flat and np.abs(more).max() > FALLS:
-            return self._solve(rubs, self._inner())
-        return force[:len(cost)], (missing + more).reshape(-1, len(self.keep))
+        cost = np.append(cost, rubs.cost)
+        force, more = _least(given, self.wanted - missing, cost, STIFFNESS * metric, rubs)
+        each = (-1, len(self.keep))
+        fell = ((np.abs(more) > FALLS).reshape(each).any(axis=1)
+                & (np.abs(soft) > FELL).reshape(each).any(axis=1))
+        if fell.any():  # so that the others need not lack what these do
+            missing = np.where(np.repeat(fell, each[1]), soft, missing)
+            force, more = _least(given, self.wanted - missing, cost, STIFFNESS * metric, rubs)
+        if sure and not self.flat and np.abs(more).max() > FALLS:
+            return self._solve(rubs, sure=False)
+        return force[:len(self.patch)], (missing + more).reshape(each)
 
-    def _inner(self) -> Any:
-        """Return rows of r·f ≥ 0: where what presses a body is within what carries it.
+    def _pull_in(self, tight: np.ndarray, need: np.ndarray) -> None:
+        """Move what presses bodies into their hulls, pulled in by what they need (n,) [m].
 
-        A sparse matrix (edges of hulls, q). A body that is held from beside has none.
+        Drop what has no place there. A body that is held from beside is left as it is.
         """
-        from scipy.sparse import csc_matrix, vstack
-
         upper, carries = self.bodies[:, 1], self.beds.carries[self.rows]
-        held = self.bodies[~carries]
+        of_bed = np.where(carries, upper, -1)
         hull = self.beds.bearings.hull[self.rows][:, :, :2]
-        of_point = np.where(carries, upper, -1)[self.patch]
+        normal = self.beds.normal[self.rows[self.patch]]
+        keeps = np.ones(len(self.patch), bool)
+        of_point = of_bed[self.patch]
         order = np.argsort(of_point, kind='stable')
         first = np.searchsorted(of_point[order], np.arange(len(self.members) + 1))
-        rows = [csc_matrix((0, len(self.point)))]
-        for body in np.setdiff1d(upper[carries], [-1, *held.ravel()]):
+        by_bed = np.argsort(of_bed, kind='stable')
+        first_bed = np.searchsorted(of_bed[by_bed], np.arange(len(self.members) + 1))
+        for body in np.setdiff1d(tight, self.bodies[~carries]):
             points = order[first[body]:first[body + 1]]
-            start, inward = hull_edges(hull[carries & (upper == body)].reshape(-1, 2))
-            depth = ((self.point[points, None, :2] - start) * inward).sum(axis=2).T
-            vertical = self.beds.normal[self.rows[self.patch[points]], 2]
-            values = (depth - self.need[body]) * vertical / self.gyration[body]
-            edges = np.repeat(np.arange(len(start)), len(points))
-            rows.append(csc_matrix((values.ravel(), (edges, np.tile(points, len(start)))),
-                                   (len(start), len(self.point))))
-        return vstack(rows, format='csc')
+            start, inward = hull_edges(
+                hull[by_bed[first_bed[body]:first_bed[body + 1]]].reshape(-1, 2))
+            if not len(points):
+                continue
+            moved, depth = pulled_in(self.point[points, :2], start, inward, need[body])
+            step = moved - self.point[points, :2]
+            self.point[points, 2] -= (step * normal[points, :2]).sum(axis=1) / normal[points, 2]
+            self.point[points, :2] = moved
+            keeps[points] = depth > (1.0 - SLACK) * need[body]
+        self.patch, self.point, self.stiffness = (
+            self.patch[keeps], self.point[keeps], self.stiffness[keeps])
+        is_span = np.zeros(len(keeps), bool)
+        is_span[self.spans] = True
+        self.spans = np.flatnonzero(is_span[keeps])
 
     def _rubbing(self, bound: np.ndarray, at: np.ndarray) -> _Friction:
         """Return friction of patches, up to bounds (k,): forces at points, and torques."""
@@ -473,19 +493,31 @@ def hull_edges(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return start, np.column_stack((-along[:, 1], along[:, 0])) / np.where(length > 0.0, length, 1.0)
 
 
+def pulled_in(points: np.ndarray, start: np.ndarray, inward: np.ndarray, need: float,
+              ) -> tuple[np.ndarray, np.ndarray]:
+    """Return points (p, 2) moved into a hull with edges (e, 2) by need, and their depths (p,)."""
+    for _ in range(MOVES):
+        depth = ((points[:, None] - start) * inward).sum(axis=2)
+        edge = depth.argmin(axis=1)
+        short = np.maximum(need - depth.min(axis=1), 0.0)
+        if not short.any():
+            break
+        points = points + short[:, None] * inward[edge]
+    return points, ((points[:, None] - start) * inward).sum(axis=2).min(axis=1)
+
+
 def _least(given: Any, wanted: np.ndarray, cost: np.ndarray, metric: np.ndarray, rubs: _Friction,
-           inner: Any) -> tuple[np.ndarray, np.ndarray]:
+           ) -> tuple[np.ndarray, np.ndarray]:
     """Return f (m,) and what is missing (e,), with the least cost·f² + metric·missing².
 
-    given·f + missing = wanted. The last f are those of friction. The others are not negative, and
-    neither is inner·f of them.
+    given·f + missing = wanted. The last f are those of friction. The others are not negative.
     """
     import clarabel
     from scipy.sparse import csc_matrix, diags, hstack, identity, vstack
 
     equations, forces = given.shape
     count = len(rubs.limit)
-    width = (forces - inner.shape[1]) // max(count, 1)
+    width = (forces - rubs.share.shape[1]) // max(count, 1)
     pressing = forces - width * count
     # Of each cone: the limit, then its forces.
     cone = (width + 1) * np.arange(count)[:, None] + np.arange(width + 1)
@@ -495,19 +527,18 @@ def _least(given: Any, wanted: np.ndarray, cost: np.ndarray, metric: np.ndarray,
         np.append(-share.data, -np.ones(column.size)),
         (np.append(cone[share.row, 0], cone[:, 1:]), np.append(share.col, column))),
         (cone.size, forces + equations))
-    positive = vstack((identity(pressing), inner))
-    rows = vstack((hstack((given, identity(equations))), hstack((
-        -positive, csc_matrix((positive.shape[0], forces - pressing + equations)))), bounded),
-        format='csc')
+    places = np.arange(pressing)
+    presses = csc_matrix((-np.ones(pressing), (places, places)), (pressing, forces + equations))
+    rows = vstack((hstack((given, identity(equations))), presses, bounded), format='csc')
     right = np.zeros(rows.shape[0])
     right[:equations] = wanted
-    right[equations + positive.shape[0] + cone[:, 0]] = rubs.limit
+    right[equations + pressing + cone[:, 0]] = rubs.limit
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = PRECISION
     solution = clarabel.DefaultSolver(
         diags(np.concatenate((cost, metric)), format='csc'), np.zeros(forces + equations), rows,
-        right, [clarabel.ZeroConeT(equations), clarabel.NonnegativeConeT(positive.shape[0]),
+        right, [clarabel.ZeroConeT(equations), clarabel.NonnegativeConeT(pressing),
                 *[clarabel.SecondOrderConeT(width + 1)] * count], settings).solve()
     force = np.array(solution.x[:forces])
     force[:pressing] = np.maximum(force[:pressing], 0.0)
