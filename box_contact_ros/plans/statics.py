@@ -168,11 +168,11 @@ def settle(bodies: Bodies, beds: Beds, friction: float,
         # Of most bodies the centre of pressure is well inside, so that they need no rows.
         margin = pressed_margins(beds, load, centre, len(own))
         is_new = (group >= 0) & (margin <= bodies.need) & ~is_tight & ~is_beside
-        falls = (np.abs(missing) > FALLS).any(axis=1)
+        falls = np.abs(missing).max(axis=1) > FALLS
         reported, is_tight = reported | todo, is_tight | is_new
         todo &= any_of(is_new[free], group[free]) | ~asked & any_of(falls[free], group[free])
         asked |= todo
-    falls = (np.abs(missing) > FALLS).any(axis=1)
+    falls = np.abs(missing).max(axis=1) > FALLS
     # Friction can turn a box that has others on it; whether it falls decides on what it carries.
     lower, upper = beds.pairs[left].T
     has_others = np.bincount(lower, minlength=len(group)) > 0
@@ -399,12 +399,10 @@ class _Programme:
         first = np.searchsorted(of_point[order], np.arange(len(self.members) + 1))
         by_bed = np.argsort(of_bed, kind='stable')
         first_bed = np.searchsorted(of_bed[by_bed], np.arange(len(self.members) + 1))
-        for body in np.setdiff1d(tight, self.bodies[~carries]):
+        for body in np.setdiff1d(np.intersect1d(tight, of_point), self.bodies[~carries]):
             points = order[first[body]:first[body + 1]]
             start, inward = hull_edges(
                 hull[by_bed[first_bed[body]:first_bed[body + 1]]].reshape(-1, 2))
-            if not len(points):
-                continue
             moved, depth = pulled_in(self.point[points, :2], start, inward, need[body])
             step = moved - self.point[points, :2]
             self.point[points, 2] -= (step * normal[points, :2]).sum(axis=1) / normal[points, 2]

@@ -379,3 +379,10 @@ def test_many_boxes_show_progress(monkeypatch, capsys):
     monkeypatch.setattr(sys.modules['box_contact_ros.plans.inspect_plan'], 'MANY', 1)
     assert inspect_plan(plan_of([box(0, 0.5), box(0, 1.5)], [10, 10])).sound
     assert 'loads' in capsys.readouterr().err
+
+
+def test_a_box_that_hangs_and_carries_is_among_those_that_fall():
+    """A plank on a pad and on a cube that hangs: one group, whose cube nothing carries."""
+    found = inspect_plan(plan_of([box(-1, 0.5, PAD), box(1, 0.6, (0.2, 1, 0.8)),
+                                  box(0, 1.05, PLANK)], [1, 1, 12]))
+    assert found.cause.tolist() == ['', '', 'hangs', 'goes with what falls']
