@@ -29,7 +29,7 @@ from box_contact_ros.scene.scene import Box, Pair, Scene
 from box_contact_ros.solver.contact import Contact
 from box_contact_ros.solver.nearest import Nearest
 from box_contact_ros.view.live.listener import DrawnTick, SceneRows, read_sorted
-from box_contact_ros.view.live.markers import LABELLED, MarkersNode, scene_markers
+from box_contact_ros.view.live.markers import LABELLED, PERIOD, MarkersNode, scene_markers
 
 NAMESPACES = ('boxes', 'points', 'normals', 'patches', 'depths', 'near', 'distances')
 SLAB, CUBE = (2.0, 4.0, 1.0), (2.0, 2.0, 2.0)
@@ -271,8 +271,13 @@ def test_boxes_that_come_and_go_are_drawn(tmp_path):
                     shown[marker.id] = marker.pose.position.z
 
     def is_shown(*heights):
+        sent = 0.0
+
         def send():
-            named.publish(joint_state(poses, 'map', client.next_stamp()))
+            nonlocal sent
+            if time.monotonic() - sent > PERIOD:
+                sent = time.monotonic()
+                named.publish(joint_state(poses, 'map', client.next_stamp()))
         return client.spin(lambda: sorted(shown.values()) == sorted(heights) or send())
 
     def change(**fields):
