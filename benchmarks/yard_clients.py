@@ -88,7 +88,6 @@ class Yard:
         if kind == 'body' and body not in self.bodies:
             kind = 'attach'
         self.kinds['detach' if known and known.body and kind in ('fixed', 'moving') else kind] += 1
-        self._first.setdefault(name)
         pose = random_pose(rng)
         if kind == 'fixed':
             self.boxes[name] = Box(CUBE, pose)
@@ -109,6 +108,8 @@ class Yard:
                 self.boxes[name] = Box(CUBE, local, body=body)
                 message.boxes = [a_box(name, local)]
             request.bodies = [message]
+        if name in self.boxes:
+            self._first.setdefault(name)
         used = {box.body for box in self.boxes.values()}
         self.bodies = {name: frame for name, frame in self.bodies.items() if name in used}
         return request

@@ -67,7 +67,7 @@ def check_frame(frame_id: str, scene: Scene) -> None:
             'the scene', scene.frame_id, 'the request', frame_id))
 
 
-def set_pose(pose: Any, numbers: np.ndarray) -> None:
+def set_pose(pose: Any, numbers: Sequence[float] | np.ndarray) -> None:
     """Write a pose `x y z qx qy qz qw` into a geometry_msgs/Pose."""
     p, q = pose.position, pose.orientation
     p.x, p.y, p.z, q.x, q.y, q.z, q.w = map(float, numbers)

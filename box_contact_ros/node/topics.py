@@ -162,7 +162,8 @@ class SceneTopics:
         """Return who publishes on the topic of a box that gives no pose."""
         subscription = self._subscriptions[box]
         topic, message = subscription.topic_name, subscription.msg_type
-        wanted = f'{message.__module__.partition(".")[0]}/msg/{message.__name__}'
+        name = message.__name__  # type: ignore[attr-defined]
+        wanted = f'{message.__module__.partition(".")[0]}/msg/{name}'
         offers = self._node.get_publishers_info_by_topic(topic)
         if not offers:
             elsewhere = self._elsewhere(topic)
@@ -175,14 +176,13 @@ class SceneTopics:
             fits, reason = qos_check_compatible(offer.qos_profile, subscription.qos_profile)
             if fits == QoSCompatibility.ERROR:
                 return f'{topic} is published with another quality of service: {reason}'
-        return f'{topic} has {len(offers)} of {message.__name__}, silent so far'
+        return f'{topic} has {len(offers)} of {name}, silent so far'
 
     def _elsewhere(self, topic: str) -> str:
-        """Return a published topic in another namespace that ends as a topic does, or ''."""
-        parts = topic.strip('/').split('/')
+        """Return a published topic with more or fewer namespaces before it, or ''."""
         for name, _ in sorted(self._node.get_topic_names_and_types()):
-            if (name != topic and name.strip('/').split('/')[-2:] == parts[-2:]
-                    and self._node.count_publishers(name)):
+            if name != topic and (name.endswith(topic) or topic.endswith(name)) and (
+                    self._node.count_publishers(name)):
                 return str(name)
         return ''
 

@@ -29,8 +29,8 @@ CONTAINER, FRAME = (12.192, 2.438, 2.591), 'spreader_frame'
 SIZES = {'ground': (60, 60, 1), 'lorry': (12.5, 2.5, 1.5), 'c1': CONTAINER, 'c2': CONTAINER,
          FRAME: (12.192, 2.438, 0.4)}  # as in the scene file
 MASSES = {'c1': 20_000.0, 'c2': 12_000.0, FRAME: 8_000.0}  # [kg]
-TOP, STIFFNESS, DAMPING, GRAVITY = 40.0, 1e6, 2e5, 9.81  # of the rope [m], [N/m], [N s/m]
-STEP, STEPS = 0.002, 10  # of physics [s]; how many from question to question
+TOP, STIFFNESS, DAMPING, GRAVITY = 20.0, 1e6, 2e5, 9.81  # of the rope [m], [N/m], [N s/m]
+STEP, STEPS = 0.002, 20  # of physics [s]; how many from question to question
 WIDE = 1e12  # inertia of a load that guides keep from turning [kg m²]
 FIXED = Body(mass=0.0, inertia=np.zeros(3))
 
@@ -46,11 +46,11 @@ class Crane(Node):
         self.create_subscription(Contacts, 'contacts', self.receive, 10, raw=True)
         self.answer: ReadContacts | None = None
         self.time = self.get_clock().now().nanoseconds
-        self.trolley, self.rope, self.sway = 0.0, 30.0, 0.0
+        self.trolley, self.rope, self.sway = 0.0, 10.0, 0.0
         self.poses = np.array([[0, 0, 0, 0, 0, 0, 1], [0, 0, 10, 0, 0, 0, 1.0]])
         self.velocities = np.zeros((2, 6))
         self.places = {'ground': (0, 0, -0.5), 'lorry': (0, 6, 0.75), 'c1': (0, 0, 1.2955),
-                       'c2': (0, -4, 1.2955), FRAME: (0, 0, 0)}  # of parts, in the body's frame
+                       'c2': (0, -3, 1.2955), FRAME: (0, 0, 0)}  # of parts, in the body's frame
         self.parts = [FRAME]
         self.forces = PatchForces([FIXED, FIXED])
         self.change.wait_for_service()
@@ -74,7 +74,8 @@ class Crane(Node):
             raise SystemExit(future.result().message)
         self.mass = sum(MASSES[part] for part in self.parts)
         self.forces.set_bodies([FIXED, Body(mass=self.mass, inertia=[WIDE] * 3)])
-        self.forces.set_boxes(list(SIZES.values()), body=[name in self.parts for name in SIZES],
+        body = [int(name in self.parts) for name in SIZES]
+        self.forces.set_boxes(list(SIZES.values()), body=body,
                               poses=[(*self.places[name], 0, 0, 0, 1) for name in SIZES])
 
     def ask(self) -> ReadContacts:
@@ -91,12 +92,13 @@ class Crane(Node):
 
     def move(self, trolley: float, height: float, seconds: float, *, lands: bool = False) -> None:
         """Move trolley and rope to a place, or until the load stands."""
-        begin, rope, boxes = self.trolley, self.rope, list(SIZES)
+        begin, rope, boxes, stood = self.trolley, self.rope, list(SIZES), 0
         end = TOP - height - self.mass * GRAVITY / STIFFNESS
         for step in range(round(seconds / STEP)):
             share = 0.5 - 0.5 * np.cos(np.pi * step * STEP / seconds)
-            self.trolley = begin + share * (trolley - begin)
-            self.rope = rope + share * (end - rope)
+            if not stood:
+                self.trolley = begin + share * (trolley - begin)
+                self.rope = rope + share * (end - rope)
             if step % STEPS == 0:
                 self.time += round(STEPS * STEP * 1e9)
                 answer = self.ask()
@@ -112,19 +114,20 @@ class Crane(Node):
             self.poses, self.velocities, *_ = self.forces.advance(
                 STEP, self.poses, self.velocities, outside)
             self.sway = max(self.sway, abs(self.poses[1, 1] - self.trolley))
-            if lands and self.forces.loads().pressing.sum() > 0.5 * GRAVITY * self.mass:
+            stood += lands and self.forces.loads().pressing.sum() > 0.5 * GRAVITY * self.mass
+            if stood * STEP > 0.5:
                 return
 
     def carry(self, name: str, y: float, height: float) -> None:
         """Lift a container, and set it down at y, on what is `height` high."""
         place = np.array(self.places[name])
-        self.move(place[1], 9.0, 4.0)
-        self.move(place[1], place[2], 6.0, lands=True)
+        self.move(place[1], 8.0, 6.0 + 2.0 * abs(place[1] - self.trolley))
+        self.move(place[1], place[2], 8.0, lands=True)
         self.parts, self.places[name] = [FRAME, name], place - self.poses[1, :3]
         self.set_boxes(bodies=[BodyMessage(name='spreader', boxes=[self.box(name)])])
-        self.move(place[1], 10.0, 4.0)
+        self.move(place[1], 10.0, 5.0)
         self.sway = 0.0
-        self.move(y, 10.0, 6.0)
+        self.move(y, 10.0, 6.0 + 2.0 * abs(y - self.trolley))
         self.move(y, height, 8.0, lands=True)
         self.places[name] += self.poses[1, :3]
         self.parts = [FRAME]

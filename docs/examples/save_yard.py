@@ -4,9 +4,9 @@
 """Save the yard of a contact node as a scene file: `python docs/examples/save_yard.py OLD NEW`.
 
 OLD is the scene file of the node, which has its pairs. Started with the file NEW, a node has the
-boxes and bodies of the yard as it is now.
+boxes and bodies of the yard as it is now. Here they are those of lift.py.
 
-It prints, of the yard of lift.py:
+It prints:
 
     4 boxes in /tmp/yard.yaml
 """
