@@ -30,9 +30,9 @@ endif
 
 PY := .venv/bin/python
 CMAKE := .venv/bin/cmake
-# One worker more than cores: tests of nodes mostly wait. conftest.py says which files come first.
+# One worker more than cores: tests of nodes mostly wait. A file's tests share what it has set up.
 WORKERS := $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
-PYTEST := $(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder -rs --durations 10
+PYTEST := $(PY) -m pytest -n $(WORKERS) --dist loadfile -rs --durations 10
 LINT := echo ruff; $(PY) -m ruff check .; echo mypy; $(PY) -m mypy
 
 help:

@@ -49,8 +49,8 @@ def on_faces(patches: FacePatches) -> Bearings:
 
 
 def on_corners(sizes: np.ndarray, poses: np.ndarray, carried_by: np.ndarray, normal: np.ndarray,
-               patches: FacePatches, slack: float, fixed: np.ndarray) -> Bearings:
-    """Return the corners of the upper boxes that are within patches, up to `slack` [m].
+               patches: FacePatches, slack: np.ndarray, fixed: np.ndarray) -> Bearings:
+    """Return the corners of the upper boxes that are within patches, up to `slack` (k,) [m].
 
     Only where the lower box has a casting, but that `fixed` ones (n,) bear everywhere. Where there
     are none, they are those of the lower box, and else those of the rectangle.
@@ -98,7 +98,7 @@ def _on_castings(points: np.ndarray, sizes: np.ndarray, poses: np.ndarray, norma
     return ends.all(axis=2)
 
 
-def _inside(points: np.ndarray, patches: FacePatches, normal: np.ndarray, slack: float,
+def _inside(points: np.ndarray, patches: FacePatches, normal: np.ndarray, slack: np.ndarray,
             ) -> np.ndarray:
     """Return which points (k, p, 3) are within polygons, along their normals (k, p)."""
     corner = patches.polygon[:, None]
@@ -106,4 +106,4 @@ def _inside(points: np.ndarray, patches: FacePatches, normal: np.ndarray, slack:
     inward = np.cross(normal[:, None, None], edge)
     length = np.linalg.norm(inward, axis=3)
     depth = ((points[:, :, None] - corner) * inward).sum(axis=3)
-    return (depth >= -slack * length).all(axis=2)
+    return (depth >= -slack[:, None, None] * length).all(axis=2)

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..solver.contact_solver import ContactSolver
+from ..solver.faces import TOLERANCE
 from .inspection import Inspection
 from .plan import Fault, Plan
 
@@ -48,12 +49,13 @@ def crowd(names: Sequence[str], count: int) -> Fault:
                  verdict='not sound' if names else 'not all judged')
 
 
-def crowded(plan: Plan, pairs: np.ndarray, tolerance: float, acceleration: Sequence[float],
+def crowded(plan: Plan, pairs: np.ndarray, tolerance: float | None, acceleration: Sequence[float],
             ) -> Inspection:
     """Return what is known of a plan with too many pairs, of which `pairs` are some.
 
     Loads and margins are not known, and no box is said to stand.
     """
+    tolerance = TOLERANCE if tolerance is None else tolerance
     apart, count = {*map(tuple, np.sort(plan.apart, axis=1).tolist())}, len(plan)
     fixed = np.isin(plan.body, plan.body[plan.ground])
     overlaps, depths = deepest_of(plan.sizes, plan.poses, pairs, lambda a, b: (
@@ -70,7 +72,8 @@ def crowded(plan: Plan, pairs: np.ndarray, tolerance: float, acceleration: Seque
     none, nothing = np.full(count, np.nan), np.zeros(0)
     return Inspection(
         plan=plan, tolerance=tolerance, acceleration=np.asarray(acceleration, float),
-        overlaps=overlaps, depths=depths, stands=fixed, cause=np.full(count, ''), share=none,
+        overlaps=overlaps, depths=depths, stands=fixed, cause=np.full(count, ''),
+        goes_with=np.full(count, -1), height=none, share=none,
         margin=none, loaded_margin=none, load=none, pressure=none,
         carried_by=np.zeros((0, 2), int), loads=nothing, corners=np.zeros((0, 4, 3)),
         corner_loads=np.zeros((0, 4)), mass=np.nan, centre_of_mass=np.full(3, np.nan))

@@ -41,13 +41,12 @@ COLUMNS = ('file', 'kind', 'boxes', 'text')
 def judged(path: str, options: argparse.Namespace) -> Inspection:
     """Return what is wrong with the plan of a file. Raises OSError and ValueError."""
     plan, bears = read_any(path)
-    limits = plan.limits.copy()
+    limits = np.full(len(plan), np.inf) if options.geometry else plan.limits.copy()
     if options.limit is not None:
         free = np.setdiff1d(np.arange(len(plan)), plan.ground)
         limits[free] = np.minimum(limits[free], options.limit)
-    ground = np.arange(len(plan)) if len(plan) == 1 else plan.ground  # it can touch nothing
     plan = dataclasses.replace(
-        plan, masses=None if options.geometry else plan.masses, ground=ground, limits=limits,
+        plan, masses=None if options.geometry else plan.masses, limits=limits,
         faults=tuple(fault for fault in plan.faults
                      if not (options.geometry and fault.kind == 'mass')))
     try:
@@ -56,7 +55,8 @@ def judged(path: str, options: argparse.Namespace) -> Inspection:
     except TooManyNear as error:
         return crowded(plan, error.pairs, options.tolerance, options.acceleration)
     except ValueError as error:
-        raise ValueError(f'{path}: {error}') from None
+        option = '--' if str(error).startswith('tolerance') else ''
+        raise ValueError(f'{path}: {option}{error}') from None
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -69,9 +69,10 @@ def _parser() -> argparse.ArgumentParser:
                         'by cause (needs Matplotlib)')
     parser.add_argument('--limit', type=within(0.0), metavar='KG', help='the most that may rest on '
                         'any box')
-    parser.add_argument('--tolerance', type=within(0.0), default=1e-4, metavar='M', help='the gap '
-                        'up to which faces touch, and the depth up to which boxes do not overlap '
-                        '(default: 1e-4)')
+    parser.add_argument('--tolerance', type=within(0.0), metavar='M', help='the gap up to which '
+                        'faces touch, and the depth up to which boxes do not overlap (default: '
+                        '1e-4, or a quarter of the thinner box)')
+    parser.add_argument('--all', action='store_true', help='print all lines, not 40')
     parser.add_argument('--bears', choices=('faces', 'corners'), help='where boxes stand on each '
                         'other (default: corners for containers, faces for others)')
     parser.add_argument('--acceleration', type=float, nargs=3, default=(0.0, 0.0, -9.81),
@@ -119,7 +120,7 @@ def main(args: Sequence[str] | None = None) -> int:
         elif len(options.files) > 1:
             print(f'{printable(path)}: {found.summary()}', flush=True)
         else:
-            print(found)
+            print(found.text(None) if options.all else found)
             if path.isprintable():
                 shown = path if not path.startswith('-') else f'./{path}'
                 print(f'To see it in 3D: box_contact_view {shlex.quote(shown)}')

@@ -31,13 +31,15 @@ FAULT_KINDS = {
     'cut': ('not all judged', 'part'), 'slot': ('not all judged', 'place'),
     'size type': ('not all judged', 'place'), 'dimension': ('not all judged', 'place'),
     'pose': ('not all judged', 'place'), 'mass': ('not all judged', 'weight'),
-    'shape': ('not all judged', 'shape'), 'column': ('sound', '')}
+    'shape': ('not all judged', 'shape'), 'support': ('not all judged', 'support'),
+    'column': ('sound', '')}
 """What may be wrong with a row of a file: the best verdict with it, and what it lacks."""
 LACKS = {
     '': ('', ''), 'place': ('1 box was not placed', '{:,} boxes were not placed'),
     'weight': ('1 has no weight', '{:,} have no weight'),
     'sure weight': ('1 has a doubtful weight', '{:,} have a doubtful weight'),
     'limit': ('1 has no known limit', '{:,} have no known limit'),
+    'support': ('support not judged: nothing is fixed',) * 2,
     'judgement': ('1 was not judged', '{:,} were not judged'),
     'shape': ('1 shape is not known', '{:,} shapes are not known'),
     'part': ('1 part of the file was not read', '{:,} parts of the file were not read')}

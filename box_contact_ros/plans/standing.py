@@ -23,17 +23,36 @@ def base_areas(sizes: np.ndarray, poses: np.ndarray, up: np.ndarray) -> np.ndarr
     return sizes.prod(axis=1) / sizes[rows, face] * turned[rows, face]
 
 
-def deepest(sizes: np.ndarray, pairs: np.ndarray, separation: np.ndarray, upper: np.ndarray,
-            count: int) -> np.ndarray:
-    """Return the depth (n,) of the deepest contact that carries each of so many [m].
+def needs(sizes: np.ndarray, pairs: np.ndarray, separation: np.ndarray, tolerance: np.ndarray,
+          upper: np.ndarray, count: int) -> np.ndarray:
+    """Return how far inside its hull each of so many centres must be (n,): tolerance and depth [m].
 
     upper: what each pair (k, 2) carries. Boxes that merely touch count as pressed together by the
-    solver's share of the larger one.
+    solver's share of the larger one; those that overlap, by the tolerance (k,).
     """
-    depth = np.zeros(count)
+    need = np.zeros(count)
     longest = sizes.max(axis=1)[pairs].max(axis=1)
-    np.maximum.at(depth, upper, np.maximum(-separation, DEPTH_FLOOR * longest))
-    return depth
+    np.maximum.at(need, upper, tolerance + np.maximum(
+        np.minimum(-separation, tolerance), DEPTH_FLOOR * longest))
+    return need
+
+
+def heights(sizes: np.ndarray, poses: np.ndarray, frame: np.ndarray, body: np.ndarray,
+            hangs: np.ndarray) -> np.ndarray:
+    """Return how high the boxes (n,) of bodies that hang are above what is below [m].
+
+    frame: (3, 3) rows: two directions across gravity, and the one against it. hangs: by body.
+    By bounding boxes along the frame. Infinity: above nothing; NaN: the box does not hang.
+    """
+    half = np.abs(frame @ rotation_matrix(poses[:, 3:])) @ sizes[:, :, None] / 2.0
+    middle, half = poses[:, :3] @ frame.T, half[:, :, 0]
+    low, high = middle - half, middle + half
+    height = np.full(len(sizes), np.nan)
+    for box in np.flatnonzero(hangs[body]):
+        below = (body != body[box]) & (high[:, 2] <= low[box, 2]) & (
+            (low < high[box]) & (low[box] < high))[:, :2].all(axis=1)
+        height[box] = low[box, 2] - high[below, 2].max(initial=-np.inf)
+    return height
 
 
 def hull_margins(points: np.ndarray, upper: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -20,7 +20,7 @@ from ..core import native
 from .checks import as_boxes, as_margin, as_places, pose_fault, short_repr
 from .contact import Contacts
 from .contact_solver import ContactSolver
-from .faces import as_tolerance
+from .faces import as_tolerances
 from .nearest import Nearests
 
 
@@ -45,7 +45,8 @@ class TooManyNear(ValueError):
 
 
 def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = None, *,
-                fixed: ArrayLike | None = None, margin: float = 0.0, tolerance: float = 0.0,
+                fixed: ArrayLike | None = None, margin: float = 0.0,
+                tolerance: float | np.ndarray = 0.0,
                 threads: int = 1, most_near: int = sys.maxsize,
                 ) -> tuple[np.ndarray, Contacts]:
     """Return which boxes touch, as rows (k, 2) of their indices a and b, and the k contacts.
@@ -55,7 +56,8 @@ def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = No
     pairs: (m, 2), the pairs that are asked for, in their order; None: each two boxes, a < b.
     fixed: (n,) bool, boxes that never move. Without `pairs`, two of them are no pair.
     margin: pairs apart are listed too, behind those in contact, up to this separation [m].
-    tolerance: the gap up to which boxes touch [m]. Above 0, contacts are those of boxes that are
+    tolerance: the gap up to which boxes touch [m]; an array (n,) has that of each box, and a pair
+    the smaller one. Above 0, contacts are those of boxes that are
     larger by it, with the separation and the volume of the boxes as they are.
     most_near: raise TooManyNear, a ValueError, for more pairs whose bounding boxes are this near.
 
@@ -68,8 +70,8 @@ def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = No
     listed = as_places([] if pairs is None else pairs, 'pairs', count)
     if (alone := np.flatnonzero(listed[:, 0] == listed[:, 1])).size:
         raise ValueError(f'pairs[{alone[0]}] is box {listed[alone[0], 0]} with itself')
-    tolerance = as_tolerance(tolerance, sizes)
-    grown = sizes + tolerance
+    tolerances = as_tolerances(tolerance, sizes)
+    grown = sizes + tolerances[:, None]
     groups_meet = np.ones((1, 1) if pairs is None and count else (0, 0), np.uint8)
     broad_phase = native.BroadPhase(grown, _as_flags(fixed, 'fixed', count), margin, listed,
                                     np.zeros(count, np.int32), groups_meet,
@@ -78,11 +80,11 @@ def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = No
     near, contacts, _ = find_contacts(broad_phase, solver, grown, poses, 'poses[{}]'.format,
                                       most_near=most_near, threads=threads)
     near, contacts = in_contact(near, contacts, margin)
-    if not tolerance:
+    if not tolerances.any():
         return near, contacts
     # Turned boxes grow by more along some axes.
     as_they_are = solver.batch(poses, sizes=sizes, pairs=near, threads=threads)
-    touches = as_they_are.separation <= tolerance
+    touches = as_they_are.separation <= tolerances[near].min(axis=1)
     return in_contact(near, replace(
         as_they_are, colliding=touches, axis=np.where(touches, contacts.axis, as_they_are.axis),
         normal=np.where(touches[:, None], contacts.normal, as_they_are.normal),

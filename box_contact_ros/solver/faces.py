@@ -33,6 +33,16 @@ def as_tolerance(value: Any, sizes: np.ndarray) -> float:
     return tolerance
 
 
+def as_tolerances(value: Any, sizes: np.ndarray) -> np.ndarray:
+    """Return the tolerances of boxes (n,), of a number or an array; ValueError for others."""
+    if not isinstance(value, np.ndarray) or not value.ndim:
+        return np.full(len(sizes), as_tolerance(value, sizes))
+    array = as_floats(value, 'tolerance', f'a number, or numbers ({len(sizes)},)', (len(sizes),))
+    for row in range(len(array)):
+        as_tolerance(float(array[row]), sizes[row])
+    return array
+
+
 @dataclass(frozen=True, eq=False)
 class FacePatches:
     """The patches of k pairs of boxes, in the common frame, midway between both faces."""

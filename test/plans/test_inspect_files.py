@@ -40,7 +40,7 @@ def judge(tmp_path, capsys):
      'unsupported           b  share 0.40, centre 100 mm outside'),
     (sheet('a,1,1,1,0,0,0.5', 'b,1,1,1,0,0,1.4'), 1, 'overlap               a  b  100.0 mm deep'),
     (sheet('a,1,1,1,0,0,0.5', 'b,1,1,1,0,0,2.5'), 1,
-     'hangs                 b  share 0.00, centre on nothing'),
+     'hangs                 b  1000.0 mm above what is below'),
     (sheet('a,1,1,1,0,0,0.4'), 1, 'overlap               a  ground  100.0 mm deep'),
     (sheet(f'{PAIR[0]},150', f'{PAIR[1]},', more=',mass,limit'), 1,
      'overloaded            a  200 kg on top'),
@@ -87,7 +87,7 @@ SMALL = collision('<geometry><box><size>1 1 1</size></box></geometry><surface><c
 
 
 @pytest.mark.parametrize(('text', 'status', 'verdict'), [
-    (world(A), 0, 'sound'), (f'<sdf>{A}</sdf>', 0, 'nothing can touch: sound'),
+    (world(A), 0, 'sound'),
     (f'<sdf><world name="w">{A.replace("<link", "<static>true</static><link")}</world></sdf>', 0,
      'nothing can touch: sound'),
     (world(A, model('b', collision(), 1.4)), 1, 'not sound'),
@@ -148,13 +148,59 @@ def test_options(judge):
     text = sheet(*PAIR, more=',mass')
     assert judge('p.csv', text, '--limit', '199')[0] == 1
     assert judge('p.csv', text, '--limit', '201')[0] == 0
-    assert judge('p.csv', text, '--limit', '199', '--geometry')[0] == 0
+    assert judge('p.csv', text, '--limit', '199', '--geometry')[0] == 3
+    assert judge('p.csv', text, '--geometry')[0] == 0
     assert judge('p.csv', text, '--acceleration', '9.9', '0', '-9.81')[0] == 1
     gap = sheet('a,1,1,1,0,0,0.501')
     assert judge('p.csv', gap)[0] == 1 and judge('p.csv', gap, '--tolerance', '0.002')[0] == 0
     status, lines = judge('p.csv', gap, '--tolerance', '0.9')
-    assert status == 2 and 'tolerance' in lines[0]
+    assert status == 2 and '--tolerance must be from 0 to 0.5 m, half of' in lines[0]
+    assert "box 'a', not 0.9" in lines[0]
     assert judge('p.csv', gap, '--acceleration', '0', '0', '0')[0] == 2
+
+
+def fixed(name, x=0.0):
+    """Return a model that does not move, with a cube on the ground."""
+    return model(name, '<static>1</static>' + collision()).replace('0 0 0.5', f'{x} 0 0.5')
+
+
+LINK = collision() + collision(more='<pose>1 0 0 0 0 0</pose>').replace('"c"', '"d"')
+
+
+@pytest.mark.parametrize(('name', 'text', 'status', 'words'), [
+    ('a.sdf', f'<sdf>{model("a", collision())}</sdf>', 3, 'support not judged: nothing is fixed'),
+    ('a.sdf', f'<sdf>{model("a", collision())}{model("b", collision(), 1.4)}</sdf>', 1, '100.0 mm'),
+    ('a.sdf', f'<sdf>{model("a", collision())}{model("b", collision(), 5)}</sdf>', 3,
+     'support not judged: nothing is fixed'),
+    ('a.sdf', f'<sdf><world name="w">{fixed("a")}{fixed("b", 0.3)}</world></sdf>', 0,
+     '700.0 mm deep, and both are fixed'),
+    ('a.csv', sheet(f'{PAIR[0][:-4]},,150', f'{PAIR[1][:-4]},,', more=',mass,limit'), 3,
+     'has no mass, so limits are not judged'),
+    # An interleave sheet, and a tolerance that nobody gave.
+    ('a.csv', sheet('carton_1,0.4,0.3,0.25,0,0,0.125,6', 'paper,0.8,0.6,0.00015,0,0,0.250075,0.02',
+                    'carton_2,0.4,0.3,0.25,0,0,0.37515,6', more=',mass'), 0, 'sound')])
+def test_what_is_not_judged_is_not_sound(judge, name, text, status, words):
+    """And what is judged and told is."""
+    found, lines = judge(name, text)
+    assert found == status and words in '\n'.join(lines), lines
+
+
+def test_a_limit_without_weights_is_not_judged(judge):
+    text = sheet('a,1,1,1,0,0,0.5', 'b,1,1,1,0,0,1.5')
+    assert judge('p.csv', text)[0] == 0
+    status, lines = judge('p.csv', text, '--limit', '10')
+    assert status == 3 and lines[-2].endswith('what was read is sound, but 2 have no weight')
+
+
+def test_forty_lines_and_what_goes_with_them(judge):
+    text = sheet('a,1,1,1,0,0,2', *(f'b{n},1,1,1,0,0,{n + 3}' for n in range(60)),
+                 'c,1,1,1,5,0,2')
+    status, lines = judge('p.csv', text)
+    assert status == 1 and len(lines) == 43 and lines[-3] == 'and 22 that go with these'
+    assert lines[0].startswith('hangs                 a  1500.0 mm')
+    assert lines[1].startswith('goes with what falls  b0  with a; ')
+    assert [line for line in lines if line.startswith('hangs                 c  ')]
+    assert len(judge('p.csv', text, '--all')[1]) == 64
 
 
 def test_several_files_have_a_line_each(tmp_path, capsys):

@@ -25,10 +25,13 @@ MEMORY, SECONDS = 300 * 2**20, 2.0
 def judged(path: Path, *options: str) -> tuple[int, str, float, int]:
     """Return exit status, what is printed, processor time [s] and memory [bytes] of the program."""
     started = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = subprocess.run(['/usr/bin/env', sys.executable, '-c', (
+    # VmHWM is the program's own; ru_maxrss also counts the process that started it.
+    done = subprocess.run([sys.executable, '-c', (
         'import resource, sys\nfrom box_contact_ros.plans.inspect_files import main\n'
-        'status = main(sys.argv[1:])\nprint(max(resource.getrusage(who).ru_maxrss for who in '
-        '(resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)), file=sys.stderr)\nsys.exit(status)'),
+        'status = main(sys.argv[1:])\nown = next(int(line.split()[1]) for line in '
+        'open("/proc/self/status") if line.startswith("VmHWM"))\n'
+        'print(max(own, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss), '
+        'file=sys.stderr)\nsys.exit(status)'),
         str(path), *options], capture_output=True, text=True, timeout=100)
     ended = resource.getrusage(resource.RUSAGE_CHILDREN)
     *errors, peak = done.stderr.splitlines()

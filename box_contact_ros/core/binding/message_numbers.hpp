@@ -15,7 +15,8 @@ namespace box_contact::binding {
 // The area of the patch of two faces [m²]; 0 where edges meet. `normal`: of the separating axis; null: it is
 // not known.
 inline double face_area(const Rows& rows, npy_intp row, const double* normal) {
-  npy_intp a = rows.pairs ? rows.pairs[2 * row] : row, b = rows.pairs ? rows.pairs[2 * row + 1] : row;
+  npy_intp a = row, b = row;
+  if (rows.pairs) a = rows.pairs[2 * row], b = rows.pairs[2 * row + 1];
   detail::PairNumbers pair{rows.poses_a + 7 * a, rows.poses_b + 7 * b,
                            rows.sizes_a + rows.size_step_a * a,
                            rows.sizes_b + rows.size_step_b * b};

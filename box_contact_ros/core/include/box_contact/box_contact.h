@@ -200,8 +200,8 @@ typedef struct bc_polygon {
  * intersected; what is left is cut where the gap of their planes exceeds `tolerance` [m]. Neither a depth nor
  * a tilt of microns changes it, while the overlap is a wedge. Where edges meet, at more than 0.1 rad from both
  * faces, there is none. On failure *patch is as it was. */
-BC_API bc_status bc_face_patch(const bc_box* a, const bc_box* b, const double* normal, double tolerance,
-                               bc_polygon* patch);
+BC_API bc_status bc_face_patch(const bc_box* a, const bc_box* b, const double* normal,
+                               double tolerance, bc_polygon* patch);
 
 #ifdef __cplusplus
 }
