@@ -30,7 +30,11 @@ import rclpy
 import yaml
 from geometry_msgs.msg import Quaternion, Transform, Vector3
 from rclpy.context import Context
-from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.executors import (
+    ExternalShutdownException,
+    MultiThreadedExecutor,
+    SingleThreadedExecutor,
+)
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import MultiDOFJointState
@@ -262,8 +266,9 @@ def serve(executor: str, scene: str) -> int:
     node.start()
     spinner = EXECUTORS[executor]()
     spinner.add_node(node)
-    while rclpy.ok():
-        spinner.spin_once(timeout_sec=0.5)
+    with contextlib.suppress(ExternalShutdownException):
+        while rclpy.ok():
+            spinner.spin_once(timeout_sec=0.5)
     return 0
 
 
