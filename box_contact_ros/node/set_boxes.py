@@ -21,6 +21,7 @@ MOST_REQUESTED = 1000
 """Boxes and names of a request. rclpy reads one of 1,000 boxes in 16 ms, which cannot be sliced."""
 STEP = 100  # boxes that are read in one step, in about 2 ms
 
+
 def changing(solver: SceneSolver, request: SetBoxes.Request,
              ) -> Generator[None, None, tuple[SceneSolver, list[str]]]:
     """Return, in steps, the solver of the scene that a request makes, and warnings.

@@ -115,7 +115,7 @@ class SceneSolver:
 
     @property
     def scene(self) -> Scene:
-        """The scene as it is now."""
+        """Return the scene as it is now."""
         return self._at.scene
 
     @property
