@@ -16,6 +16,8 @@ from benchmarks.pose_sets import CUBE
 from box_contact_ros import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix
 
+pytestmark = pytest.mark.reports
+
 COUNT = 4000
 SMALL = (300, 200, 400)
 

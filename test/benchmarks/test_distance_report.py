@@ -14,6 +14,8 @@ import pytest
 from benchmarks import apart, distance, native_calls
 from box_contact_ros.core import instruction_sets
 
+pytestmark = pytest.mark.reports
+
 
 @pytest.mark.parametrize('family', ['random', 'yaw, stacked, moved', 'tilts 1e-17 to 1e-12'])
 def test_the_judge_finds_what_is_wrong(family: str) -> None:

@@ -21,6 +21,8 @@ from benchmarks.pose_sets import CONTAINER, SETS, Pairs, apart
 from benchmarks.timing import take_turns
 from box_contact_ros.solver.pose import rotation_matrix
 
+pytestmark = pytest.mark.reports
+
 ROOT = Path(__file__).resolve().parents[2]
 ALL = [ours('exact'), *installed()[0]]
 COARSE = {'Drake hydroelastic': 0.03}

@@ -20,6 +20,8 @@ from benchmarks.native_calls import Effort, Program
 from benchmarks.pose_sets import FLUSH, LOADS, SETS, Pairs
 from box_contact_ros.core import instruction_sets
 
+pytestmark = pytest.mark.reports
+
 needs_compiler = pytest.mark.skipif(shutil.which('g++') is None, reason='no compiler')
 
 

@@ -25,6 +25,8 @@ from box_contact_ros.models import soup
 from box_contact_ros.models.weights_file import load_weights
 from box_contact_ros.solver.contact_solver import ContactSolver
 
+pytestmark = pytest.mark.reports
+
 KEPT = {'table-1-as-written': 1.0, 'table-1-mixture': (0.32, 0.32, 0.7), 'table-1-dropped': 0.0}
 """Share of the placements as written, of all sets of patterns or of each."""
 

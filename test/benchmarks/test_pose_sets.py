@@ -12,6 +12,8 @@ from benchmarks.errors import degrees_between
 from benchmarks.pose_sets import CUBE, SETS, Pairs
 from box_contact_ros.solver.pose import rotation_matrix
 
+pytestmark = pytest.mark.reports
+
 N = 200
 DEPTHS = {'random cubes': (2e-3, 0.2), 'touching': (0.0, 0.0), 'stacks': (1e-3, 1e-3),
           'tilted stacks': (1e-3, 1e-3), 'containers': (2.438e-3, 0.2438)}

@@ -18,6 +18,8 @@ from patience import PATIENCE
 
 from benchmarks import output
 
+pytestmark = pytest.mark.reports
+
 ROOT = Path(__file__).resolve().parents[2]
 STAND_IN = """#!/bin/sh
 echo "$@" >>called

@@ -11,6 +11,8 @@ import pytest
 
 from benchmarks import service
 
+pytestmark = pytest.mark.reports
+
 
 @pytest.mark.reports
 def test_ticks_come_first_beside_a_planner(capfd: pytest.CaptureFixture[str],

@@ -13,6 +13,8 @@ from benchmarks import speed
 from benchmarks.contestant import CORE_MODELS
 from benchmarks.output import processor, versions
 
+pytestmark = pytest.mark.reports
+
 
 def test_the_gain_of_threads_is_the_ratio_of_medians() -> None:
     gains = speed.threads_table({'exact': ([9.0, 10.0, 90.0], [5.0, 5.0, 5.0])})

@@ -16,6 +16,8 @@ from benchmarks.contestant import CORE_MODELS, ours
 from benchmarks.pose_sets import Pairs
 from box_contact_ros.solver.contact import Contacts
 
+pytestmark = pytest.mark.reports
+
 ROOT = Path(__file__).resolve().parents[2]
 CASES = hard_poses.load()
 

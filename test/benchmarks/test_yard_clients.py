@@ -18,6 +18,8 @@ from box_contact_ros.scene.scene import NOWHERE, Box, Scene
 from box_contact_ros.stream.pairing import StampedPose
 from box_contact_ros.stream.write_contacts import TickWriter
 
+pytestmark = pytest.mark.reports
+
 
 def test_two_clients_of_a_yard(capfd: pytest.CaptureFixture[str],
                                monkeypatch: pytest.MonkeyPatch) -> None:
