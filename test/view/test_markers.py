@@ -13,6 +13,8 @@ import numpy as np
 import poses
 import pytest
 import yaml
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from patience import PATIENCE
 from rclpy.qos import QoSProfile
 from ros_client import CUBES, Client, serving
@@ -284,7 +286,7 @@ def test_boxes_that_come_and_go_are_drawn(tmp_path):
         assert client.call(SetBoxes, 'contact_node/set_boxes', SetBoxes.Request(**fields)).success
 
     with closing(Client()) as client, serving(ContactNode, scene=str(path),
-                                              pair_topics=False) as node:
+                                              pair_topics=False):
         named = client.node.create_publisher(MultiDOFJointState, 'poses', 10)
         client.node.create_subscription(MarkerArray, 'markers', hear, 10)
         for number in range(1, CHANGES + 1):
@@ -301,7 +303,8 @@ def test_boxes_that_come_and_go_are_drawn(tmp_path):
             assert is_shown(-0.5, 9.0)
             change(fixed=[a_box(f'p{k}', (0, 0, 20 + k, 0, 0, 0, 1), CUBE) for k in range(600)])
             assert is_shown(-0.5, 9.0, *range(20, 620))
-            node.trigger_deactivate()
-            node.trigger_cleanup()
-            node.start()
+            for step in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP,
+                         Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+                request = ChangeState.Request(transition=Transition(id=step))
+                assert client.call(ChangeState, 'contact_node/change_state', request).success
             assert is_shown(-0.5, 9.0)

@@ -32,7 +32,7 @@ from .. import style
 from .listener import SCENE_PARAMETERS, DrawnTick, Listener
 
 PERIOD = 1 / 30  # time [s] between marker arrays
-DELETED = 1.0
+DELETED = 5.0
 """Time [s] for which arrays delete what is gone: a viewer that is behind loses some of them."""
 LABELLED = 10
 """Contacts whose depth is written beside them, the deepest; and pairs near, the nearest."""
