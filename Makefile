@@ -40,7 +40,7 @@ help:
 	echo 'make view     the same in the browser, again and again'
 	echo 'make test     ruff, mypy, and all tests of what the package answers'
 	echo 'make test-builds  another compiler, sanitizers, wheels and other installations'
-	echo 'make test-reports  the reports, each in a quick run, and the pages of docs'
+	echo 'make test-reports  the reports and the demo, each in a quick run, examples and pages'
 	echo 'make test-training  the tests of training, for which it fetches PyTorch'
 	echo 'make check    linters, and the quick tests of core, solver and scene: a minute'
 	echo 'make test-colcon  tests of what an installation changes, by `colcon test` in a workspace'

@@ -145,6 +145,8 @@ print('left at 0:', unset(deserialize_message(client.data, Contacts).contacts))
 LOAD = """
 import sys, rclpy
 from composition_interfaces.srv import LoadNode
+
+pytestmark = pytest.mark.reports
 rclpy.init()
 node = rclpy.create_node('loader')
 load = node.create_client(LoadNode, 'ComponentManager/_container/load_node')

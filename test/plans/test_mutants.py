@@ -38,7 +38,7 @@ from test_read_plan import (
     world,
 )
 
-COUNT = int(os.environ.get('BOX_CONTACT_MUTANTS', '300'))
+COUNT = int(os.environ.get('BOX_CONTACT_MUTANTS', '150'))
 """Files in all."""
 LONGEST, STARTING = 1.0, 2.0  # of a file [s of this process; a subprocess imports MuJoCo, too]
 MEMORY = 300 * 2**10  # that this process may need more [kB]
