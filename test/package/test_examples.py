@@ -19,6 +19,8 @@ from pathlib import Path
 import pytest
 from patience import PATIENCE
 
+pytestmark = pytest.mark.reports
+
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / 'docs' / 'examples'
 CLIENTS = ('check_client.py', 'lockstep_client.py', 'forces_client.py', 'lift.py',
@@ -145,8 +147,6 @@ print('left at 0:', unset(deserialize_message(client.data, Contacts).contacts))
 LOAD = """
 import sys, rclpy
 from composition_interfaces.srv import LoadNode
-
-pytestmark = pytest.mark.reports
 rclpy.init()
 node = rclpy.create_node('loader')
 load = node.create_client(LoadNode, 'ComponentManager/_container/load_node')
