@@ -10,7 +10,7 @@ SHELL := bash
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
 .PHONY: help demo view test check reports rivals docs docs-links tables dist coverage clean
-.PHONY: test-arm test-colcon test-debian13 test-schemas test-training
+.PHONY: test-arm test-builds test-colcon test-debian13 test-reports test-schemas test-training
 
 # Arguments for the program behind the target: make test ARGS='-k sat -x'
 ARGS ?=
@@ -30,15 +30,17 @@ endif
 
 PY := .venv/bin/python
 CMAKE := .venv/bin/cmake
-# One worker more than cores: tests of nodes mostly wait. conftest.py says which files come first.
+# One worker more than cores: tests of nodes mostly wait. A file's tests share what it has set up.
 WORKERS := $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
-PYTEST := $(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder -rs --durations 10
+PYTEST := $(PY) -m pytest -n $(WORKERS) --dist loadfile -rs --durations 10
 LINT := echo ruff; $(PY) -m ruff check .; echo mypy; $(PY) -m mypy
 
 help:
 	@echo 'make demo     the crane, the contact node, and contacts live in this terminal'
 	echo 'make view     the same in the browser, again and again'
-	echo 'make test     ruff, mypy, and all tests that need no PyTorch'
+	echo 'make test     ruff, mypy, and all tests of what the package answers'
+	echo 'make test-builds  another compiler, sanitizers, wheels and other installations'
+	echo 'make test-reports  the reports and the demo, each in a quick run, examples and pages'
 	echo 'make test-training  the tests of training, for which it fetches PyTorch'
 	echo 'make check    linters, and the quick tests of core, solver and scene: a minute'
 	echo 'make test-colcon  tests of what an installation changes, by `colcon test` in a workspace'
@@ -120,6 +122,10 @@ rivals:
 	@.ci/setup test
 	$(CMAKE) -S benchmarks/stack_calls -B build/rivals -DLEAVE_OUT='$(LEAVE_OUT)' $(ARGS)
 	exec $(CMAKE) --build build/rivals --parallel $$(getconf _NPROCESSORS_ONLN)
+
+test-builds test-reports:
+	@.ci/setup test
+	exec $(PYTEST) -m $(@:test-%=%) $(ARGS)
 
 test-training:
 	@.ci/setup training

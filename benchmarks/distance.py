@@ -3,22 +3,17 @@
 
 """Program `distance`: distances of boxes apart, beside other engines, and a fuzzer of them.
 
-`python -m benchmarks.distance` compiles distance_calls/, which calls all in turn, and writes
+`python -m benchmarks.distance` compiles native_calls/, which calls all in turn, and writes
 distance.md, .csv and .png: times relative to `mj_geomDistance`, and errors against a judge that
-proves the distance. Coal, FCL and Bullet are compiled in where pkg-config finds them. `--fuzz N`
-proves N drawn pairs of all families instead; the status is 1 if one is beyond the bounds of
-docs/reference/conventions.md.
+proves the distance. `--fuzz N` proves N drawn pairs of all families instead; the status is 1 if one
+is beyond the bounds of docs/reference/conventions.md.
 """
 from __future__ import annotations
 
-import importlib.util
-import os
-import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
 
@@ -31,61 +26,31 @@ from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.nearest import Nearests
 from box_contact_ros.solver.pose import rotation_matrix
 
-from . import distance_picture, native, output
+from . import distance_picture, output
 from .apart import FAMILIES, Proof, draw, prove
-from .engines import add_leave_out, may_miss
-from .native import Ratio, Times
+from .engines import add_leave_out
+from .native_calls import FULL, Effort, Program, Ratio, compiled_for, of_copies
 from .output import markdown_table, number
 from .pose_sets import Pairs
 from .timing import by_round, no_garbage_collection, pinned, usable_cores
 
-COPIES, PAIRS, ROUNDS, CALLS = 7, 20_000, 11, 2_000
-QUICK_COPIES, QUICK_PAIRS, QUICK_ROUNDS, QUICK_CALLS = 2, 400, 1, 100
+QUICK = Effort(2, 400, 1, 100)
 UNIT = 'mj_geomDistance, single'
-RIVALS = {'mj': 'MuJoCo', 'Coal': 'Coal', 'FCL': 'FCL', 'Bullet': 'Bullet'}
-OPTIONAL = {'coal': 'pip install coal cmeel-eigen', 'fcl': 'apt install libfcl-dev',
-            'bullet': 'apt install libbullet-dev'}
-"""By file of distance_calls/ and by name for pkg-config: what brings headers and library."""
-CALLS_FOLDER = Path(__file__).with_name('distance_calls')
 PYTHON_FAMILIES = ('random', 'swaying containers')
 PIECE = 20_000  # pairs that are fuzzed at a time
 BOUNDS = {'above': 32.0, 'below': 32.0, 'outside': 10.0, 'length': 32.0}
 """Of `Proof`, as conventions.md promises them [2⁻⁵³ of the largest size or coordinate]."""
 
 
-class OnFamily(NamedTuple):
-    """All contestants on the pairs of a family."""
+class Found(NamedTuple):
+    """One contestant on the pairs of a family."""
 
-    times: dict[str, Times]  # those of the depths stay empty
-    errors: dict[str, np.ndarray]
-    """By contestant, |distance − true distance| (n,) divided by size + distance of the centres."""
+    nanoseconds: np.ndarray  # (copies, rounds), of a pair
+    errors: np.ndarray
+    """|distance − true distance| (n,) divided by size + distance of the centres."""
 
 
-def compiled(folder: Path) -> tuple[Path, list[str]]:
-    """Compile distance_calls/ into a folder; return the program, and the rivals that are left out.
-
-    Raises `RuntimeError` with what the compiler reports.
-    """
-    spec = importlib.util.find_spec('mujoco')
-    if spec is None or spec.origin is None:
-        raise RuntimeError("MuJoCo is not installed: pip install -e '.[sim]'")
-    mujoco = Path(spec.origin).parent
-    options = {name: native.package_flags(name) for name in OPTIONAL}
-    rivals = {name: flags for name, flags in options.items() if flags is not None}
-    compiler = [os.environ.get('CXX', 'g++'), '-std=c++17', '-Wall', '-Wextra', '-O2',
-                f'-I{Path(sys.prefix, "include")}', '-Wl,--disable-new-dtags']
-    linked = [name for name in rivals if name != 'fcl']
-    if 'fcl' in rivals:
-        native.run_compiler([*compiler, '-fPIC', '-shared', str(CALLS_FOLDER / 'fcl.cpp'),
-                             '-o', str(folder / 'libfcl_calls.so'), *rivals['fcl']])
-    native.run_compiler([
-        *compiler, f'-I{mujoco / "include"}', *(f'-DWITH_{name.upper()}' for name in rivals),
-        str(native.CALLS_FOLDER / 'contestants.cpp'),
-        *[str(CALLS_FOLDER / f'{name}.cpp') for name in ('main', 'ours', 'mujoco', *linked)],
-        '-o', str(folder / 'distance'), shutil.copy(native.LIBRARY, folder),
-        str(next(mujoco.glob('libmujoco.so*'))), '-Wl,-rpath,$ORIGIN', f'-Wl,-rpath,{mujoco}',
-        *(flag for name in linked for flag in rivals[name]), '-ldl', '-rdynamic'])
-    return folder / 'distance', [name for name in OPTIONAL if name not in rivals]
+OnFamily = Mapping[str, Found]  # by contestant
 
 
 def distances(pairs: Pairs) -> Nearests:
@@ -103,46 +68,29 @@ def drawn_apart(name: str, count: int) -> tuple[Pairs, Proof]:
     return pairs, prove(pairs, found[rows])
 
 
-def timed(program: Path, pairs: Pairs, proof: Proof, instruction_set: str, *, rounds: int,
-          calls: int) -> OnFamily:
+def timed(program: Program, pairs: Pairs, proof: Proof, instruction_set: str,
+          effort: Effort) -> OnFamily:
     """Return times and errors of all contestants on one family, in one process."""
-    answers = program.parent / 'answers'
-    first, names, *lines = native.run(program, pairs, instruction_set, rounds, calls, answers)
-    if first != instruction_set:
-        raise RuntimeError(f'{instruction_set} was asked for, and the library answered {first!r}')
-    times: dict[str, list[float]] = {name: [] for name in names.split('\t')}
-    for line in lines:
-        name, nanoseconds = line.split('\t')
-        times[name].append(float(nanoseconds))
-    found = np.fromfile(answers).reshape(len(times), -1)
-    offset = np.linalg.norm(pairs.pose_b[:, :3] - pairs.pose_a[:, :3], axis=1)
-    count, scale = found.shape[1], pairs.size + offset
-    return OnFamily(
-        {name: Times(np.array([values]), 0, 0, count, (np.nan,) * 3)
-         for name, values in times.items()},
-        {name: np.abs(row - proof.true[:count]) / scale[:count]
-         for name, row in zip(times, found)})
-
-
-def of_copies(runs: Sequence[OnFamily]) -> OnFamily:
-    """Return the runs of all copies as one, whose times have a row for each copy."""
-    return OnFamily(native.of_copies([run.times for run in runs]), runs[0].errors)
+    answers = program.answers(pairs, instruction_set, effort.rounds, effort.calls)
+    scale = pairs.size + np.linalg.norm(pairs.pose_b[:, :3] - pairs.pose_a[:, :3], axis=1)
+    return {name: Found(nanoseconds, np.abs(found - proof.true[:len(found)]) / scale[:len(found)])
+            for name, (nanoseconds, found) in answers.items()}
 
 
 def times_table(found: Mapping[str, OnFamily]) -> str:
     """Return a row per family: the time of `UNIT`, and the ratios of all others to it."""
-    names = [name for name in next(iter(found.values())).times if name != UNIT]
+    names = [name for name in next(iter(found.values())) if name != UNIT]
     return markdown_table(['', '`mj_geomDistance` [ns]', *names], [
-        [family, f'{np.median(one.times[UNIT].nanoseconds):.0f}',
-         *(str(Ratio.of(one.times, name, UNIT)) for name in names)]
+        [family, f'{np.median(one[UNIT].nanoseconds):.0f}',
+         *(str(Ratio.of(one, name, UNIT)) for name in names)]
         for family, one in found.items()])
 
 
 def errors_table(found: Mapping[str, OnFamily]) -> str:
     """Return a row per family: the largest error of each, of size + distance of the centres."""
-    names = list(next(iter(found.values())).errors)
+    names = list(next(iter(found.values())))
     return markdown_table(['', *names], [
-        [family, *(f'{errors.max():.1e}' for errors in one.errors.values())]
+        [family, *(f'{errors.max():.1e}' for _, errors in one.values())]
         for family, one in found.items()])
 
 
@@ -222,12 +170,12 @@ def csv_rows(found: Mapping[str, Mapping[str, OnFamily]]) -> Iterator[dict[str, 
     """Yield a row per instruction set, family and contestant."""
     for instruction_set, by_family in found.items():
         for family, one in by_family.items():
-            for name, times in one.times.items():
+            for name, (nanoseconds, errors) in one.items():
                 yield {'instruction_set': instruction_set, 'family': family, 'contestant': name,
-                       'p50_ns': float(np.median(times.nanoseconds)),
-                       **Ratio.of(one.times, name, UNIT).columns('by_unit'),
-                       'error_p99': float(np.percentile(one.errors[name], 99)),
-                       'error_worst': float(one.errors[name].max())}
+                       'p50_ns': float(np.median(nanoseconds)),
+                       **Ratio.of(one, name, UNIT).columns('by_unit'),
+                       'error_p99': float(np.percentile(errors, 99)),
+                       'error_worst': float(errors.max())}
 
 
 def fuzz(name: str, seed: int, count: int) -> tuple[int, dict[str, float], list[str]]:
@@ -284,46 +232,32 @@ def main(args: Sequence[str] | None = None) -> int:
         return run_fuzz(options.fuzz, options.seed)
     folder = output.results_folder(parser, options)
     require('report', 'sim')
-    count, pairs, rounds, calls = (
-        (QUICK_COPIES, QUICK_PAIRS, QUICK_ROUNDS, QUICK_CALLS) if options.quick
-        else (COPIES, PAIRS, ROUNDS, CALLS))
+    effort = QUICK if options.quick else FULL
     names = [name for name in instruction_sets() if name != 'baseline'] or list(instruction_sets())
     found: dict[str, dict[str, OnFamily]] = {name: {} for name in names}
     proofs: dict[str, Proof] = {}
     with tempfile.TemporaryDirectory() as made:
-        try:
-            program, missing = compiled(Path(made))
-            if not (options.quick or may_miss('distance', missing, options.leave_out)):
-                return 2
-        except RuntimeError as error:
-            print(f'distance: {error}', file=sys.stderr)
+        program = compiled_for('distance', options, Path(made), 'distance')
+        if program is None:
             return 2
-        copies = [native.copied(program, Path(made, f'copy {number}')) for number in range(count)]
+        copies = [program.copied(Path(made, f'copy {number}')) for number in range(effort.copies)]
         with pinned({usable_cores()[-1]}):
             for family in tqdm(FAMILIES, unit='family'):
-                chosen, proofs[family] = drawn_apart(family, pairs)
-                runs = [{name: timed(copy, chosen, proofs[family], name, rounds=rounds,
-                                     calls=calls) for name in names} for copy in copies]
+                chosen, proofs[family] = drawn_apart(family, effort.pairs)
+                runs = [{name: timed(copy, chosen, proofs[family], name, effort) for name in names}
+                        for copy in copies]
                 for name in names:
                     found[name][family] = of_copies([run[name] for run in runs])
-            from_python = in_python(rounds, calls)
-    versions = [f'MuJoCo {metadata.version("mujoco")}', *(
-        f'{RIVALS.get(name.capitalize(), name.upper())} '
-        f'{native.package_config(name, "--modversion")}'
-        for name in OPTIONAL if name not in missing)]
+            from_python = in_python(effort.rounds, effort.calls)
     times = times_table(found[names[-1]])
     output.write_page(
-        folder, 'distance', args, machine=output.machine(), engines=', '.join(versions),
-        copies=count, rounds=rounds, calls=calls, pairs=pairs, best=names[-1], times=times,
-        errors=errors_table(found[names[-1]]), proofs=proofs_table(proofs),
-        python=python_table(from_python), code=native.calls_shown(missing, CALLS_FOLDER),
-        missing=''.join(f'\n\nLeft out: {name.capitalize()} is not installed with its headers '
-                        f'(`{OPTIONAL[name]}`).' for name in missing))
+        folder, 'distance', args, machine=output.machine(), **effort._asdict(), best=names[-1],
+        times=times, errors=errors_table(found[names[-1]]), proofs=proofs_table(proofs),
+        python=python_table(from_python), code=program.calls_shown(), engines=program.engines(),
+        missing=program.left_out())
     output.write_csv(folder / 'distance.csv', csv_rows(found), about=output.machine())
     distance_picture.draw(folder / 'distance.png', folder / 'distance.csv', names[-1])
     print(times)
-    for name in missing:
-        print(f'distance: {name.capitalize()} is left out: {OPTIONAL[name]}', file=sys.stderr)
     return 0
 
 

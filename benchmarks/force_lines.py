@@ -5,17 +5,20 @@
 
 `python -m benchmarks.force_lines` runs the cases of eight subjects by `PatchForces` with contacts
 of its own: uneven steps, heavy bodies on light ones, impacts, carriers, gaps of a nanometre, a wide
-floor, loads of feet, and tipping. It prints a table, and writes force_lines.csv. The lines of
-impacts, feet and tipping come from theory; the other ones say what a user may expect. The exit
-status is 1 if a figure is beyond its line. `--only SUBJECT` runs some of the subjects.
+floor, loads of feet, and tipping. It prints and writes force_lines.md, which also lists the tuned
+numbers of the forces, and force_lines.csv. The lines of impacts, feet and tipping come from theory;
+the other ones say what a user may expect. The exit status is 1 if a figure is beyond its line.
+`--only SUBJECT` runs some of the subjects.
 """
 from __future__ import annotations
 
 import math
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -261,6 +264,43 @@ def tipping(*, quick: bool) -> Iterator[Line]:
     yield Line(subject='tipping', case=cube.name, what='falls within [s]', figure=tipped, line=3.0)
 
 
+# --- the numbers of the method --------------------------------------------------------------------
+
+TUNING = output.ROOT / 'box_contact_ros/core/src/force/tuning.hpp'
+
+
+class Number(NamedTuple):
+    """Tuned numbers that share a comment."""
+
+    subject: str
+    names: str
+    values: str
+    meaning: str
+
+
+def tuned_numbers(text: str) -> list[Number]:
+    """Return the constants of a header, each with its subject and the comment above it."""
+    found: list[Number] = []
+    subject = comment = ''
+    for line in text.splitlines():
+        if heading := re.fullmatch('// --- (.*) ---', line):
+            subject, comment = heading[1], ''
+        elif line.startswith('//'):
+            comment = f'{comment} {line[2:].strip()}'.strip()
+        elif line.startswith('constexpr '):
+            pairs = re.findall(r'(\w+) = ([-\w.+]+)', line)
+            names, values = (', '.join(parts) for parts in zip(*pairs))
+            if not comment:  # that of the line above holds for both
+                above = found.pop()
+                names, values = f'{above.names}, {names}', f'{above.values}, {values}'
+                comment = above.meaning
+            found.append(Number(subject, names, values, comment))
+            comment = ''
+        else:
+            comment = ''
+    return found
+
+
 # --- the report -----------------------------------------------------------------------------------
 
 SUBJECTS: dict[str, Callable[..., Iterator[Line]]] = {
@@ -271,7 +311,7 @@ SUBJECTS: dict[str, Callable[..., Iterator[Line]]] = {
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the cases, print and write; 1 if a figure is beyond its line."""
-    parser = output.report_parser('force_lines', __doc__, out='force_lines.csv',
+    parser = output.report_parser('force_lines', __doc__, out='force_lines.md, .csv',
                                   quick=f'{QUICK_MINUTE:g} s instead of a minute')
     parser.add_argument('--only', nargs='+', choices=SUBJECTS, default=list(SUBJECTS),
                         metavar='SUBJECT', help=f'of {", ".join(SUBJECTS)} (default: all)')
@@ -281,15 +321,21 @@ def main(args: Sequence[str] | None = None) -> int:
         for line in SUBJECTS[name](quick=options.quick):
             print(f'{line.subject}, {line.case}: {line.what} {line.figure:.3g}', flush=True)
             found.append(line)
-    print('\n' + output.markdown_table(
-        ['subject', 'case', 'figure of', 'found', 'line', ''],
-        [[line.subject, line.case, line.what, f'{line.figure:.3g}', f'{line.line:g}',
-          '' if line.is_met else '**beyond**'] for line in found], words=3))
+    missed = sum(not line.is_met for line in found)
+    numbers = tuned_numbers(TUNING.read_text('utf-8'))
+    print(output.write_page(
+        folder, 'force_lines', args, machine=output.machine(), missed=missed, count=len(found),
+        lines=output.markdown_table(
+            ['subject', 'case', 'figure of', 'found', 'line', ''],
+            [[line.subject, line.case, line.what, f'{line.figure:.3g}', f'{line.line:g}',
+              '' if line.is_met else '**beyond**'] for line in found], words=3),
+        numbers=output.markdown_table(['', 'name', 'value', ''], [
+            [number.subject, number.names, number.values, number.meaning] for number in numbers],
+            words=4)))
     output.write_csv(folder / 'force_lines.csv', [
         {'subject': line.subject, 'case': line.case, 'figure_of': line.what,
          'found': line.figure, 'line': line.line} for line in found], digits=3,
         about=output.machine())
-    missed = sum(not line.is_met for line in found)
     print(f'\n{missed} of {len(found)} figures beyond their lines')
     return int(missed > 0)
 

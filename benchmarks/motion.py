@@ -8,8 +8,6 @@ writes motion.md and motion.csv. The status is 1 if an answer is late, early, to
 """
 from __future__ import annotations
 
-import os
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -22,7 +20,7 @@ import numpy as np
 
 from box_contact_ros.extras import require
 
-from . import native, output
+from . import native_calls, output
 from .engines import add_leave_out, may_miss
 from .motions import EVERYDAY, KINDS, TOLERANCE, Motions, draw
 from .output import markdown_table, number
@@ -32,7 +30,7 @@ from .timing import pinned, usable_cores
 MOTIONS, TIMED, RIVALED = 52_632, 2_000, 400  # of a kind: a million in all
 QUICK_MOTIONS, QUICK_TIMED, QUICK_RIVALED = 40, 40, 10
 CALLS_FOLDER = Path(__file__).with_name('motion_calls')
-SOURCES = native.ROOT / 'box_contact_ros/core'
+SOURCES = output.ROOT / 'box_contact_ros/core/src'
 STANDING = ('containers that swing', 'plates and bullets', 'bars that turn by')
 """Kinds without a clearance whose box A stands: the only ones that Rapier answers."""
 RIVALED_KINDS = (*STANDING, 'both turning')
@@ -47,11 +45,9 @@ Answers = dict[str, np.ndarray]  # (n,) by column
 
 def compiled(folder: Path) -> Path:
     """Compile motion_calls/ into a folder; RuntimeError with what the compiler reports."""
-    native.run_compiler([
-        os.environ.get('CXX', 'g++'), '-std=c++17', '-O2', '-ffp-contract=off',
-        '-fno-tree-slp-vectorize', '-Wall', '-Wextra', '-Wno-psabi', f'-I{SOURCES / "include"}',
-        f'-I{SOURCES / "src"}', str(CALLS_FOLDER / 'main.cpp'), '-o', str(folder / 'motion'),
-        shutil.copy(native.LIBRARY, folder), '-Wl,-rpath,$ORIGIN'])
+    native_calls.run_compiler(
+        '-O2', '-ffp-contract=off', '-fno-tree-slp-vectorize', '-Wno-psabi', f'-I{SOURCES}',
+        CALLS_FOLDER / 'main.cpp', '-o', folder / 'motion', *native_calls.library_beside(folder))
     return folder / 'motion'
 
 
@@ -126,32 +122,6 @@ Asker = Callable[[Motions, int], tuple[float, float]]
 """One motion by an engine: its time, NaN for never, and the seconds of the call."""
 
 
-def fcl_asker(solver: str) -> Asker:
-    """Return FCL's continuous collision by one of its solvers."""
-    import fcl
-
-    request = fcl.ContinuousCollisionRequest(
-        num_max_iterations=1000, toc_err=TOLERANCE,
-        ccd_motion_type=fcl.CCDMotionType.CCDM_LINEAR,
-        ccd_solver_type=getattr(fcl.CCDSolverType, solver))
-
-    def place(pose: np.ndarray) -> fcl.Transform:
-        return fcl.Transform(pose[[6, 3, 4, 5]], pose[:3])
-
-    def ask(found: Motions, row: int) -> tuple[float, float]:
-        boxes = fcl.Box(*found.size_a[row]), fcl.Box(*found.size_b[row])  # objects keep none alive
-        a, b = (fcl.CollisionObject(box, place(start[row])) for box, start in zip(
-            boxes, (found.start_a, found.start_b)))
-        ends = place(found.end_a[row]), place(found.end_b[row])
-        result = fcl.ContinuousCollisionResult()
-        begin = time.perf_counter()
-        fcl.continuousCollide(a, ends[0], b, ends[1], request, result)
-        seconds = time.perf_counter() - begin
-        return (result.time_of_contact if result.is_collide else np.nan), seconds
-
-    return ask
-
-
 def rapier_asker() -> Asker:
     """Return Rapier's nonlinear shape cast, at a box that stands."""
     import rapier3d as rapier
@@ -204,18 +174,10 @@ def compared(kind: str, name: str, times: np.ndarray, true: np.ndarray, microsec
 
 def engines(leave_out: Sequence[str]) -> tuple[dict[str, Asker], list[str]]:
     """Return the engines that are installed, by name, and what is missing."""
-    made: dict[str, tuple[str, Callable[[], Asker]]] = {
-        'FCL, advancement': ('fcl', lambda: fcl_asker('CCDC_CONSERVATIVE_ADVANCEMENT')),
-        'FCL, naive': ('fcl', lambda: fcl_asker('CCDC_NAIVE')),
-        'Rapier': ('rapier', rapier_asker)}
-    found, missing = {}, []
-    for name, (package, make) in made.items():
-        try:
-            if package not in leave_out:
-                found[name] = make()
-        except ImportError:
-            missing.append(package)
-    return found, list(dict.fromkeys(missing))
+    try:
+        return ({} if 'rapier' in leave_out else {'Rapier': rapier_asker()}), []
+    except ImportError:
+        return {}, ['rapier']
 
 
 def rivals(answers: Mapping[str, Answers], seed: int, count: int, asked: Mapping[str, Asker],
@@ -229,7 +191,7 @@ def rivals(answers: Mapping[str, Answers], seed: int, count: int, asked: Mapping
                 ('1 mm', one['sampled'][:count], one['sampled_ns'][:count])):
             yield compared(kind, name, times, true, float(np.median(took)) / 1e3)
         for name, ask in asked.items():
-            if name == 'Rapier' and kind not in STANDING:
+            if kind not in STANDING:
                 continue
             times, seconds = np.array([ask(drawn, row) for row in range(count)]).T
             yield compared(kind, name, times, true, 1e6 * float(np.median(seconds)))

@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import importlib.util
 import math
-import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -26,7 +24,7 @@ import numpy as np
 
 from box_contact_ros.forces.patch_forces import FRICTION, GRAVITY
 
-from . import native, output, rivals_picture
+from . import native_calls, output, rivals_picture
 from .engines import DYNAMICS
 from .loops import FRAME, Boxes, Scene
 from .output import ROOT, markdown_table, number
@@ -119,10 +117,8 @@ def compiled(folder: Path) -> Path:
     Raises `RuntimeError` with what the compiler reports.
     """
     program = folder / 'ours'
-    native.run_compiler([
-        os.environ.get('CXX', 'g++'), '-std=c++17', '-Wall', '-Wextra', '-O2',
-        f'-I{Path(sys.prefix, "include")}', str(CALLS_FOLDER / 'ours.cpp'), '-o', str(program),
-        shutil.copy(native.LIBRARY, folder), '-Wl,--disable-new-dtags', '-Wl,-rpath,$ORIGIN'])
+    native_calls.run_compiler('-O2', CALLS_FOLDER / 'ours.cpp', '-o', program,
+                              *native_calls.library_beside(folder))
     return program
 
 

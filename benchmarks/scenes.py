@@ -106,7 +106,7 @@ def scene_of(boxes: Boxes, pairs: np.ndarray | None = None) -> Scene:
                  boxes.size.tolist(), boxes.pose.tolist(), boxes.fixed))}
     listed = () if pairs is None else tuple(
         Pair.between(f'b{a}', f'b{b}') for a, b in pairs.tolist())
-    return Scene(named, listed, pose_array=True, patterns=EVERY_PAIR if pairs is None else ())
+    return Scene(named, listed, poses='array', patterns=EVERY_PAIR if pairs is None else ())
 
 
 class MuJoCo:
@@ -220,7 +220,7 @@ def grow(counts: Sequence[int], rounds: int) -> list[Grown]:
             solver = SceneSolver(scene, model='exact')
             rng = np.random.default_rng(1)
             places = [boxes.shaken(rng) for _ in range(PLACES)]
-            phase = solver._broad_phase
+            phase = solver._at.broad_phase
             times: list[tuple[float, float]] = []
             for turn in range(PLACES + rounds):
                 took, answer = cpu_milliseconds(solver, places[turn % PLACES])

@@ -3,18 +3,21 @@
 
 """Statics of upright boxes by linear programmes: slow, obvious, and nothing of the package's own.
 
-Loads are forces at the corners of the rectangles that two boxes share.
+Loads are forces at the corners of the rectangles that two boxes share. With friction, each is
+within a pyramid around the cone of friction, and so a sum of forces along its four edges.
 """
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linprog
+import scipy  # loads scipy.optimize where it is called
+from scipy.sparse import csr_matrix, hstack, identity
 
 SAME = 1e-6  # [m] heights that are one
 LEAST = 1e-4  # [m] what two boxes must share at least
 HOLDS = 1e-6  # of the weight, what loads may lack: rounding
+INSCRIBED = 0.5**0.5  # of a friction, so that the pyramid is within the cone
 
 
 @dataclass
@@ -34,7 +37,7 @@ class Upright:
         rows = ~(self.fixed[a] & self.fixed[b])
         a, b = a[rows], b[rows]
         self.low, self.high = np.maximum(low[a], low[b]), np.minimum(high[a], high[b])
-        rows = (self.high - self.low)[:, :2].min(axis=1) > LEAST
+        rows = (self.high - self.low)[:, :2].min(axis=1) > max(LEAST, 2.0 * self.sooner)
         self.low, self.high = self.low[rows] + self.sooner, self.high[rows] - self.sooner
         self.pairs = np.stack((a[rows], b[rows]), axis=1)
 
@@ -48,35 +51,60 @@ class Upright:
                     joined[box] = joined[a]
         return [sorted(group) for group in {id(group): group for group in joined.values()}.values()]
 
-    def equations(self, boxes: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return A (3 per box, 4 per pair) and w of A·f = w, and the pairs' rows (p,)."""
-        place = {box: row for row, box in enumerate(boxes)}
-        pairs = np.flatnonzero(np.isin(self.pairs, boxes).any(axis=1))
-        matrix = np.zeros((3 * len(boxes), 4 * len(pairs)))
-        for column, pair in enumerate(pairs):
-            ends = np.stack((self.low[pair], self.high[pair]))
-            for corner, (i, j) in enumerate(((0, 0), (0, 1), (1, 0), (1, 1))):
-                for box, sign in zip(self.pairs[pair].tolist(), (-1, 1)):
-                    if box in place:
-                        x, y = np.array((ends[i, 0], ends[j, 1])) - self.poses[box, :2]
-                        matrix[3 * place[box]:3 * place[box] + 3, 4 * column + corner] += (
-                            sign, sign * y, -sign * x)
-        wanted = np.zeros(3 * len(boxes))
-        wanted[::3] = self.masses[boxes]
-        return matrix, wanted, pairs
+    def equations(self, boxes: list[int], friction: float = 0.0,
+                  ) -> tuple[csr_matrix, np.ndarray, np.ndarray]:
+        """Return A and w of A·f = w, and the pairs' rows (p,).
 
-    def missing(self, boxes: list[int]) -> float:
-        """Return the least force and moment that nothing gives a group, divided by its mass."""
-        matrix, wanted, _ = self.equations(boxes)
-        eye = np.eye(len(wanted))
-        forces = matrix.shape[1]
-        found = linprog(np.repeat((0.0, 1.0), (forces, 2 * len(eye))),
-                        A_eq=np.hstack((matrix, eye, -eye)), b_eq=wanted, method='highs')
-        return float(found.fun / self.masses[boxes].sum())
+        A has 3 rows for each box, and 4 columns for each pair; with friction, 6 and 16.
+        """
+        place = np.full(len(self.poses), -1)
+        place[boxes] = np.arange(len(boxes))
+        pairs = np.flatnonzero((place[self.pairs] >= 0).any(axis=1))
+        along = np.array([(x, y, 1.0) for x in (-friction, friction) for y in (-friction, friction)]
+                         if friction else [(0.0, 0.0, 1.0)])
+        keep = np.arange(6) if friction else np.array([2, 3, 4])
+        low, high = self.low[pairs], self.high[pairs]
+        at = np.stack([np.stack((x[:, 0], y[:, 1], low[:, 2]), axis=1)
+                       for x in (low, high) for y in (low, high)], axis=1)
+        force = np.tile(along, (4, 1))
+        column = np.arange(len(pairs) * len(force)).reshape(len(pairs), len(force), 1)
+        parts = []
+        for side, sign in ((0, -1), (1, 1)):
+            box = place[self.pairs[pairs, side]]
+            used = box >= 0
+            arm = at[used] - self.poses[self.pairs[pairs[used], side], None, :3]
+            torque = np.cross(np.repeat(arm, len(along), axis=1), force)
+            value = sign * np.concatenate((np.broadcast_to(force, torque.shape), torque), axis=2)
+            row = len(keep) * box[used, None, None] + np.arange(len(keep))
+            parts.append([np.broadcast_to(part, value[..., keep].shape).ravel()
+                          for part in (value[..., keep], row, column[used])])
+        values, rows, columns = map(np.concatenate, zip(*parts))
+        wanted = np.zeros(len(keep) * len(boxes))
+        wanted[keep.tolist().index(2)::len(keep)] = self.masses[boxes]
+        return csr_matrix((values, (rows, columns)), (len(wanted), column.size)), wanted, pairs
 
-    def holds(self, boxes: list[int]) -> bool:
-        """Return whether there are loads that a group is at rest with."""
-        return self.missing(boxes) < HOLDS
+    def missing(self, groups: list[list[int]], friction: float = 0.0) -> np.ndarray:
+        """Return the least force and moment that nothing gives groups (n,), by their masses."""
+        boxes = [box for group in groups for box in group]
+        if not boxes:
+            return np.zeros(0)
+        matrix, wanted, _ = self.equations(boxes, friction)
+        eye = identity(len(wanted))
+        found = scipy.optimize.linprog(np.repeat((0.0, 1.0), (matrix.shape[1], 2 * len(wanted))),
+                        A_eq=hstack((matrix, eye, -eye)), b_eq=wanted, method='highs')
+        lack = found.x[matrix.shape[1]:].reshape(2, len(boxes), -1).sum(axis=(0, 2))
+        group = np.repeat(np.arange(len(groups)), [len(boxes) for boxes in groups])
+        return np.bincount(group, lack) / np.bincount(group, self.masses[boxes])
+
+    def holds(self, groups: list[list[int]], friction: float = 0.0) -> np.ndarray:
+        """Return for which groups (n,) there are loads that they are at rest with.
+
+        With friction, those without are asked first.
+        """
+        holds = self.missing(groups) < HOLDS
+        others = np.flatnonzero(~holds) if friction else np.zeros(0, int)
+        holds[others] = self.missing([groups[n] for n in others], friction) < HOLDS
+        return holds
 
     def ranges(self, boxes: list[int]) -> dict[tuple[int, int], tuple[float, float]]:
         """Return the least and the greatest load of each pair of a group that can hold [kg]."""
@@ -86,6 +114,7 @@ class Upright:
             cost = np.zeros(matrix.shape[1])
             cost[4 * column:4 * column + 4] = 1.0
             found[tuple(self.pairs[pair].tolist())] = tuple(
-                sign * linprog(sign * cost, A_eq=matrix, b_eq=wanted, method='highs').fun
+                sign * scipy.optimize.linprog(
+                    sign * cost, A_eq=matrix, b_eq=wanted, method='highs').fun
                 for sign in (1, -1))
         return found

@@ -9,43 +9,45 @@ they are first used, so `import box_contact_ros` stays cheap.
 from importlib import import_module as _import_module
 from typing import TYPE_CHECKING, Any
 
-from .solver.contact import Contact, Contacts, patch_area, patch_areas
+from .solver.contact import Contact, Contacts
 from .solver.contact_solver import ContactSolver
 from .solver.motion import Approach, Approaches
 from .solver.nearest import Nearest, Nearests
 
 if TYPE_CHECKING:
     from .forces.patch_forces import Body, PatchForces
-    from .forces.support import support
     from .models.make_model import make_model
     from .node.contact_node import ContactNode as ContactNode  # noqa: F401
     from .plans.inspect_plan import inspect_plan
-    from .plans.plan import Plan
+    from .plans.inspection import Inspection, Row
+    from .plans.plan import Fault, Plan
     from .plans.read_plan import read_plan
     from .scene.scene import Box, Frame, Pair, Scene
     from .scene.scene_file import read_scene
     from .scene.scene_solver import SceneSolver
     from .solver.contacts_of import contacts_of
+    from .solver.faces import FacePatches, face_patches
     from .stream.read_contacts import ReadContacts, read_contacts
 
-__all__ = ['Approach', 'Approaches', 'Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'Frame',
-           'Nearest', 'Nearests', 'Pair', 'PatchForces', 'Plan', 'ReadContacts', 'Scene',
-           'SceneSolver', 'contacts_of', 'inspect_plan', 'make_model', 'patch_area', 'patch_areas',
-           'read_contacts', 'read_plan', 'read_scene', 'support']
+__all__ = ['Approach', 'Approaches', 'Body', 'Box', 'Contact', 'ContactSolver', 'Contacts',
+           'FacePatches', 'Fault', 'Frame', 'Inspection', 'Nearest', 'Nearests', 'Pair',
+           'PatchForces', 'Plan', 'ReadContacts', 'Row', 'Scene', 'SceneSolver', 'contacts_of',
+           'face_patches', 'inspect_plan', 'make_model', 'read_contacts', 'read_plan', 'read_scene']
 # `ContactNode` needs ROS, and `import *` does without.
 
 _LOADED_WHEN_USED = {
     'forces.patch_forces': ('Body', 'PatchForces'),
-    'forces.support': ('support',),
     'models.make_model': ('make_model',),
     'node.contact_node': ('ContactNode',),
     'plans.inspect_plan': ('inspect_plan',),
-    'plans.plan': ('Plan',),
+    'plans.inspection': ('Inspection', 'Row'),
+    'plans.plan': ('Fault', 'Plan'),
     'plans.read_plan': ('read_plan',),
     'scene.scene_file': ('read_scene',),
     'scene.scene': ('Box', 'Frame', 'Pair', 'Scene'),
     'scene.scene_solver': ('SceneSolver',),
     'solver.contacts_of': ('contacts_of',),
+    'solver.faces': ('FacePatches', 'face_patches'),
     'stream.read_contacts': ('ReadContacts', 'read_contacts'),
 }
 

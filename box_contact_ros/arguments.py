@@ -5,14 +5,72 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import functools
+import io
 import math
+import os
+import signal
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from .models.make_model import check_model
+from .solver.checks import printable
 
 Number = TypeVar('Number', int, float)
+Main = Callable[[Sequence[str] | None], int]
+NOT_WRITTEN = 74
+"""Exit status where stdout or a file cannot be written, as <sysexits.h> has it."""
+
+
+def program_main(main: Main) -> Callable[..., int]:
+    """Return the main function of a program that ends without a traceback if output fails.
+
+    The exit status is 128 and the signal for a closed pipe or Ctrl-C, as shells report it, and
+    NOT_WRITTEN for a full device. What the terminal cannot encode is escaped.
+    """
+    @functools.wraps(main)
+    def run(args: Sequence[str] | None = None) -> int:
+        streams = [stream for stream in (sys.stdout, sys.stderr) if stream]  # None: closed
+        for stream in streams:
+            if isinstance(stream, io.TextIOWrapper):
+                stream.reconfigure(errors='backslashreplace')
+        try:
+            try:
+                return main(args)
+            finally:
+                if sys.stdout:
+                    sys.stdout.flush()
+        except BrokenPipeError:
+            status = 128 + signal.SIGPIPE
+        except KeyboardInterrupt:
+            status = 128 + signal.SIGINT
+        except OSError as error:
+            status = NOT_WRITTEN
+            with contextlib.suppress(OSError):
+                print(one_line(error), file=sys.stderr)
+        for stream in streams:
+            _give_up(stream)
+        return status
+    return run
+
+
+def _give_up(stream: Any) -> None:
+    """Drop what is left of a stream that cannot be written: Python would complain at its end."""
+    try:
+        stream.flush()
+    except OSError:
+        with contextlib.suppress(OSError), open(os.devnull, 'w') as nowhere:
+            os.dup2(nowhere.fileno(), stream.fileno())
+
+
+def one_line(error: BaseException) -> str:
+    """Return what went wrong in one line, with the file."""
+    text = str(error)
+    if isinstance(error, OSError) and error.strerror:
+        text = error.strerror if error.filename is None else f'{error.filename}: {error.strerror}'
+    return printable(' '.join(text.split()))
 
 
 def program_parser(program: str, doc: str | None, **options: Any) -> argparse.ArgumentParser:

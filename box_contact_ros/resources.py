@@ -17,8 +17,10 @@ from __future__ import annotations
 
 import contextlib
 import os
+import stat
 from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 _PACKAGE = Path(__file__).resolve().parent
 _SHARE = Path('share', 'box_contact_ros')
@@ -42,12 +44,38 @@ def resource_path(*parts: str) -> Path:
 
 
 def find_file(name: str | os.PathLike[str]) -> Path:
-    """Return the path that a user names, of one of the package's own where it leads nowhere."""
+    """Return the path that a user names, of one of the package's own where it leads nowhere.
+
+    `~` is the user's home, as a launch file or a parameter has it, which no shell has replaced.
+    """
+    with contextlib.suppress(RuntimeError):  # of a user that is not there
+        name = Path(name).expanduser()
     path = Path(name)
     if not path.is_absolute() and not path.exists():
         with contextlib.suppress(FileNotFoundError):
             return resource_path(str(name))
     return path
+
+
+def open_regular(path: str | os.PathLike[str]) -> BinaryIO:
+    """Return a file, open for reading its bytes. Raises OSError, at once, for what is no file.
+
+    A pipe would be waited for, and a device may have no end.
+    """
+    number = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+    if not stat.S_ISREG(os.fstat(number).st_mode):
+        os.close(number)
+        raise OSError('it is not a regular file')
+    return os.fdopen(number, 'rb')
+
+
+def read_regular(path: str | os.PathLike[str], most_bytes: int) -> bytes:
+    """Return the bytes of a file. Raises OSError for what is no file, or has more bytes."""
+    with open_regular(path) as file:
+        content = file.read(most_bytes + 1)
+    if len(content) > most_bytes:
+        raise OSError(f'it has more than {most_bytes} bytes')
+    return content
 
 
 def _roots() -> Iterator[Path]:

@@ -38,14 +38,8 @@ else:  # a busy machine is no failure
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in `nohup make test &`
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-FIRST = (
-    'test_install.py', 'test_faults.py', 'test_view.py', 'test_training.py', 'test_readme.py',
-    'test_examples.py', 'test_hostile.py', 'test_demo.py', 'test_crane_node.py', 'test_bench.py',
-    'test_scene_node.py', 'test_first_run.py', 'test_contact_node.py', 'test_landing_report.py',
-    'test_search.py', 'test_native.py', 'test_exact.py', 'test_service.py', 'test_builds.py',
-    'test_frontier.py', 'test_series.py', 'test_paper_tables.py', 'test_fuzz.py',
-    'test_dataset.py')
-"""The longest files, longest first. Begun late, one would leave the other workers idle."""
+APART = {'arm', 'builds', 'network', 'reports', 'training'}
+"""Markers of tests that have a make target of their own."""
 
 _modules = count()
 _claims: list[int] = []
@@ -117,13 +111,11 @@ EXTRAS = {
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Put the longest files first; leave out what has a make target of its own, unless -m asks."""
-    for marker in {'arm', 'network', 'training'} - set(config.option.markexpr.split()):
+    """Leave out what has a make target of its own, unless -m asks."""
+    for marker in APART - set(config.option.markexpr.split()):
         apart = [item for item in items if item.get_closest_marker(marker)]
         config.hook.pytest_deselected(items=apart)
         items[:] = [item for item in items if item not in apart]
-    items.sort(key=lambda item: FIRST.index(item.path.name) if item.path.name in FIRST
-               else len(FIRST))
 
 
 class TestFile(pytest.Module):

@@ -18,13 +18,6 @@ void fail(const std::string& what) {
 
 namespace {
 
-template <class Item>
-std::vector<Item> read(std::FILE* file, size_t count) {
-  std::vector<Item> items(count);
-  if (std::fread(items.data(), sizeof(Item), count, file) != count) fail("the poses end early");
-  return items;
-}
-
 PlacedBox placed(const bc_pose& pose, const bc_size& size) {
   const double* q = pose.quaternion;
   double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
@@ -46,11 +39,11 @@ PlacedBox placed(const bc_pose& pose, const bc_size& size) {
 Poses::Poses(const char* path) {
   std::FILE* file = std::fopen(path, "rb");
   if (!file) fail(std::string("cannot read ") + path);
-  size_t n = size_t(read<int64_t>(file, 1)[0]);
-  a = read<bc_pose>(file, n);
-  b = read<bc_pose>(file, n);
-  size_a = read<bc_size>(file, n);
-  size_b = read<bc_size>(file, n);
+  size_t n = size_t(read_items<int64_t>(file, 1)[0]);
+  a = read_items<bc_pose>(file, n);
+  b = read_items<bc_pose>(file, n);
+  size_a = read_items<bc_size>(file, n);
+  size_b = read_items<bc_size>(file, n);
   std::fclose(file);
   for (size_t pair = 0; pair < n; ++pair) {
     box_a.push_back({a[pair], size_a[pair]});
@@ -67,8 +60,8 @@ void compare(const Contestants& all, const Poses& poses, size_t rounds, size_t c
   for (const Contestant& one : all) {
     std::printf("%s%s", &one == &all[0] ? "" : "\t", one.name.c_str());
     for (size_t pair = 0; pair < calls; ++pair) {
-      double separation = one.separation(pair);
-      std::fwrite(&separation, sizeof separation, 1, answers);
+      double answer = one.answer(pair);
+      std::fwrite(&answer, sizeof answer, 1, answers);
     }
   }
   std::printf("\n");

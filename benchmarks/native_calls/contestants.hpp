@@ -2,18 +2,21 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // What a contestant of `native` is. Each library has one file, which adds its contestants.
-// The page of the report shows what lies between "// call: NAME" and "// end of call".
+// A report's page shows what lies between "// QUERY: NAME" and "// end of call".
 #pragma once
 
 #include <box_contact/box_contact.h>
 
 #include <cstddef>
+#include <cstdio>
 #include <functional>
 #include <limits>
 #include <string>
 #include <vector>
 
 constexpr double APART = std::numeric_limits<double>::infinity();
+
+enum class Query { contact, distance };
 
 // A pose and a size as other engines take them, made before anything is timed.
 struct PlacedBox {
@@ -36,8 +39,8 @@ struct Contestant {
   std::string name;
   size_t pairs;                             // of a round
   std::function<void(size_t first)> round;  // what is timed
-  // The signed separation [m] that it answers for a pair, to be checked; not timed.
-  std::function<double(size_t pair)> separation;
+  // What it answers for a pair, the signed separation or the distance [m], to be checked; not timed.
+  std::function<double(size_t pair)> answer;
 };
 
 using Contestants = std::vector<Contestant>;
@@ -45,7 +48,7 @@ using Contestants = std::vector<Contestant>;
 extern double kept;  // depends on every call, so that the compiler can leave none out
 
 // Return a contestant that is called pair by pair. `call` returns any number that depends on its
-// answer; `read` returns the signed separation in the answer of the last call.
+// answer; `read` returns what is checked in the answer of the last call.
 template <class Call, class Read>
 Contestant single(const std::string& name, size_t calls, Call call, Read read) {
   return {name + ", single", calls,
@@ -58,6 +61,15 @@ Contestant single(const std::string& name, size_t calls, Call call, Read read) {
           }};
 }
 
+// Return a contestant that is called for all pairs at once, and leaves what is checked in `answers`.
+template <class Call>
+Contestant batched(const std::string& name, size_t pairs, Call call, const double* answers) {
+  return {name + ", batch", pairs, call, [=](size_t pair) {
+            if (pair == 0) call(0);
+            return answers[pair];
+          }};
+}
+
 // Writes what each contestant answers for the first `calls` pairs to a file: float64, a row for each.
 // Prints the names of all, and a line for each contestant and round: nanoseconds a pair.
 void compare(const Contestants& all, const Poses& poses, size_t rounds, size_t calls,
@@ -65,17 +77,22 @@ void compare(const Contestants& all, const Poses& poses, size_t rounds, size_t c
 
 [[noreturn]] void fail(const std::string& what);
 
+template <class Item>
+std::vector<Item> read_items(std::FILE* file, size_t count) {
+  std::vector<Item> items(count);
+  if (std::fread(items.data(), sizeof(Item), count, file) != count) fail("a file ends early");
+  return items;
+}
+
 // Each adds its contestants, with `calls` single calls a round. What they use is never freed.
-void add_ours(const Poses& poses, size_t calls, Contestants& all);
-// Prints for each contact the time of a call of `exact` and of `mlp` [ns], the least of all passes.
-void time_each_contact(const Poses& poses, size_t passes);
+void add_ours(Query query, const Poses& poses, size_t calls, Contestants& all);
+void add_mujoco(Query query, const Poses& poses, size_t calls, Contestants& all);
+void add_coal(Query query, const Poses& poses, size_t calls, Contestants& all);
+void add_bullet(Query query, const Poses& poses, size_t calls, Contestants& all);
+extern "C" void add_fcl(Query query, const Poses& poses, size_t calls, Contestants& all);
 // Adds the networks of a file: for each the lengths of its name and of its numbers, int64, and both.
 void add_networks_avx2(const Poses& poses, size_t calls, const char* path, Contestants& all);
 void add_networks_avx512(const Poses& poses, size_t calls, const char* path, Contestants& all);
-void add_mujoco(const Poses& poses, size_t calls, Contestants& all);
-#ifdef WITH_COAL
-void add_coal(const Poses& poses, size_t calls, Contestants& all);
-#endif
-#ifdef WITH_BULLET
-void add_bullet(const Poses& poses, size_t calls, Contestants& all);
-#endif
+
+// Prints for each contact the time of a call of `exact` and of `mlp` [ns], the least of all passes.
+void time_each_contact(const Poses& poses, size_t passes);

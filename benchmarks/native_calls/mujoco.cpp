@@ -44,26 +44,28 @@ struct Scene {
 
 }  // namespace
 
-void add_mujoco(const Poses& poses, size_t calls, Contestants& all) {
+void add_mujoco(Query query, const Poses& poses, size_t calls, Contestants& all) {
   Scene& scene = *new Scene;
+  double farthest = query == Query::contact ? 1.0 : 1e10;  // distance up to which it is asked [m]
   auto boxes = [&](size_t i) {
-    // call: mjc_BoxBox
+    // contact: mjc_BoxBox
     scene.place(0, poses.placed_a[i]);
     scene.place(1, poses.placed_b[i]);
     scene.count = scene.box_box(scene.model, scene.data, scene.contacts, 0, 1, 0.0);
     // end of call
     return scene.count;
   };
-  all.push_back(single("mjc_BoxBox", calls, boxes, [&] {
-    double deepest = APART;
-    for (int k = 0; k < scene.count; ++k) deepest = std::min(deepest, scene.contacts[k].dist);
-    return deepest;
-  }));
-  auto distance = [&](size_t i) {
-    // call: mj_geomDistance
+  auto deepest = [&] {
+    double found = APART;
+    for (int k = 0; k < scene.count; ++k) found = std::min(found, scene.contacts[k].dist);
+    return found;
+  };
+  if (query == Query::contact) all.push_back(single("mjc_BoxBox", calls, boxes, deepest));
+  auto distance = [&, farthest](size_t i) {
+    // contact, distance: mj_geomDistance
     scene.place(0, poses.placed_a[i]);
     scene.place(1, poses.placed_b[i]);
-    scene.distance = mj_geomDistance(scene.model, scene.data, 0, 1, 1.0, scene.from_to);
+    scene.distance = mj_geomDistance(scene.model, scene.data, 0, 1, farthest, scene.from_to);
     // end of call
     return scene.distance;
   };

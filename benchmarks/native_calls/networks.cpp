@@ -51,17 +51,7 @@ void add(const Poses& poses, size_t calls, const std::string& name, const Model&
     Results results{colliding, separation, normal, point, volume, nullptr, nullptr, 0.0};
     solve_rows<Lanes<double, lanes>>(model, rows, 0, long(n), results);
   };
-  all.push_back({name + ", batch", n, batch, [=](size_t i) {
-                   if (i == 0) batch(0);
-                   return separation[i];
-                 }});
-}
-
-template <class Item>
-std::vector<Item> read(std::FILE* file, size_t count) {
-  std::vector<Item> items(count);
-  if (std::fread(items.data(), sizeof(Item), count, file) != count) fail("the networks end early");
-  return items;
+  all.push_back(batched(name, n, batch, separation));
 }
 
 }  // namespace
@@ -70,8 +60,8 @@ void ADD_NETWORKS(const Poses& poses, size_t calls, const char* path, Contestant
   std::FILE* file = std::fopen(path, "rb");
   if (!file) fail(std::string("cannot read ") + path);
   for (int64_t lengths[2]; std::fread(lengths, sizeof lengths, 1, file);) {
-    auto name = read<char>(file, size_t(lengths[0]));
-    auto& numbers = *new std::vector<float>(read<float>(file, size_t(lengths[1])));
+    auto name = read_items<char>(file, size_t(lengths[0]));
+    auto& numbers = *new std::vector<float>(read_items<float>(file, size_t(lengths[1])));
     std::string shown(name.begin(), name.end());
     if (numbers[0] == float(detail::paper_inputs))
       add(poses, calls, shown, PaperModel{view(numbers.data())}, all);

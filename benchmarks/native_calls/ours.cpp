@@ -1,24 +1,20 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// libbox_contact through its C interface: models `exact` and `mlp`, single calls and batches.
-#include <algorithm>
-#include <chrono>
-#include <cstdio>
+// libbox_contact through its C interface: contacts by models `exact` and `mlp`, and distances, single
+// calls and batches.
 #include <memory>
-#include <numeric>
-#include <random>
 
 #include "contestants.hpp"
 
 namespace {
 
 // Arrays of the results of a batch.
-struct Found {
+struct Contacts {
   std::unique_ptr<bool[]> colliding;
   std::vector<double> separation, normal, point, volume, covariance;
 
-  explicit Found(size_t n)
+  explicit Contacts(size_t n)
       : colliding(new bool[n]),
         separation(n),
         normal(3 * n),
@@ -27,7 +23,19 @@ struct Found {
         covariance(9 * n) {}
 };
 
-void add(const Poses& poses, size_t calls, bc_model model, bc_patch patch, Contestants& all) {
+struct Distances {
+  std::vector<double> distance, normal, point_a, point_b;
+  explicit Distances(size_t n) : distance(n), normal(3 * n), point_a(3 * n), point_b(3 * n) {}
+};
+
+bc_rows rows_of(const Poses& poses) {
+  int64_t n = int64_t(poses.count());
+  return {sizeof(bc_rows),     n, n, poses.a.data(), poses.b.data(), poses.size_a.data(),
+          poses.size_b.data(), n, n, nullptr};
+}
+
+void add_contacts(const Poses& poses, size_t calls, bc_model model, bc_patch patch,
+                  Contestants& all) {
   bc_query query = bc_default_query();
   query.model = model;
   query.patch = patch;
@@ -36,19 +44,17 @@ void add(const Poses& poses, size_t calls, bc_model model, bc_patch patch, Conte
 
   bc_contact& contact = *new bc_contact;
   auto call = [=, &poses, &contact](size_t i) {
-    // call: bc_collide
+    // contact: bc_collide
     bc_collide(&poses.box_a[i], &poses.box_b[i], &query, &contact);
     // end of call
     return contact.separation;
   };
   all.push_back(single(name, calls, call, [&contact] { return contact.separation; }));
 
-  Found& found = *new Found(poses.count());
+  Contacts& found = *new Contacts(poses.count());
   auto batch = [=, &poses, &found](size_t) {
-    // call: bc_collide_rows
-    int64_t n = int64_t(poses.count());
-    bc_rows rows = {sizeof rows,         n, n, poses.a.data(), poses.b.data(), poses.size_a.data(),
-                    poses.size_b.data(), n, n, nullptr};
+    // contact: bc_collide_rows
+    bc_rows rows = rows_of(poses);
     double* covariance = patch == BC_VOLUME ? nullptr : found.covariance.data();
     bc_results results = {sizeof results,
                           found.colliding.get(),
@@ -61,60 +67,37 @@ void add(const Poses& poses, size_t calls, bc_model model, bc_patch patch, Conte
     bc_collide_rows(&rows, &query, &results, 1, nullptr);
     // end of call
   };
-  all.push_back({name + ", batch", poses.count(), batch, [=, &found](size_t pair) {
-                   if (pair == 0) batch(0);
-                   return found.separation[pair];
-                 }});
+  all.push_back(batched(name, poses.count(), batch, found.separation.data()));
 }
 
-using Clock = std::chrono::steady_clock;
+void add_distances(const Poses& poses, size_t calls, Contestants& all) {
+  bc_nearest& nearest = *new bc_nearest{};
+  nearest.size = sizeof nearest;
+  auto call = [&poses, &nearest](size_t i) {
+    // distance: bc_distance
+    bc_distance(&poses.box_a[i], &poses.box_b[i], &nearest);
+    // end of call
+    return nearest.distance;
+  };
+  all.push_back(single("bc_distance", calls, call, [&nearest] { return nearest.distance; }));
 
-double nanoseconds(Clock::duration time) {
-  return std::chrono::duration<double, std::nano>(time).count();
-}
-
-// What two readings of the clock take with nothing between them [ns], the least of many.
-double empty_reading() {
-  double least = APART;
-  for (int k = 0; k < 100000; ++k) {
-    Clock::time_point start = Clock::now();
-    least = std::min(least, nanoseconds(Clock::now() - start));
-  }
-  return least;
+  Distances& found = *new Distances(poses.count());
+  auto batch = [&poses, &found](size_t) {
+    // distance: bc_distance_rows
+    bc_rows rows = rows_of(poses);
+    bc_nearest_results results = {sizeof results,        nullptr,
+                                  found.distance.data(), found.normal.data(),
+                                  found.point_a.data(),  found.point_b.data()};
+    bc_distance_rows(&rows, &results, 1, nullptr);
+    // end of call
+  };
+  all.push_back(batched("bc_distance_rows", poses.count(), batch, found.distance.data()));
 }
 
 }  // namespace
 
-void time_each_contact(const Poses& poses, size_t passes) {
-  double clock = empty_reading();
-  bc_query query = bc_default_query();
-  query.patch = BC_COVARIANCE;
-  bc_contact contact;
-  std::vector<double> least[2];
-  for (auto& times : least) times.assign(poses.count(), APART);
-  // Each pass goes through all contacts in another order. No branch is known from the call before, and
-  // no contact comes first each time after a change of model, or of set, when code is not in the cache.
-  std::vector<size_t> order(poses.count());
-  std::iota(order.begin(), order.end(), 0);
-  std::mt19937 random;
-  for (size_t pass = 0; pass < passes; ++pass) {
-    std::shuffle(order.begin(), order.end(), random);
-    for (bc_model model : {BC_EXACT, BC_MLP}) {
-      query.model = model;
-      std::vector<double>& times = least[model == BC_MLP];
-      for (size_t i : order) {
-        bc_box a = poses.box_a[i], b = poses.box_b[i];  // in the cache before the clock starts
-        Clock::time_point start = Clock::now();
-        bc_collide(&a, &b, &query, &contact);
-        times[i] = std::min(times[i], nanoseconds(Clock::now() - start) - clock);
-        kept += contact.separation;
-      }
-    }
-  }
-  for (size_t i = 0; i < poses.count(); ++i) std::printf("%.1f\t%.1f\n", least[0][i], least[1][i]);
-}
-
-void add_ours(const Poses& poses, size_t calls, Contestants& all) {
+void add_ours(Query query, const Poses& poses, size_t calls, Contestants& all) {
+  if (query == Query::distance) return add_distances(poses, calls, all);
   for (bc_model model : {BC_EXACT, BC_MLP})
-    for (bc_patch patch : {BC_VOLUME, BC_COVARIANCE}) add(poses, calls, model, patch, all);
+    for (bc_patch patch : {BC_VOLUME, BC_COVARIANCE}) add_contacts(poses, calls, model, patch, all);
 }

@@ -39,7 +39,7 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
-from ..arguments import model_name, outside_ros_args, program_parser, within
+from ..arguments import model_name, outside_ros_args, program_main, program_parser, within
 from ..core import native
 from ..extras import require
 from ..models.make_model import MODELS
@@ -55,6 +55,7 @@ NICENESS = {NICE: 10, BUSY: 0}  # of loops
 
 
 @exit_on_refusal
+@program_main
 def main(args: Sequence[str] | None = None) -> int:
     """Run the bench; return its exit status."""
     args = sys.argv[1:] if args is None else list(args)

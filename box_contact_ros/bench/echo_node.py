@@ -26,6 +26,7 @@ from rclpy.serialization import serialize_message
 
 from box_contact_msgs.msg import Contact, Contacts
 
+from ..arguments import program_main
 from ..node.messages import make_header
 from ..node.parameters import Setting, declare, flag
 from ..node.runtime import GuardedNode, run_node
@@ -79,6 +80,7 @@ class EchoNode(GuardedNode):
             publisher.publish(with_stamp(message, stamp))
 
 
+@program_main
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM."""
     return run_node(EchoNode, args)

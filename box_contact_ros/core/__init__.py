@@ -46,8 +46,8 @@ SQUARE_SLACK = native.SQUARE_SLACK
 have its covariance."""
 THREADS_MAX = native.THREADS_MAX
 """Most threads that a batch is accepted with."""
-ITERATIONS_MAX = native.ITERATIONS_MAX
-"""Most sub-steps of a step of forces, iterations of a sub-step, and relaxations."""
+SUBSTEPS_MAX = native.SUBSTEPS_MAX
+"""Most sub-steps of a step of forces."""
 DEPTH_FLOOR = native.DEPTH_FLOOR
 """Least depth to which boxes are pressed together before the overlap is taken [of the size]."""
 NETWORK_FORMAT = native.NETWORK_FORMAT

@@ -34,7 +34,7 @@ from visualization_msgs.msg import Marker
 
 from box_contact_msgs.msg import Contacts
 
-from ..arguments import parse_command_line
+from ..arguments import parse_command_line, program_main
 from ..node.messages import make_header, pose_message
 from ..node.parameters import Setting, declare, flag, number, warn_of_unknown
 from ..node.runtime import REFUSALS, GuardedNode, running_node, spin_once
@@ -232,6 +232,7 @@ def verdict(landing: Landing, latencies: Sequence[float], lost: int) -> tuple[bo
                   f'p99 {p99:.2f} ms')
 
 
+@program_main
 def main(args: Sequence[str] | None = None) -> int:
     """Land once; 0 only if the stack carries the load and no answer was lost."""
     parse_command_line('crane', __doc__, PARAMETERS, args)

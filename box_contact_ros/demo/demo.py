@@ -24,7 +24,7 @@ import time
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 
-from ..arguments import model_name, program_parser
+from ..arguments import model_name, program_main, program_parser
 from ..extras import require
 from ..processes import asked_to_end, keep_to_this_host, program, running
 
@@ -35,6 +35,7 @@ NEXT = """
 Next: `make view` shows this in the browser, and README.md how to use the node."""
 
 
+@program_main
 def main(args: Sequence[str] | None = None) -> int:
     """Run the demonstration and return the crane's exit status."""
     parser = program_parser('demo', __doc__)

@@ -1,4 +1,4 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What contacts carry: the forces of patches, and which boxes stand."""
+"""What contacts carry: the forces of patches."""

@@ -27,10 +27,10 @@ from numpy.typing import ArrayLike
 
 from ..core import (
     INERTIA_SLACK,
-    ITERATIONS_MAX,
     LENGTH_MAX,
     MASS_MAX,
     MASS_MIN,
+    SUBSTEPS_MAX,
     THREADS_MAX,
     native,
 )
@@ -210,32 +210,24 @@ class PatchForces:
     """
 
     def __init__(self, bodies: Sequence[Body], *, friction: float = FRICTION, substeps: int = 4,
-                 iterations: int = 4, relaxations: int = 2, threads: int = 1,
-                 most_depth: float = 1e-3, rest: bool = True, rest_speed: float = 1e-4) -> None:
+                 threads: int = 1, most_depth: float = 1e-3, rest: bool = True) -> None:
         """Begin without patches.
 
         friction: Coulomb's μ of pairs without one of their own.
-        substeps: equal parts of the longest step lately, more if 5 ms are exceeded.
-        iterations: of sequential impulses in a sub-step, at most.
-        relaxations: further iterations, which remove the speed of pushing out. Unless answers are
-        late, there are three times as many of both where masses that touch differ tenfold or
-        stacks sway, and up to twelve times the longer they sway.
+        substeps: equal parts of the longest step lately, more if 5 ms are exceeded; up to 1,000.
         threads: at most. They change no bit.
         most_depth: how deep what rests may be [m], where a load is large for the lighter body.
         With contacts of one's own, its island makes up to 64 times as many sub-steps. `loads`
         tells where that is not enough.
         rest: whether bodies at rest are laid down. `advance` then returns their poses as they were
-        given until an input of theirs differs.
-        rest_speed: what is slower for half a second, by its energy, is at rest [m/s].
-        substeps, iterations and relaxations may be 1,000 each.
+        given until an input of theirs differs. At rest is what was slower than 0.1 mm/s, by its
+        energy, for half a second.
         ValueError: names the field and its value.
         """
         self._native = native.PatchForces(
-            *_columns(bodies), as_whole(substeps, 'substeps', 1, ITERATIONS_MAX),
-            as_whole(iterations, 'iterations', 1, ITERATIONS_MAX),
-            as_whole(relaxations, 'relaxations', 0, ITERATIONS_MAX),
+            *_columns(bodies), as_whole(substeps, 'substeps', 1, SUBSTEPS_MAX),
             as_whole(threads, 'threads', 1, THREADS_MAX), as_number(friction, 'friction'),
-            as_number(most_depth, 'most_depth'), as_number(rest_speed, 'rest_speed'), bool(rest))
+            as_number(most_depth, 'most_depth'), bool(rest))
 
     def set_bodies(self, bodies: Sequence[Body]) -> None:
         """Change masses, add bodies at the end, or drop bodies there with their patches."""
@@ -264,7 +256,8 @@ class PatchForces:
         Without contacts, they are one's own: `exact` solves the pairs at the start of each
         `advance`. That needs `set_boxes`, and no poses, age or period. Holding the same pairs at
         each step wakes nobody.
-        A contact whose separation is NaN is stale: the patch of its pair stays.
+        A contact whose separation is NaN is stale: the patch of its pair stays. Contacts of boxes
+        that are of one body by now are passed over.
         friction: μ (k,).
         surface_velocity: (k, 3) of B's surface relative to A's [m/s], as of a belt. That of the
         bodies is added.

@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from ..resources import open_regular
 from ..solver.checks import short_repr
 
 WEIGHT_LIMIT = 1e4
@@ -89,8 +90,7 @@ def _read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Return tensors of credible values and the model card, or raise ValueError."""
     from safetensors import safe_open
 
-    if path.exists() and not path.is_file():  # a pipe would be waited for
-        raise ValueError('it is not a regular file')
+    open_regular(path).close()
     tensors = {}
     with safe_open(path, framework='numpy') as file:
         for name in file.keys():

@@ -19,9 +19,9 @@ MOST_CONTACTS = 4096
 class CheckAnswerer:
     """Answers requests with the scene and the model of a node. It keeps nothing of a request."""
 
-    def __init__(self, solver: SceneSolver, model: str = 'exact') -> None:
-        """Take the scene and the model, by its name too."""
-        self.solver = solver
+    def __init__(self, solver: SceneSolver, model: str = 'exact', epoch: int = 0) -> None:
+        """Take the scene and the model, by its name too, and the node's epoch."""
+        self.solver, self._epoch = solver, epoch
         self._check = SceneCheck(solver, most_near=most_near(model))
         self._kept = KeptMessages(MOST_CONTACTS)
 
@@ -42,7 +42,7 @@ class CheckAnswerer:
         """Fill in contacts; raise ValueError, with field and value, for what is refused."""
         check_frame(request.header.frame_id, self.solver.scene)
         boxes = request.boxes
-        found = self._check(
+        found, areas = self._check(
             [box.name for box in boxes], [pose_of(box) for box in boxes],
             [size_of(box) for box in boxes],
             [(pair.box_a, pair.box_b) for pair in request.pairs], request.margin)
@@ -51,9 +51,10 @@ class CheckAnswerer:
             raise ValueError(f'contacts: {count} pairs touch or are near, and a response has '
                              f'at most {MOST_CONTACTS}: ask for fewer boxes, or name pairs')
         listed, names_of = response.contacts, self._check.names_of
-        listed.header, listed.revision = request.header, self.solver.revision
+        listed.header, listed.epoch = request.header, self._epoch
+        listed.revision = self.solver.revision
         listed.contacts = self._kept.fill([names_of(a, b) for a, b in found.pairs.tolist()],
-                                          found.contacts)
+                                          found.contacts, areas)
         listed.near = near_messages([names_of(a, b) for a, b in found.near_pairs.tolist()],
                                     found.near)
 

@@ -10,6 +10,7 @@ evaluation it publishes contacts (box_contact_msgs/Contacts), and once a second 
 With a scene file: <name>/pose of every box and body that moves, and of every pair
 <pair>/contact/point, <pair>/contact/normal.
 The service ~/check (box_contact_msgs/Check) answers about the boxes of a request, without stamps.
+~/set_boxes changes boxes of the scene, ~/get_boxes tells them, and the topic ~/boxes each change.
 The service ~/reset (std_srvs/Trigger) forgets all poses and stamps.
 It is a lifecycle node that configures and activates itself, unless autostart is false. Its
 parameters are read when it is configured; model, tolerance and max_age may be set while it runs.
@@ -19,7 +20,7 @@ from __future__ import annotations
 import gc
 import sys
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar
 
 from rcl_interfaces.msg import SetParametersResult
@@ -29,12 +30,11 @@ from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
-from rclpy.service_introspection import ServiceIntrospectionState
 from std_srvs.srv import Trigger
 
-from box_contact_msgs.srv import Check, SetBoxes
+from box_contact_msgs.srv import Check, GetBoxes, SetBoxes
 
-from ..arguments import parse_command_line
+from ..arguments import parse_command_line, program_main
 from ..core import LENGTH_MAX
 from ..models.make_model import MODELS, check_model, make_model, most_near
 from ..scene.scene import CONTAINER, Scene, two_boxes
@@ -44,7 +44,7 @@ from ..solver.checks import short_repr
 from ..solver.model import NATIVE
 from ..stream.pairing import PAIRINGS, RESETS
 from ..stream.streams import watched_of
-from . import check, set_boxes
+from . import check, get_boxes, set_boxes
 from .check import CheckAnswerer
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
 from .paced_service import PacedService
@@ -63,10 +63,12 @@ from .parameters import (
 from .rclpy_workarounds import ends_within, lifecycle_state
 from .runtime import END_SECONDS, LOG_SECONDS, GuardedNode, run_node
 from .tick import TickAnswerer
-from .topics import CHANGES, SceneTopics
+from .topics import SceneTopics
 
 NOT_CONFIGURED = 'the node is not configured'
 LONGEST = 1e6  # s, about twelve days
+TICK_SECONDS = 0.1
+"""A report waits so long for a tick, behind which it comes: one takes 0.4 ms."""
 NAMED_TOPICS = 3  # how many pose topics the node names when it is ready
 
 
@@ -154,15 +156,18 @@ class ContactNode(GuardedNode, LifecycleNode):
         self.add_on_set_parameters_callback(self._set_live)
         self._checks = PacedService(self, self.counts, 'checks', (Check, '~/check'), self._check,
                                     check.kind_and_size)
-        changes = PacedService(self, self.counts, 'changes', (SetBoxes, '~/set_boxes'),
-                               self._set_boxes, set_boxes.kind_and_size, in_turn=True)
-        # Who draws the scene follows its changes.
-        changes.service.configure_introspection(self.get_clock(), CHANGES,
-                                                ServiceIntrospectionState.CONTENTS)
+        self._taken: SetBoxes.Request | None = None  # the last request of ~/set_boxes
+        PacedService(self, self.counts, 'changes', (SetBoxes, '~/set_boxes'), self._set_boxes,
+                     set_boxes.kind_and_size, in_turn=True)
+        PacedService(self, self.counts, 'listings', (GetBoxes, '~/get_boxes'), self._get_boxes,
+                     get_boxes.kind_and_size)
         self.create_service(Trigger, '~/reset', self.answered(self._reset, '~/reset'))
         # On a clock of its own: simulated time may stand still.
-        self.create_timer(DIAGNOSTICS_SECONDS, self._report, clock=Clock(
-            clock_type=ClockType.STEADY_TIME))
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(DIAGNOSTICS_SECONDS, self._report_soon, clock=steady)
+        self._is_due = False  # whether a report waits for a tick
+        self._overdue = self.create_timer(TICK_SECONDS, self._report_at_last, clock=steady)
+        self._overdue.cancel()
         self._jumps = self.get_clock().create_jump_callback(
             JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1),
                           on_clock_change=True), post_callback=self._clock_jumped)
@@ -242,6 +247,8 @@ class ContactNode(GuardedNode, LifecycleNode):
             raise
         warn_of_unknown(self, self.parameters)
         self._values, self._topics, self._answerer = values, topics, answerer
+        self._taken = None
+        topics.boxes.publish(set_boxes.boxes_message(answerer.epoch, solver, None))
 
     def _make_solver(self, values: Mapping[str, Any], scene: Scene) -> SceneSolver:
         """Return the solver that checked parameters ask for, or raise ValueError."""
@@ -281,32 +288,54 @@ class ContactNode(GuardedNode, LifecycleNode):
             f'poses{frame} from {", ".join(topics[:NAMED_TOPICS])}'
             f'{f" and {more} more" if more > 0 else ""}')
 
-    def _check(self, request: Check.Request, response: Check.Response) -> Check.Response:
+    def _check(self, request: Check.Request, response: Check.Response) -> Iterable[None]:
         """Answer on the node's scene and model; ticks know nothing of it."""
         if self._answerer is None:
             response.message = NOT_CONFIGURED
-            return response
+            return ()
         if self._check_answerer is None or self._check_answerer.solver is not self._answerer.solver:
-            self._check_answerer = CheckAnswerer(self._answerer.solver, self.model_of(self._values))
-        return self._check_answerer.answer(request, response)
+            self._check_answerer = CheckAnswerer(
+                self._answerer.solver, self.model_of(self._values), self._answerer.epoch)
+        self._check_answerer.answer(request, response)
+        return ()
 
-    def _set_boxes(self, request: SetBoxes.Request, response: SetBoxes.Response,
-                   ) -> SetBoxes.Response:
-        """Change boxes of the scene, all or none; the next poses are answered by the new scene."""
+    def _get_boxes(self, request: GetBoxes.Request, response: GetBoxes.Response) -> Iterable[None]:
+        """Tell some boxes of the scene."""
         if self._answerer is None:
             response.message = NOT_CONFIGURED
-            return response
-        solver = self._answerer.solver
+        else:
+            get_boxes.answer(self._answerer.solver, self._answerer.epoch, request, response)
+        return ()
+
+    def _set_boxes(self, request: SetBoxes.Request, response: SetBoxes.Response,
+                   ) -> Iterator[None]:
+        """Change boxes of the scene, all or none; the next poses are answered by the new scene."""
+        answerer, topics = self._answerer, self._topics
+        if answerer is None or topics is None:
+            response.message = NOT_CONFIGURED
+            return
+        former = answerer.solver
+        response.epoch, response.revision = answerer.epoch, former.revision
+        if self._taken is not None and set_boxes.is_same(request, self._taken):
+            response.success = True
+            return
         try:
-            solver = set_boxes.changed(solver, request)
+            set_boxes.check_expected(request, answerer.epoch, former.revision)
+            solver, response.warnings = yield from set_boxes.changing(former, request)
+            writer = answerer.writer_of(solver)
         except ValueError as error:
             response.message = str(error)
-        else:
-            self._answerer.set_solver(solver)
-            self._monitor.watch(watched_of(solver.scene))
-            response.success = True
-        response.revision = solver.revision
-        return response
+            return
+        yield
+        if self._answerer is not answerer or answerer.solver is not former:
+            response.message = 'the node was configured anew, or took another model, meanwhile'
+            return
+        answerer.set_writer(writer)
+        self._monitor.watch(watched_of(solver.scene))
+        self._taken = request
+        response.success, response.revision = True, solver.revision
+        yield
+        topics.boxes.publish(set_boxes.boxes_message(answerer.epoch, solver, request))
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Forget all poses and stamps: a simulation begins anew."""
@@ -326,8 +355,24 @@ class ContactNode(GuardedNode, LifecycleNode):
             self.get_logger().warning(f'time went back: {cause}; a new time begins',
                                       throttle_duration_sec=LOG_SECONDS)
 
+    def _report_soon(self) -> None:
+        """Report once the next tick is answered: no tick waits for it then. Or without ticks."""
+        self._is_due = True
+        if self._answerer is not None:
+            self._answerer.after = self._report
+        self._overdue.reset()
+
+    def _report_at_last(self) -> None:
+        """Report if no tick came meanwhile. If another callback cancels the timer, rclpy raises."""
+        self._overdue.cancel()
+        if self._is_due:
+            self._report()
+
     def _report(self) -> None:
-        """Publish diagnostics, once a second."""
+        """Publish diagnostics."""
+        self._is_due = False
+        if self._answerer is not None:
+            self._answerer.after = None
         state = lifecycle_state(self)
         if self._answerer is None or self._topics is None:
             self._diagnostics.publish(state=state, values={'pairs': 0})
@@ -360,6 +405,7 @@ def run(node_type: type[ContactNode], doc: str | None, args: Sequence[str] | Non
     return run_node(started, args)
 
 
+@program_main
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM."""
     return run(ContactNode, __doc__, args)

@@ -71,7 +71,8 @@ class TickMonitor:
     """What happened since the last report, by the steady clock [s]."""
 
     def __init__(self) -> None:
-        self.absent: list[str] = []  # the boxes that the last array had no pose of
+        self.absent: list[str] = []  # what moves and the last message had no pose of
+        self.unknown: Sequence[str] = ()  # the names of the last message that move nothing
         self.shared: list[str] = []  # the boxes whose publishers take turns
         self._times: deque[tuple[int, int]] = deque(maxlen=KEPT_TIMES)
         """Time to answer and age of the answer [ns] of the last evaluations."""
@@ -93,8 +94,11 @@ class TickMonitor:
         self._since.clear()
 
     def watch(self, pairs: Sequence[Pair]) -> None:
-        """Ask for other pairs from the next report on."""
-        self._pairs, self._open = pairs, None
+        """Ask for other pairs; those that are new count as answered until the next report."""
+        self._pairs = pairs
+        if self._open:
+            known = set(pairs)
+            self._open = [pair for pair in self._open if pair in known]
 
     def evaluated(self, took: int, age: int, stale: list[Pair]) -> None:
         """Note a tick: the time to answer it and the age of its answer [ns], the pairs left out.
@@ -204,13 +208,17 @@ class Diagnostics:
         only_serves = not summary.has_heard and self._counts['checks answered'] > 0
         unseen = [] if only_serves else [
             box for box in pairing.unseen() if box not in self._monitor.refused_boxes]
-        stale = self._monitor.absent if scene.pose_array else pairing.stale()
+        stale = self._monitor.absent if scene.in_one_message else pairing.stale()
         findings = [] if state != ACTIVE else list(_findings(
             summary, [name.partition(': ')[2] for name in new if name.startswith('refused')],
             unseen, stale, scene, pairing, topics, mostly_alone=new[NO_PARTNER] > new['poses'] / 2))
         sent = (new['poses'] + load.lost) / len(streams_of(scene))
         if state == ACTIVE:
             findings += _lateness(load, sent, new[OVERTAKEN])
+            if self._monitor.unknown:
+                findings.append(Finding(
+                    'unknown', f'names that move nothing: {some_names(self._monitor.unknown)}',
+                    'the scene has no such box or body, or it does not move; ask ~/get_boxes'))
             findings += _rivals(self._monitor.shared, topics,
                                 self._node.get_fully_qualified_name())
         self._log(findings)
@@ -284,7 +292,7 @@ def _rivals(shared: Sequence[str], topics: SceneTopics, name: str) -> Iterator[F
     shared: boxes whose publishers take turns. name: the node's own.
     """
     if shared:
-        yield Finding('shared', f'several publishers: {_some(shared)}',
+        yield Finding('shared', f'several publishers: {some_names(shared)}',
                       f'the poses of all are used; leave one that publishes '
                       f'{topics.pose_topic(shared[0])}')
     if rivals := topics.rivals():
@@ -292,7 +300,8 @@ def _rivals(shared: Sequence[str], topics: SceneTopics, name: str) -> Iterator[F
         if name in rivals:  # services are named after the node
             same_name = f', and either one answers {name}/check'
             each = 'a namespace of its own by -r __ns:=/NAME'
-        yield Finding('rivals', f'others publish {topics.contacts.topic_name}: {_some(rivals)}',
+        yield Finding('rivals',
+                      f'others publish {topics.contacts.topic_name}: {some_names(rivals)}',
                       f'their answers are mixed with those of this node{same_name}; stop all but '
                       f'one, or give each {each}')
 
@@ -307,18 +316,19 @@ def _findings(summary: Summary, refused: Sequence[str], unseen: Sequence[str],
     max_age = 1e-9 * pairing.max_age
     if summary.unanswered:
         pairs = [pair.label for pair in summary.unanswered]
-        yield Finding('unanswered', f'unanswered for {UNANSWERED_SECONDS:g} s: {_some(pairs)}',
+        yield Finding('unanswered', f'unanswered for {UNANSWERED_SECONDS:g} s: {some_names(pairs)}',
                       level=ERROR)
     if refused:
         yield Finding('refused', f'poses refused: {", ".join(refused)}')
     if unseen and (summary.unmatched or (
             not summary.has_heard and summary.quiet >= UNANSWERED_SECONDS)):
         yield Finding('unseen' if summary.has_heard else SILENCE,
-                      f'no pose ever came: {_some(unseen)}',
+                      f'no pose ever came: {some_names(unseen)}',
                       '; '.join(map(topics.why_silent, unseen[:NAMED])))
     if stale:
-        yield Finding('stale', f'stale boxes: {_some(stale)}', '' if (
-            scene.pose_array or not summary.unmatched) else _why_stale(stale[0], pairing, topics))
+        yield Finding('stale', f'stale boxes: {some_names(stale)}', '' if (
+            scene.in_one_message or not summary.unmatched) else
+                      _why_stale(stale[0], pairing, topics))
     if summary.has_heard and 0 < max_age <= summary.quiet:
         yield Finding('stopped', f'poses have stopped: none for {summary.quiet:.0f} s')
     elif (summary.unmatched or mostly_alone) and not (refused or unseen or stale):
@@ -370,7 +380,7 @@ def _period(stamps: np.ndarray) -> float:
     return float(np.median(np.diff(stamps))) if len(stamps) > 1 else math.inf
 
 
-def _some(names: Sequence[str]) -> str:
+def some_names(names: Sequence[str]) -> str:
     """Return the first names, and how many there are besides."""
     more = len(names) - NAMED
     return ', '.join(names[:NAMED]) + (f' and {more} more' if more > 0 else '')

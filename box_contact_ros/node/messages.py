@@ -22,7 +22,7 @@ from box_contact_msgs.msg import Near as NearMessage
 from ..core import native
 from ..scene.scene import Scene
 from ..scene.scene_check import Row
-from ..solver.checks import name_fault
+from ..solver.checks import name_fault, short_repr
 from ..solver.contact import Contacts
 from ..solver.nearest import Nearests
 from ..stream.cdr import CONTACT, NANOSECONDS
@@ -61,13 +61,13 @@ def size_of(box: Box) -> Row:
 def check_frame(frame_id: str, scene: Scene) -> None:
     """Raise ValueError for the frame of a request that is not that of the scene."""
     if fault := name_fault(frame_id):
-        raise ValueError(f'header.frame_id: {fault}')
+        raise ValueError(f'header.frame_id: {short_repr(frame_id)} {fault}')
     if scene.frame_id not in ('', frame_id):
         raise ValueError('header.frame_id: ' + frames_differ(
             'the scene', scene.frame_id, 'the request', frame_id))
 
 
-def set_pose(pose: Any, numbers: np.ndarray) -> None:
+def set_pose(pose: Any, numbers: Sequence[float] | np.ndarray) -> None:
     """Write a pose `x y z qx qy qz qw` into a geometry_msgs/Pose."""
     p, q = pose.position, pose.orientation
     p.x, p.y, p.z, q.x, q.y, q.z, q.w = map(float, numbers)
@@ -94,17 +94,17 @@ class KeptMessages:
         self._messages: list[ContactMessage] = []
         self._covariance = np.zeros((most, 6))  # a row for each message, which refers to it
 
-    def fill(self, names: Sequence[tuple[str, str, str]], contacts: Contacts,
+    def fill(self, names: Sequence[tuple[str, str, str]], contacts: Contacts, areas: np.ndarray,
              ) -> list[ContactMessage]:
         """Return the messages of contacts, by the names of their pair and its boxes.
 
-        They are overwritten by the next call.
+        areas: (k,) by which their faces meet [m²]. The next call overwrites the messages.
         """
         while len(self._messages) < len(names):
             row = self._covariance[len(self._messages)]
             self._messages.append(ContactMessage(covariance=row))
         numbers = native.message_numbers(contacts.point, contacts.normal, contacts.separation,
-                                         contacts.volume, contacts.covariance)
+                                         contacts.volume, contacts.covariance, areas)
         covariance = CONTACT['covariance']
         self._covariance[:len(names)] = numbers[:, -covariance:]
         for message, name, row in zip(self._messages, names, numbers[:, :-covariance].tolist()):

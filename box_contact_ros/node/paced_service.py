@@ -1,16 +1,18 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""A service whose costly requests wait for the ticks."""
+"""A service whose costly requests wait for the ticks, and are answered in steps between them."""
 from __future__ import annotations
 
 import time
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
+from rclpy.qos import QoSProfile
 from rclpy.service import Service
 
 from .rclpy_workarounds import Send, answer_later
@@ -24,6 +26,9 @@ MOST_WAITING = 16
 """Costly requests that wait for the end of a pause."""
 KEPT_TIMES = 4096  # of requests, for a report
 KEPT_KINDS = 256
+REQUESTS = QoSProfile(depth=128)
+"""Of requests, here and at clients: DDS drops what comes while more wait, and its client waits for
+ever."""
 Kind = tuple[Any, ...]
 """Of requests: what decides how much each part of one costs."""
 
@@ -37,26 +42,27 @@ class PacedService:
     """
 
     def __init__(self, node: GuardedNode, counts: Counter[str], what: str, service: tuple[Any, str],
-                 answer: Callable[[Any, Any], Any],
+                 answer: Callable[[Any, Any], Iterable[None]],
                  kind_and_size: Callable[[Any], tuple[Kind, int]], *, in_turn: bool = False,
                  ) -> None:
-        """Serve a service, by its type and name, of a node; `answer` fills in a response.
+        """Serve a service, by its type and name, of a node; `answer` fills in a response in steps.
 
         what: what `counts` calls the requests. in_turn: whether none overtakes another.
         """
         self._counts, self._what = counts, what
-        self._kind_and_size, self._in_turn = kind_and_size, in_turn
+        self._answer, self._kind_and_size, self._in_turn = answer, kind_and_size, in_turn
         self._until = 0.0  # end of the pause, by the steady clock [s]
         self._cheap: dict[Kind, int] = {}
         """Size up to which requests are not costly, of the kinds that came last."""
         self._waiting: deque[tuple[float, Any, Any, Send]] = deque()
-        """When each came [s], and what `_answer` takes."""
+        """When each came [s], and what `_begin` takes."""
+        self._running: Running | None = None
         self._times: deque[float] = deque(maxlen=KEPT_TIMES)  # from taking to answering [s]
-        self._filled = node.answered(answer, service[1])
-        self._timer = node.create_timer(LONG, self._answer_next, clock=Clock(
+        self._next_step = node.answered(self._step, service[1])
+        self._timer = node.create_timer(LONG, self._go_on, clock=Clock(
             clock_type=ClockType.STEADY_TIME))
         self._timer.cancel()
-        self.service: Service = node.create_service(*service, answer)
+        self.service: Service = node.create_service(*service, answer, qos_profile=REQUESTS)
         answer_later(self.service, self._take)
 
     def take_times(self) -> list[float]:
@@ -70,8 +76,9 @@ class PacedService:
         now = time.monotonic()
         kind, size = self._kind_and_size(request)
         is_costly = size > self._cheap.get(kind, 0) or (self._in_turn and self._waiting)
-        if not is_costly or not (self._waiting or now < self._until):
-            self._answer(now, request, response, send)
+        has_to_wait = self._running or (is_costly and (self._waiting or now < self._until))
+        if not has_to_wait:
+            self._begin(now, request, response, send)
         elif len(self._waiting) < MOST_WAITING:
             self._waiting.append((now, request, response, send))
             self._wait()
@@ -81,32 +88,69 @@ class PacedService:
                                 'ask again later')
             send(response)
 
-    def _answer_next(self) -> None:
-        """Answer the first that waits, as its pause is over."""
+    def _go_on(self) -> None:
+        """Do the next step, or begin with the first request that waits, as its pause is over."""
         self._timer.cancel()
-        if self._waiting:
-            self._answer(*self._waiting.popleft())
-        if self._waiting:
+        if self._running:
+            self._run(self._running)
+        elif self._waiting:
+            self._begin(*self._waiting.popleft())
+        if self._running or self._waiting:
             self._wait()
 
     def _wait(self) -> None:
-        """Let the timer end with the pause."""
-        self._timer.timer_period_ns = max(1, round(1e9 * (self._until - time.monotonic())))
+        """Let the timer end now, where ticks that wait are answered before; or with the pause."""
+        pause = 0.0 if self._running else self._until - time.monotonic()
+        self._timer.timer_period_ns = max(1, round(1e9 * pause))
         self._timer.reset()
 
-    def _answer(self, came: float, request: Any, response: Any, send: Send) -> None:
-        """Answer a request that came at a time [s]."""
+    def _begin(self, came: float, request: Any, response: Any, send: Send) -> None:
+        """Begin to answer a request that came at a time [s]."""
+        self._running = Running(came, request, response, send)
+        self._run(self._running)
+        if self._running:
+            self._wait()
+
+    def _run(self, running: Running) -> None:
+        """Do one step of an answer; send it after the last one."""
         began, used = time.monotonic(), time.thread_time()
-        response = self._filled(request, response)
-        send(response)
+        response = self._next_step(running.request, running.response)
+        if response is not None:
+            self._running = None
+            running.send(response)
         ended = time.monotonic()
+        running.wall += ended - began
+        running.cost += time.thread_time() - used
+        if response is None:
+            return
         self._counts[f'{self._what} {"answered" if response.success else "refused"}'] += 1
-        self._times.append(ended - came)
-        kind, size = self._kind_and_size(request)
+        self._times.append(ended - running.came)
+        kind, size = self._kind_and_size(running.request)
         cheap = max(self._cheap.pop(kind, 0), size)
-        if ended - began > COSTLY and (cost := time.thread_time() - used) > COSTLY:
-            self._until = ended + PAUSE * (ended - began)
-            cheap = int(size * COSTLY / cost)
+        if running.cost > COSTLY:
+            self._until = ended + PAUSE * running.wall
+            cheap = int(size * COSTLY / running.cost)
         self._cheap[kind] = cheap  # the newest comes last
         if len(self._cheap) > KEPT_KINDS:
             del self._cheap[next(iter(self._cheap))]
+
+    def _step(self, request: Any, response: Any) -> Any:
+        """Return the response after the last step, else None."""
+        running = self._running
+        assert running is not None
+        if running.steps is None:
+            running.steps = iter(self._answer(request, response))
+        return next(running.steps, response)
+
+
+@dataclass(slots=True)
+class Running:
+    """A request that is being answered."""
+
+    came: float  # [s]
+    request: Any
+    response: Any
+    send: Send
+    steps: Iterator[None] | None = None  # those that are left
+    wall: float = 0.0  # time of the steps so far [s]
+    cost: float = 0.0  # processor time of these [s]

@@ -13,6 +13,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..arguments import program_main
 from ..extras import require
 from ..models.make_model import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
 from .contact_node import PARAMETERS as CONTACT_PARAMETERS
@@ -40,6 +41,7 @@ class SoupNode(ContactNode):
         return f'soup-{values["divisions"]}'
 
 
+@program_main
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM."""
     return run(SoupNode, __doc__, args)

@@ -12,6 +12,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import partial
+from random import randrange
 from typing import Any
 
 import numpy as np
@@ -20,15 +21,14 @@ from ..scene.scene_solver import SceneSolver
 from ..solver.checks import absent_poses, are_poses, pose_fault
 from ..stream.cdr import NANOSECONDS, MessageError
 from ..stream.pairing import OVERTAKEN, PAIRINGS, Pairing, StampedPose, TickPoses
-from ..stream.read_poses import read_pose, read_poses
+from ..stream.read_poses import NamedPoses, read_pose, read_poses
 from ..stream.streams import ALL_BOXES
 from ..stream.write_contacts import TickWriter
-from .diagnostics import TickMonitor
+from .diagnostics import TickMonitor, some_names
 from .parameters import reason_of
 from .topics import PoseCallback, SceneTopics
 
-FORMER_LENGTHS = 16
-"""Of arrays of poses that are answered while boxes come that move."""
+UNKNOWN_NAMES = 'unknown names'
 
 
 class PoseQueue:
@@ -96,35 +96,40 @@ class TickAnswerer:
     """Answers ticks of poses; every pose that is refused is counted and noted, never answered.
 
     active: poses that arrive while the node is not active are dropped.
+    after: is called when a tick was answered, and the next one is still far.
     """
 
     def __init__(self, solver: SceneSolver, topics: SceneTopics, settings: Mapping[str, Any],
                  counts: Counter[str], monitor: TickMonitor) -> None:
         """Begin without poses; `settings` are the checked parameters."""
         self._topics, self._monitor, self._counts = topics, monitor, counts
-        self._writers: dict[int, TickWriter] = {}
-        """Of the last scenes, by the number of poses in an array. The newest comes last."""
+        self.epoch = randrange(1, 2**32)
+        """Of this configuration of the node: its revisions begin at 0."""
         self.pairing: Pairing = PAIRINGS[settings['pairing']](solver.scene, counts=counts)
         self.set_solver(solver)
         self.set_times(settings)
         self._queues: dict[str, PoseQueue] = {}  # by box
         self.active = False
+        self.after: Callable[[], None] | None = None
 
     @property
     def solver(self) -> SceneSolver:
-        """Return the solver of the newest scene."""
-        return next(reversed(self._writers.values())).solver
+        """Return the solver of the scene."""
+        return self._writer.solver
 
     def set_solver(self, solver: SceneSolver) -> None:
-        """Answer by another solver, whose scene may have other boxes.
+        """Answer by another solver, whose scene may have other boxes."""
+        self.set_writer(self.writer_of(solver))
 
-        Arrays of former lengths, which may be on their way, are answered by former ones.
-        """
-        self._writer = TickWriter(solver, self._topics.of_pair)  # of the next tick
-        self._writers[len(solver.moving)] = self._writer
-        if len(self._writers) > FORMER_LENGTHS:
-            del self._writers[next(iter(self._writers))]
-        self.pairing.set_partners(solver.scene)
+    def writer_of(self, solver: SceneSolver) -> TickWriter:
+        """Return what `set_writer` takes."""
+        return TickWriter(solver, self._topics.of_pair, self.epoch)
+
+    def set_writer(self, writer: TickWriter) -> None:
+        """Answer by another writer from the next tick on."""
+        self._writer, scene = writer, writer.solver.scene
+        self._named = NamedPoses(scene.moving)
+        self.pairing.set_partners(scene)
 
     def set_times(self, settings: Mapping[str, Any]) -> None:
         """Take `tolerance` and `max_age` of checked parameters [s]."""
@@ -155,6 +160,8 @@ class TickAnswerer:
                     self._answer(tick, arrived)
                 except Exception as error:  # one tick that is refused keeps back no other
                     self._refuse(error, topic)
+            if ticks and self.after:
+                self.after()
         return callback
 
     def take_lost(self) -> int:
@@ -165,16 +172,18 @@ class TickAnswerer:
 
     def _read_all(self, data: bytes) -> StampedPose:
         """Return the poses of all that moves; a bad one is counted, and its name absent."""
-        poses = read_poses(data)
-        count = len(poses.numbers)
-        if count not in self._writers:
-            raise MessageError('wrong number of poses',
-                               f'{count} poses, but {len(self.solver.moving)} boxes and bodies '
-                               'move')
-        while count != next(iter(self._writers)):  # whoever sends them knows of the change
-            del self._writers[next(iter(self._writers))]
-        self._writer = self._writers[count]
-        moving = self._writer.solver.moving
+        moving = self.solver.moving
+        if self.solver.scene.poses == 'named':
+            poses = self._named(data)
+            self._monitor.unknown = self._named.unknown
+            if self._named.unknown:
+                self._counts[UNKNOWN_NAMES] += len(self._named.unknown)
+        else:
+            poses = read_poses(data)
+            if len(poses.numbers) != len(moving):
+                raise MessageError('wrong number of poses',
+                                   f'{len(poses.numbers)} poses, but {len(moving)} move: '
+                                   f'{some_names(moving)}')
         missing = np.flatnonzero(~are_poses(poses.numbers))
         for row in missing[~absent_poses(poses.numbers[missing])]:
             self._refuse(MessageError('bad pose', f'{pose_fault(poses.numbers[row])}'), moving[row])
@@ -197,7 +206,7 @@ class TickAnswerer:
         # What nobody waits for comes last. A box that an array leaves out is not there: nobody
         # asks for its pairs.
         age, scene = time.time_ns() - arrived if arrived else 0, self._writer.solver.scene
-        open_pairs = [] if scene.pose_array else [scene.pair_of(*boxes) for boxes in stale]
+        open_pairs = [] if scene.in_one_message else [scene.pair_of(*boxes) for boxes in stale]
         self._monitor.evaluated(took, age, open_pairs)
         counts = self._counts
         counts['contacts'] += touching

@@ -22,8 +22,9 @@ from rclpy.qos import (
 )
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
+from sensor_msgs.msg import MultiDOFJointState
 
-from box_contact_msgs.msg import Contacts
+from box_contact_msgs.msg import Boxes, Contacts
 
 from ..scene.scene import Pair, Scene
 from ..solver.checks import short_repr
@@ -34,9 +35,8 @@ MOST_PAIRS_WITH_TOPICS = 1000
 """Two publishers a pair take milliseconds and memory, here and in every process that listens."""
 DEEP_RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 """Of a client: what the DDS layer delivers while Python is busy must not push out the rest."""
-CHANGES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""Of the events of ~/set_boxes, two a request: who draws the scene later hears of the last 50, too.
-Of requests of 100,000 boxes, which are refused, more would take gigabytes."""
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""Of ~/boxes: who subscribes later hears of the last change."""
 CONTACT_DEPTH = 10
 POSE_DEPTH = 100
 """Poses that wait: 100 ms at 1 kHz, longer than any collection of garbage."""
@@ -54,6 +54,11 @@ def pose_qos(source: str) -> QoSProfile:
     """
     return QoSProfile(depth=ARRAY_DEPTH if source == ALL_BOXES else POSE_DEPTH,
                       reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+def pose_type(scene: Scene) -> type:
+    """Return the type of the messages that have the poses of a scene."""
+    return {'topics': PoseStamped, 'array': PoseArray, 'named': MultiDOFJointState}[scene.poses]
 
 
 def contact_qos() -> QoSProfile:
@@ -75,8 +80,8 @@ QOS_OVERRIDES = QoSOverridingOptions.with_default_policies(callback=_check_depth
 class SceneTopics:
     """The topics of a node from configure to cleanup.
 
-    contacts: the publisher of all contacts. of_pair: those of point and normal, by the names of the
-    boxes of a pair. Empty without topics of their own.
+    contacts: the publisher of all contacts. boxes: that of changes of the scene. of_pair: those of
+    point and normal, by the names of the boxes of a pair. Empty without topics of their own.
     """
 
     def __init__(self, node: Node, prefix: str, scene: Scene, *, pair_topics: bool) -> None:
@@ -103,6 +108,7 @@ class SceneTopics:
         self.of_pair: dict[tuple[str, str], tuple[Publisher, Publisher]] = {}
         self.contacts = self._publisher(Contacts, f'{prefix}contacts',
                                         qos_overriding_options=QOS_OVERRIDES)
+        self.boxes = self._publisher(Boxes, '~/boxes', LATCHED)
         for pair in pairs:
             point, normal = self._topics_of(pair)
             self.of_pair[pair.a, pair.b] = (self._publisher(PointStamped, point),
@@ -113,7 +119,7 @@ class SceneTopics:
         for box, topic in topics_of(scene).items():
             with qos_refusals(self._node, topic):
                 self._subscriptions[box] = self._node.create_subscription(
-                    PoseArray if box == ALL_BOXES else PoseStamped, topic,
+                    pose_type(scene), topic,
                     with_info(callback_of(box, topic)), pose_qos(box), raw=True,
                     event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
                     qos_overriding_options=QOS_OVERRIDES)
@@ -122,7 +128,8 @@ class SceneTopics:
         """Destroy all topics."""
         for subscription in self._subscriptions.values():
             self._node.destroy_subscription(subscription)
-        for publisher in (self.contacts, *(each for two in self.of_pair.values() for each in two)):
+        of_pairs = (each for two in self.of_pair.values() for each in two)
+        for publisher in (self.contacts, self.boxes, *of_pairs):
             self._node.destroy_publisher(publisher)
         self._subscriptions.clear()
         self.of_pair.clear()
@@ -155,27 +162,39 @@ class SceneTopics:
         """Return who publishes on the topic of a box that gives no pose."""
         subscription = self._subscriptions[box]
         topic, message = subscription.topic_name, subscription.msg_type
-        wanted = message.__name__  # type: ignore[attr-defined]
+        name = message.__name__  # type: ignore[attr-defined]
+        wanted = f'{message.__module__.partition(".")[0]}/msg/{name}'
         offers = self._node.get_publishers_info_by_topic(topic)
         if not offers:
-            return f'nobody publishes {topic}'
+            elsewhere = self._elsewhere(topic)
+            return f'nobody publishes {topic}' + (
+                f', but {elsewhere} is published: remap the one to the other' if elsewhere else '')
         for offer in offers:
-            if offer.topic_type != f'geometry_msgs/msg/{wanted}':
+            if offer.topic_type != wanted:
                 return (f'{topic} is published as {short_repr(offer.topic_type)}, not as '
-                        f'geometry_msgs/msg/{wanted}')
+                        f'{wanted}')
             fits, reason = qos_check_compatible(offer.qos_profile, subscription.qos_profile)
             if fits == QoSCompatibility.ERROR:
                 return f'{topic} is published with another quality of service: {reason}'
-        return f'{topic} has {len(offers)} of {wanted}, silent so far'
+        return f'{topic} has {len(offers)} of {name}, silent so far'
+
+    def _elsewhere(self, topic: str) -> str:
+        """Return a published topic with more or fewer namespaces before it, or ''."""
+        for name, _ in sorted(self._node.get_topic_names_and_types()):
+            if name != topic and (name.endswith(topic) or topic.endswith(name)) and (
+                    self._node.count_publishers(name)):
+                return str(name)
+        return ''
 
     def _topics_of(self, pair: Pair) -> tuple[str, str]:
         topic = f'{self._prefix}{pair.name}{"/" if pair.name else ""}contact'
         return f'{topic}/point', f'{topic}/normal'
 
-    def _publisher(self, message: type, topic: str, **options: Any) -> Publisher:
+    def _publisher(self, message: type, topic: str, qos: QoSProfile | None = None, **options: Any,
+                   ) -> Publisher:
         # Without events: an event that waits in EventsExecutor outlives a publisher that is
         # destroyed, and ends the process.
         with qos_refusals(self._node, topic):
             return self._node.create_publisher(
-                message, topic, contact_qos(),
+                message, topic, qos or contact_qos(),
                 event_callbacks=PublisherEventCallbacks(use_default_callbacks=False), **options)

@@ -40,9 +40,13 @@ FIRST_ON_DECK, LAST_BASE = 80, 84
 """Tiers: what is on deck, and the highest on which a stack may begin without one beside it."""
 SLAB = 0.1  # thickness [m]
 SHIP = 'ship'
-UNITS = {'KGM': 1.0, 'LBR': 0.45359237, 'TNE': 1000.0}
+UNITS = {'KGM': 1.0, 'KG': 1.0, 'T': 1000.0, 'LBR': 0.45359237, 'TNE': 1000.0}
 """Of masses [kg]."""
-HEAVIEST = 60e3  # [kg] of a container with its goods; the standard allows 36 t
+LIGHTEST, HEAVIEST = 1e3, 60e3
+"""[kg] of a container with its goods. An empty 10 ft has 1.3 t, and the standard allows 36 t. What
+is below may have been written with a mark of thousands, or in tonnes."""
+NOT_STOWED = '9999999'
+"""The slot of a container that has none yet."""
 GROSS = ('WT', 'VGM', 'G', 'AET')
 """What MEA calls the mass of a container with its goods; VGM is that which was weighed."""
 OVERS = {'5': 'in front', '6': 'behind', '7': 'on the right', '8': 'on the left', '9': 'in height'}
@@ -61,6 +65,7 @@ class Stowed:
     mass: str = ''
     is_weighed: bool = False
     over: list[str] = field(default_factory=list)
+    is_container: bool = True  # else breakbulk
 
     @property
     def name(self) -> str:
@@ -102,7 +107,8 @@ def read_baplie(text: str) -> Plan:
     if not rows:
         raise ValueError('it has no container: neither LOC+147 nor EQD+CN')
     faults = list(cuts(parts))
-    return stow(checked(rows, faults), faults)
+    boxes, left_out = checked(rows, faults)
+    return stow(boxes, left_out, faults)
 
 
 def part(segment: list[str], place: int) -> str:
@@ -148,8 +154,9 @@ def containers(parts: Iterable[list[str]]) -> Iterator[Stowed]:
                     yield row
                 row = Stowed()
             if is_slot:
-                row.slot = _shown(part(segment, 2).split(':')[0])
+                row.slot = _shown(part(segment, 2).split(':')[0]).strip()
             else:
+                row.is_container = part(segment, 1) != 'BB'
                 row.number = _shown(part(segment, 2).split(':')[0])
                 row.kind = _shown(part(segment, 3).split(':')[0])
         elif row and tag == 'MEA':
@@ -208,23 +215,36 @@ class Placed:
         return self.tier >= FIRST_ON_DECK
 
 
-def checked(rows: Iterable[Stowed], faults: list[Fault]) -> list[Placed]:
-    """Return the containers that can be placed, and add what is wrong with the others."""
+Slot = tuple[int, int, int]  # bay, row, tier
+
+
+def checked(rows: Iterable[Stowed], faults: list[Fault]) -> tuple[list[Placed], list[Slot]]:
+    """Return the containers that can be placed, and the slots of others; add what is wrong."""
+    rows = list(rows)
     placed: dict[str, Placed] = {}
     slot_of: dict[str, str] = {}
     unknown: dict[str, list[str]] = defaultdict(list)
     forms: dict[int, list[str]] = defaultdict(list)
+    not_stowed, breakbulk = [], []
+    if all(re.fullmatch(f'[0-9]{{6}}|{NOT_STOWED}|', row.slot) for row in rows):  # BBRRTT
+        for row in rows:
+            row.slot = row.slot.rjust(7, '0') if row.slot else ''
     for row in rows:
         size = extents_of(row.kind)
         if row.over:
             faults.append(Fault('dimension', (row.name,), f'reaches beyond its container, which is '
-                                                          f'not judged: {", ".join(row.over)}'))
-        if not re.fullmatch('[0-9]{7}', row.slot):
+                                                          f'not judged: {", ".join(row.over)}',
+                                lacks='shape'))
+        if row.slot == NOT_STOWED:
+            not_stowed.append(row.number or row.slot)
+        elif not row.is_container:
+            breakbulk.append(row)
+        elif not re.fullmatch('[0-9]{7}', row.slot):
             forms[len(row.slot)].append(row.name)
         elif row.slot in placed:
             faults.append(Fault('twice', (row.slot,), f'{row.number or "a container"} has the slot '
                                                       f'of {placed[row.slot].number or "another"}: '
-                                                      'left out'))
+                                                      'left out', lacks='place'))
         elif size is None:
             unknown[row.kind].append(row.slot)
         else:
@@ -232,8 +252,7 @@ def checked(rows: Iterable[Stowed], faults: list[Fault]) -> list[Placed]:
             if other != row.slot:
                 faults.append(Fault('twice', (row.slot,), f'{row.number} is at {other}, too'))
             mass = _mass(row, faults)
-            placed[row.slot] = Placed(row.slot, row.number, int(row.slot[:3]),
-                                      int(row.slot[3:5]), int(row.slot[5:]), size, mass)
+            placed[row.slot] = Placed(row.slot, row.number, *_numbers(row.slot), size, mass)
     for count, names in forms.items():
         faults.append(Fault('slot', tuple(names), (
             f'slots of {count} characters are not known, only 7 digits (bay, row, tier)' if count
@@ -242,15 +261,28 @@ def checked(rows: Iterable[Stowed], faults: list[Fault]) -> list[Placed]:
         faults.append(Fault('size type', tuple(names), (
             f'of the type {kind} no size is known' if kind else 'without a size type (EQD)')
             + ': left out'))
+    if not_stowed:
+        faults.append(Fault('slot', tuple(not_stowed), f'not stowed ({NOT_STOWED}): left out'))
+    if breakbulk:
+        faults.append(Fault('slot', tuple(row.name for row in breakbulk), 'breakbulk (EQD+BB), of '
+                            'which no size is known: left out'))
     if not placed:
         fault = next(fault for fault in faults if fault.kind in ('slot', 'size type'))
         raise ValueError(f'no container can be placed; {fault.kind} {fault.names[0]}: {fault.text}')
-    return sorted(placed.values(), key=lambda box: (box.tier, box.slot))
+    left_out = [row.slot for row in breakbulk] + [slot for some in unknown.values()
+                                                  for slot in some]
+    return sorted(placed.values(), key=lambda box: (box.tier, box.slot)), [
+        _numbers(slot) for slot in left_out if re.fullmatch('[0-9]{7}', slot)]
+
+
+def _numbers(slot: str) -> Slot:
+    return int(slot[:3]), int(slot[3:5]), int(slot[5:])
 
 
 def _mass(row: Stowed, faults: list[Fault]) -> float:
     """Return the mass [kg] of a container; 0 where the file has none. What is odd is a fault."""
     unit, _, number = row.mass.partition(':')
+    unit = unit.strip()
     number = number.split(':')[0].strip()
     mass, fault = 0.0, ''
     if not row.mass:
@@ -263,26 +295,37 @@ def _mass(row: Stowed, faults: list[Fault]) -> float:
         mass = UNITS[unit] * float(number)
         if mass == 0.0:
             fault = 'its weight is 0'
+        elif mass < LIGHTEST:
+            fault = (f'its weight is {number} {unit}, less than any container: thousands may be '
+                     'meant')
         elif mass > HEAVIEST:
             fault = f'its weight is {number} {unit}, more than any container'
     if fault:
-        faults.append(Fault('mass', (row.slot,), fault))
+        faults.append(Fault('mass', (row.slot,), fault, lacks='sure weight' if mass else 'weight'))
     return mass
 
 
-def stow(boxes: list[Placed], faults: list[Fault]) -> Plan:
-    """Return the plan of containers, sorted from below to above, with what carries them."""
+def stow(boxes: list[Placed], left_out: list[Slot], faults: list[Fault]) -> Plan:
+    """Return the plan of containers, sorted from below to above, with what carries them.
+
+    left_out: what is there too, and is not placed.
+    """
     size = np.array([box.size for box in boxes])
     x, y = grid(boxes)
     pose = np.zeros((len(boxes), 7))
     pose[:, :2], pose[:, 6] = np.stack((x, y), axis=1), 1.0
-    lowest = [n for on_deck in (False, True) for n in _stack(boxes, on_deck, size, pose, faults)]
+    held: list[int] = []
+    lowest = [n for on_deck in (False, True)
+              for n in _stack(boxes, left_out, on_deck, size, pose, held, faults)]
+    if held:
+        faults.append(Fault('slot', tuple(boxes[n].slot for n in held), 'stands on what is left '
+                            'out: taken as fixed, and not judged', lacks='judgement'))
     slabs, below = size[lowest].copy(), pose[lowest].copy()
     slabs[:, 2] = SLAB
     below[:, 2] -= (size[lowest, 2] + SLAB) / 2.0
     masses = np.r_[[box.mass for box in boxes], np.zeros(len(lowest))]
     return Plan(np.vstack((size, slabs)), np.vstack((pose, below)), masses,
-                ground=np.arange(len(boxes), len(boxes) + len(lowest)),
+                ground=[*held, *range(len(boxes), len(boxes) + len(lowest))],
                 names=[box.slot for box in boxes] + [SHIP] * len(lowest), faults=faults)
 
 
@@ -301,9 +344,13 @@ def grid(boxes: list[Placed]) -> tuple[np.ndarray, np.ndarray]:
     return x, ROW * np.where(row % 2 == 1, aside, -aside)
 
 
-def _stack(boxes: list[Placed], on_deck: bool, size: np.ndarray, pose: np.ndarray,
-           faults: list[Fault]) -> list[int]:
-    """Write heights, in the hold or on deck; return what is on the ship, and add the gaps."""
+def _stack(boxes: list[Placed], left_out: list[Slot], on_deck: bool, size: np.ndarray,
+           pose: np.ndarray, held: list[int], faults: list[Fault]) -> list[int]:
+    """Write heights, in the hold or on deck; return what is on the ship, and add the gaps.
+
+    held: gets what is on something that is left out.
+    """
+    missing = _by_row(left_out, on_deck)
     stacks: dict[tuple[int, int], list[int]] = defaultdict(list)
     bases: dict[int, set[int]] = defaultdict(set)  # tiers on which stacks of a bay begin
     lowest, left, right = [], pose[:, 0] - size[:, 0] / 2.0, pose[:, 0] + size[:, 0] / 2.0
@@ -321,8 +368,13 @@ def _stack(boxes: list[Placed], on_deck: bool, size: np.ndarray, pose: np.ndarra
         below = [m for m in near if left[m] < right[n] and left[n] < right[m]
                  and boxes[m].tier < box.tier]
         stacks[blocks[n], box.row].append(n)
-        if below:
-            top = max(boxes[m].tier for m in below)
+        top = max((boxes[m].tier for m in below), default=0)
+        if any(abs(bay - box.bay) <= 1 and top <= tier < box.tier
+               for bay, tier in missing[box.row]):
+            held.append(n)
+            floor = max((pose[m, 2] + size[m, 2] / 2.0 for m in below), default=high + TIER * (
+                box.tier - low) / 2.0) + TIER * (box.tier - 2 - top) / 2.0 * bool(below)
+        elif below:
             floor = max(pose[m, 2] + size[m, 2] / 2.0 for m in below)
             if box.tier - 2 > top:
                 floor += TIER * (box.tier - 2 - top) / 2.0
@@ -338,7 +390,16 @@ def _stack(boxes: list[Placed], on_deck: bool, size: np.ndarray, pose: np.ndarra
             elif box.tier > min(begun, default=box.tier):
                 faults.append(Fault('slot', (box.slot,), (
                     f'begins a stack, as others of its bay do at tier {min(begun)}: taken as on '
-                    'the ship')))
+                    'the ship'), verdict='sound', lacks=''))
             bases[blocks[n]].add(box.tier)
         pose[n, 2] = floor + size[n, 2] / 2.0
     return lowest
+
+
+def _by_row(slots: list[Slot], on_deck: bool) -> dict[int, list[tuple[int, int]]]:
+    """Return bays and tiers of slots, in the hold or on deck, by row."""
+    found: dict[int, list[tuple[int, int]]] = defaultdict(list)
+    for bay, row, tier in slots:
+        if (tier >= FIRST_ON_DECK) == on_deck:
+            found[row].append((bay, tier))
+    return found

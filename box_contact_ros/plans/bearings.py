@@ -4,15 +4,13 @@
 """Where patches bear: all over, or at the corners of a box, as containers do."""
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..solver.faces import FacePatches
 from ..solver.pose import rotation_matrix
 
-NEGLIGIBLE = 1e-9
-"""Share of a patch's stiffness that a point may lack: of triangles with an edge of a micron."""
 CASTING = 0.178
 """Length of a corner casting [m] (ISO 1161): as far apart two of them still meet."""
 FORTY_FEET = 12.192
@@ -29,6 +27,10 @@ class Bearings:
     """(k, m) 0 where no point is: an area [m²] of a face, a share of the patch's of a corner."""
     hull: np.ndarray
     """(k, h, 3) the first points, which span the others; some may come twice [m]."""
+
+    def in_frame(self, axes: np.ndarray) -> Bearings:
+        """Return the same in a frame with these axes, as rows (3, 3)."""
+        return replace(self, point=self.point @ axes.T, hull=self.hull @ axes.T)
 
 
 def on_faces(patches: FacePatches) -> Bearings:
@@ -47,11 +49,11 @@ def on_faces(patches: FacePatches) -> Bearings:
 
 
 def on_corners(sizes: np.ndarray, poses: np.ndarray, carried_by: np.ndarray, normal: np.ndarray,
-               patches: FacePatches, slack: float, fixed: np.ndarray) -> Bearings:
-    """Return the corners of the upper boxes that are within patches, up to `slack` [m].
+               patches: FacePatches, slack: np.ndarray, fixed: np.ndarray) -> Bearings:
+    """Return the corners of the upper boxes that are within patches, up to `slack` (k,) [m].
 
-    Only where the lower box has a casting, but that `fixed` ones bear everywhere. Where there are
-    none, they are those of the lower box, and else those of the rectangle.
+    Only where the lower box has a casting, but that `fixed` ones (n,) bear everywhere. Where there
+    are none, they are those of the lower box, and else those of the rectangle.
     """
     point = patches.rectangle.copy()
     within = np.ones(point.shape[:2], bool)
@@ -96,7 +98,7 @@ def _on_castings(points: np.ndarray, sizes: np.ndarray, poses: np.ndarray, norma
     return ends.all(axis=2)
 
 
-def _inside(points: np.ndarray, patches: FacePatches, normal: np.ndarray, slack: float,
+def _inside(points: np.ndarray, patches: FacePatches, normal: np.ndarray, slack: np.ndarray,
             ) -> np.ndarray:
     """Return which points (k, p, 3) are within polygons, along their normals (k, p)."""
     corner = patches.polygon[:, None]
@@ -104,4 +106,4 @@ def _inside(points: np.ndarray, patches: FacePatches, normal: np.ndarray, slack:
     inward = np.cross(normal[:, None, None], edge)
     length = np.linalg.norm(inward, axis=3)
     depth = ((points[:, :, None] - corner) * inward).sum(axis=3)
-    return (depth >= -slack * length).all(axis=2)
+    return (depth >= -slack[:, None, None] * length).all(axis=2)

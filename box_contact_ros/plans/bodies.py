@@ -16,14 +16,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ..solver.checks import pose_fault, size_fault
-from ..solver.contacts_of import contacts_of
+from ..solver.contacts_of import TooManyNear, contacts_of
 from ..solver.faces import TOLERANCE
 from ..solver.pose import rotation_matrix
+from .crowd import crowd, deepest_of, most_near
 from .packing import slab_below
 from .plan import Fault, Plan
 
 NEAR = 0.1
 """Up to this separation [m], pairs that may not touch are named in the plan."""
+UNMOVED = {'verdict': 'sound', 'lacks': ''}
+"""Of the fault that a shape is no box, where nothing moves."""
 HERE = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 
 
@@ -80,18 +83,21 @@ def plan_of_bodies(solids: Sequence[Solid], fixed: set[Hashable],
     solids = [_as_slab(solid, [solids[n] for n in boxes]) if solid.kind == 'plane' else solid
               for solid in solids]
     kept = [n for n, solid in enumerate(solids) if solid.kind in ('box', 'plane')]
-    pairs, touches = _near(solids, fixed)
+    pairs, touches = _near(solids, fixed, lambda a, b: may_touch(places[a], places[b]), faults)
     shapes = [solid for solid in solids if solid.kind not in ('box', 'plane')]
     if shapes:
         counts = Counter(solid.kind for solid in shapes)
+        moves = any(solid.body not in fixed for solid in solids)
         faults.append(Fault('shape', tuple(solid.name for solid in shapes), ', '.join(
-            f'{count} {kind}' for kind, count in counts.items()) + ': no box, so left out'))
+            f'{count} {kind}' for kind, count in counts.items()) + ': no box, so left out', **(
+                {} if moves else UNMOVED)))
     unjudged = _unjudged(solids, pairs[touches], fixed, may_touch, places,
                          is_whole and all(solid.size is not None for solid in shapes))
     if unjudged:
         faults.append(Fault('shape', tuple(
             solids[n].name for n in boxes if solids[n].body in unjudged),
-            'touches, or is joined to, what is no box: taken as fixed, and not judged'))
+            'touches, or is joined to, what is no box: taken as fixed, and not judged',
+            lacks='judgement'))
     fixed = fixed | unjudged
     row_of = {n: row for row, n in enumerate(kept)}
     apart = [(row_of[a], row_of[b]) for a, b in pairs.tolist()
@@ -133,15 +139,31 @@ def _as_slab(plane: Solid, boxes: Sequence[Solid]) -> Solid:
     return plane._replace(size=tuple(size), pose=within(plane.pose, pose))
 
 
-def _near(solids: Sequence[Solid], fixed: set[Hashable]) -> tuple[np.ndarray, np.ndarray]:
-    """Return pairs (k, 2) of solids of two bodies that are near, and which of them touch (k,)."""
+def _near(solids: Sequence[Solid], fixed: set[Hashable], may_touch: Callable[[int, int], bool],
+          faults: list[Fault]) -> tuple[np.ndarray, np.ndarray]:
+    """Return pairs (k, 2) of solids of two bodies that are near, and which of them touch (k,).
+
+    Of too many, they are those that touch; of still too many, a fault is added, and none returned.
+    """
     known = np.array([n for n, solid in enumerate(solids) if solid.size is not None], int)
     if len(known) < 2:
         return np.zeros((0, 2), int), np.zeros(0, bool)
     sizes = np.array([solids[n].size for n in known], float)
     poses = np.array([solids[n].pose for n in known])
-    rows, contacts = contacts_of(sizes, poses, margin=NEAR,
-                                 fixed=[solids[n].body in fixed for n in known])
+    is_fixed = [solids[n].body in fixed for n in known]
+    for margin in NEAR, TOLERANCE:
+        try:
+            rows, contacts = contacts_of(sizes, poses, margin=margin, fixed=is_fixed,
+                                         most_near=most_near(len(known)))
+            break
+        except TooManyNear as error:
+            some = error.pairs
+    else:
+        deep = deepest_of(sizes, poses, some, lambda a, b: (
+            solids[known[a]].body != solids[known[b]].body and may_touch(known[a], known[b])),
+            TOLERANCE)[0]
+        faults.append(crowd([solids[n].name for n in known[deep[:1]].ravel()], len(known)))
+        return np.zeros((0, 2), int), np.zeros(0, bool)
     own = np.array([solids[a].body == solids[b].body for a, b in known[rows].tolist()], bool)
     return known[rows[~own]], contacts.separation[~own] <= TOLERANCE
 

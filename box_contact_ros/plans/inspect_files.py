@@ -4,8 +4,8 @@
 """Is a plan sound? A line for each fault, the worst first, and one for the whole plan.
 
 It reads SMDG BAPLIE, SDF, MJCF, URDF, scene files, and packing plans as CSV or JSON. Of several
-files it prints a line each. The exit status is 0 if all are sound, 1 if one is not, and 2 if one
-could not be read.
+files it prints a line each. The exit status is 2 if a file could not be read, else 1 if a plan is
+not sound, else 3 if not all of one was judged, else 0.
 """
 from __future__ import annotations
 
@@ -14,21 +14,26 @@ import csv
 import dataclasses
 import json
 import math
+import os
+import shlex
 import sys
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
-from ..arguments import program_parser, within
+from ..arguments import one_line, program_main, program_parser, within
 from ..extras import MissingExtra
+from ..solver.checks import printable
+from ..solver.contacts_of import TooManyNear
+from .crowd import crowded
 from .inspect_plan import inspect_plan
 from .inspection import Inspection
-from .plan import Plan
 from .read_plan import read_any
 
-SOUND, NOT_SOUND, NOT_READ = 0, 1, 2
-"""Exit statuses."""
+NOT_READ = 2
+STATUSES = {'sound': 0, 'not all judged': 3, 'not sound': 1, 'not read': NOT_READ}
+"""Exit statuses, by verdict; of several files the last of these counts."""
 PATIENT = 5.0  # time [s] after which several files have a progress bar
 COLUMNS = ('file', 'kind', 'boxes', 'text')
 
@@ -36,19 +41,22 @@ COLUMNS = ('file', 'kind', 'boxes', 'text')
 def judged(path: str, options: argparse.Namespace) -> Inspection:
     """Return what is wrong with the plan of a file. Raises OSError and ValueError."""
     plan, bears = read_any(path)
-    limits = plan.limits.copy()
+    limits = np.full(len(plan), np.inf) if options.geometry else plan.limits.copy()
     if options.limit is not None:
         free = np.setdiff1d(np.arange(len(plan)), plan.ground)
         limits[free] = np.minimum(limits[free], options.limit)
-    ground = range(len(plan)) if len(plan) == 1 else plan.ground  # it can touch nothing
-    plan = Plan(plan.sizes, plan.poses, None if options.geometry else plan.masses, ground=ground,
-                names=plan.names, centres=plan.centres, limits=limits, body=plan.body,
-                apart=plan.apart, faults=plan.faults)
+    plan = dataclasses.replace(
+        plan, masses=None if options.geometry else plan.masses, limits=limits,
+        faults=tuple(fault for fault in plan.faults
+                     if not (options.geometry and fault.kind == 'mass')))
     try:
         return inspect_plan(plan, tolerance=options.tolerance, acceleration=options.acceleration,
                             bears=options.bears or bears)
+    except TooManyNear as error:
+        return crowded(plan, error.pairs, options.tolerance, options.acceleration)
     except ValueError as error:
-        raise ValueError(f'{path}: {error}') from None
+        option = '--' if str(error).startswith('tolerance') else ''
+        raise ValueError(f'{path}: {option}{error}') from None
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -61,9 +69,10 @@ def _parser() -> argparse.ArgumentParser:
                         'by cause (needs Matplotlib)')
     parser.add_argument('--limit', type=within(0.0), metavar='KG', help='the most that may rest on '
                         'any box')
-    parser.add_argument('--tolerance', type=within(0.0), default=1e-4, metavar='M', help='the gap '
-                        'up to which faces touch, and the depth up to which boxes do not overlap '
-                        '(default: 1e-4)')
+    parser.add_argument('--tolerance', type=within(0.0), metavar='M', help='the gap up to which '
+                        'faces touch, and the depth up to which boxes do not overlap (default: '
+                        '1e-4, or a quarter of the thinner box)')
+    parser.add_argument('--all', action='store_true', help='print all lines, not 40')
     parser.add_argument('--bears', choices=('faces', 'corners'), help='where boxes stand on each '
                         'other (default: corners for containers, faces for others)')
     parser.add_argument('--acceleration', type=float, nargs=3, default=(0.0, 0.0, -9.81),
@@ -74,39 +83,53 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+@program_main
 def main(args: Sequence[str] | None = None) -> int:
-    """Judge files; return the worst exit status."""
+    """Judge files; return the exit status of the worst."""
     parser = _parser()
     options = parser.parse_args(args)
     if options.picture and len(options.files) > 1:
         parser.error('--picture takes one file')
+    if options.picture and os.path.realpath(options.picture) == os.path.realpath(options.files[0]):
+        parser.error(f'--picture would overwrite {printable(options.picture)}')
     if options.json and options.csv:
         parser.error('--json and --csv exclude each other')
     writer = csv.writer(sys.stdout, lineterminator='\n')
     if options.csv:
         writer.writerow(COLUMNS)
-    worst = SOUND
+    worst = 'sound'
     for path in _with_progress(options.files):
         try:
             found = judged(path, options)
-            if options.picture:
-                found.plot().savefig(options.picture, dpi=120)
+            figure = found.plot() if options.picture else None
         except (OSError, ValueError, MissingExtra) as error:
             print(one_line(error), file=sys.stderr)
-            worst = NOT_READ
+            worst = 'not read'
             continue
-        worst = max(worst, SOUND if found.sound else NOT_SOUND)
+        if figure:
+            try:
+                figure.savefig(options.picture, dpi=120)
+            except ValueError as error:  # for an ending that is no picture's
+                parser.error(f'--picture: {one_line(error)}')
+        worst = max(worst, found.verdict, key=list(STATUSES).index)
         if options.json:
             print(json.dumps({'file': path, **as_json(found)}))
         elif options.csv:
-            writer.writerows((path, row.kind, ' '.join(row.names), row.text)
+            writer.writerows(map(_cell, (path, row.kind, ' '.join(row.names), row.text))
                              for row in found.rows())
         elif len(options.files) > 1:
-            print(f'{path}: {found.summary()}', flush=True)
+            print(f'{printable(path)}: {found.summary()}', flush=True)
         else:
-            print(found)
-            print(f'To see it in 3D: box_contact_view {path}')
-    return worst
+            print(found.text(None) if options.all else found)
+            if path.isprintable():
+                shown = path if not path.startswith('-') else f'./{path}'
+                print(f'To see it in 3D: box_contact_view {shlex.quote(shown)}')
+    return STATUSES[worst]
+
+
+def _cell(text: str) -> str:
+    """Return a text as a cell that no spreadsheet runs."""
+    return ("'" if text.startswith(tuple('=+-@\t\r')) else '') + printable(text)
 
 
 def as_json(found: Inspection) -> dict[str, Any]:
@@ -119,7 +142,8 @@ def as_json(found: Inspection) -> dict[str, Any]:
     del fields['plan']
     for pairs in ('overlaps', 'carried_by'):
         fields[pairs] = [[plan.names[a], plan.names[b]] for a, b in fields[pairs].tolist()]
-    return {'sound': found.sound, 'names': list(plan.names), 'ground': plan.ground.tolist(),
+    return {'verdict': found.verdict, 'sound': found.sound,
+            'names': list(plan.names), 'ground': plan.ground.tolist(),
             'faults': [row._asdict() for row in found.rows()],
             **{name: _plain(value) for name, value in fields.items()}}
 
@@ -141,13 +165,6 @@ def _with_progress(paths: Sequence[str]) -> Iterable[str]:
     from tqdm import tqdm
 
     return tqdm(paths, unit='file', delay=PATIENT, leave=False, disable=None)
-
-
-def one_line(error: Exception) -> str:
-    """Return what went wrong in one line, with the file."""
-    if isinstance(error, OSError) and error.filename is not None:
-        return f'{error.filename}: {error.strerror}'
-    return ' '.join(str(error).split())
 
 
 if __name__ == '__main__':

@@ -4,25 +4,31 @@
 """What is wrong with a plan, and what each of its boxes carries: the answer of `inspect_plan`."""
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .plan import Plan
+from ..solver.checks import printable
+from .plan import LACKS, VERDICTS, Plan
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-UNSOUND_FAULTS = ('gap', 'twice', 'cut')
-"""Faults of a file with which a plan is not sound. The others are told."""
 CAUSES = ('hangs', 'unsupported', 'tips under its load', 'slides', 'goes with what falls',
           'overloaded')
 """What may be wrong with a box, the worst first."""
+GOES = 'goes with what falls'
+LEFT_OUT = ('place', 'part', 'shape')
+"""What rows lack that come first: others may fall because these are left out."""
+OVER = 1e-6
+"""By how much a load may exceed its limit [1]: rounding."""
+MOST_LINES = 40
+"""Lines that are printed of what is wrong, if not all are asked for."""
 MOST_NAMES = 3
 """Names that a line shows of a fault with more."""
-LEFT_OUT = ('slot', 'size type', 'pose', 'dimension')
-"""Faults for which a box is not in the plan."""
 
 
 class Row(NamedTuple):
@@ -37,8 +43,7 @@ class Row(NamedTuple):
         names = '  '.join(self.names[:MOST_NAMES])
         if len(self.names) > MOST_NAMES:
             names += f' and {len(self.names) - MOST_NAMES:,} more'
-        return ''.join(mark if mark.isprintable() else '?' for mark in
-                       f'{self.kind:<20}  {names}{"  " if names else ""}{self.text}')
+        return printable(f'{self.kind:<20}  {names}{"  " if names else ""}{self.text}')
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +67,13 @@ class Inspection:
     """(n,) bool."""
     cause: np.ndarray
     """(n,) why a box does not stand, or is overloaded; '' for the others."""
+    goes_with: np.ndarray
+    """(n,) the box with which a box falls, by index; −1: it does not go with another."""
+    height: np.ndarray
+    """(n,) of a box that hangs, above what is below it [m]; NaN for others, infinity above nothing.
+    """
     share: np.ndarray
-    """(n,) area by which a box is carried, divided by that of its base."""
+    """(n,) area by which a box is carried, divided by that of its base; at most 1."""
     margin: np.ndarray
     """(n,) how far the centre of mass is inside the hull of what carries the box [m]; below 0:
     outside it. That of its body, if the box is a part of one."""
@@ -87,10 +97,17 @@ class Inspection:
     """(3,) [m]."""
 
     @property
+    def verdict(self) -> str:
+        """Return 'not sound' for what is certainly wrong, else 'not all judged', or 'sound'."""
+        faults = {fault.verdict for fault in self.plan.faults}
+        if len(self.overlaps) or (self.cause != '').any():
+            faults.add('not sound')
+        return next((verdict for verdict in VERDICTS if verdict in faults), 'sound')
+
+    @property
     def sound(self) -> bool:
-        """Whether all boxes stand, none overlaps or is overloaded, and the file is whole."""
-        return not (len(self.overlaps) or (self.cause != '').any()
-                    or any(fault.kind in UNSOUND_FAULTS for fault in self.plan.faults))
+        """Whether all was judged, all boxes stand, and none overlaps or is overloaded."""
+        return self.verdict == 'sound'
 
     @property
     def verdicts(self) -> np.ndarray:
@@ -101,30 +118,68 @@ class Inspection:
         return words
 
     def __str__(self) -> str:
-        """Return a line for each fault, the worst first, and one for the whole plan."""
-        return '\n'.join((*map(str, self.rows()), self.summary()))
+        """Return lines on what is wrong, as `text` has them."""
+        return self.text()
+
+    def text(self, most: int | None = MOST_LINES) -> str:
+        """Return a line for each row, at most so many (None: all), and one for the whole plan."""
+        rows = self.rows()
+        lines = [str(row) for row in rows]
+        if most is not None and len(rows) > most:
+            goes = [n for n, row in enumerate(rows) if row.kind == GOES]
+            others = np.setdiff1d(np.arange(len(rows)), goes).tolist()
+            shown = sorted((others + goes)[:most])
+            more = max(0, len(others) - most)
+            rest = len(rows) - most - more
+            hidden = [f'{more:,} more'] * (more > 0) + [f'{rest:,} that go with these'] * (rest > 0)
+            lines = [lines[n] for n in shown] + [f'and {" and ".join(hidden)}']
+        return '\n'.join((*lines, self.summary()))
 
     def rows(self) -> list[Row]:
-        """Return what is wrong with a plan, the worst first; a box is in one row, its worst."""
+        """Return what is wrong: first what was left out, then the worst.
+
+        What goes with a box that falls comes after it. A box has a row for each of its faults.
+        """
         plan, names = self.plan, self.plan.names
-        told = [Row(fault.kind, fault.names, fault.text) for fault in plan.faults]
-        rows = [row for kind in UNSOUND_FAULTS for row in told if row.kind == kind]
+        told: dict[str, list[Row]] = {word: [] for word in ('left out', *VERDICTS)}
+        for fault in plan.faults:
+            is_first = fault.lacks in LEFT_OUT and fault.verdict != 'sound'
+            told['left out' if is_first else fault.verdict].append(
+                Row(fault.kind, fault.names, fault.text))
+        rows = told['left out'] + told['not sound']
         for n in np.argsort(-self.depths, kind='stable').tolist():
             a, b = self.overlaps[n].tolist()
             rows.append(Row('overlap', (names[a], names[b]), f'{1e3 * self.depths[n]:.1f} mm deep'))
-        seen = {name for row in rows for name in row.names}
+        rows += self._falls()
         on_top = self.load / np.linalg.norm(self.acceleration)
-        for cause in CAUSES:
-            worst = -on_top if cause == 'overloaded' else self.margin
-            boxes = np.flatnonzero(self.cause == cause)
-            for box in boxes[np.argsort(worst[boxes], kind='stable')].tolist():
-                text = (f'{on_top[box]:.0f} kg on top' if cause == 'overloaded' else
-                        f'share {self.share[box]:.2f}, centre {_side(self.margin[box])}')
-                if cause == 'tips under its load':
-                    text += f', under its load {_side(self.loaded_margin[box])}'
-                if names[box] not in seen:
-                    rows.append(Row(cause, (names[box],), text))
-        return rows + [row for row in told if row.kind not in UNSOUND_FAULTS]
+        over = np.flatnonzero(on_top > (1.0 + OVER) * plan.limits)
+        rows += [Row('overloaded', (names[box],), f'{on_top[box]:.0f} kg on top')
+                 for box in over[np.argsort(-on_top[over], kind='stable')].tolist()]
+        return rows + told['not all judged'] + told['sound']
+
+    def _falls(self) -> Iterator[Row]:
+        """Yield rows of the boxes that fall, each before those that go with it."""
+        names = self.plan.names
+        order = np.argsort(self.margin, kind='stable').tolist()
+        goes: dict[int, list[int]] = {}
+        for box in order:
+            if self.cause[box] == GOES:
+                goes.setdefault(int(self.goes_with[box]), []).append(box)
+        for cause in CAUSES[:CAUSES.index(GOES)]:
+            for box in order:
+                if self.cause[box] == cause:
+                    yield Row(cause, (names[box],), self._why(box))
+                    for other in goes.get(box, ()):
+                        yield Row(GOES, (names[other],), f'with {names[box]}; {self._why(other)}')
+        for other in goes.get(-1, ()):
+            yield Row(GOES, (names[other],), self._why(other))
+
+    def _why(self, box: int) -> str:
+        if self.cause[box] == 'hangs':
+            height = self.height[box]
+            return (f'{1e3 * height:.1f} mm above what is below' if np.isfinite(height) else
+                    'above nothing')
+        return f'share {self.share[box]:.2f}, centre {_side(self.margin[box])}'
 
     def summary(self) -> str:
         """Return one line on the whole plan."""
@@ -136,12 +191,24 @@ class Inspection:
                 f'{self.mass / 1e3:,.0f} t' if self.mass >= 1e4 else f'{self.mass:,.1f} kg')
             if np.isfinite(self.centre_of_mass).all():
                 words.append('centre of mass {:.3f} {:.3f} {:.3f} m'.format(*self.centre_of_mass))
-        lost = {name for fault in plan.faults if fault.kind in LEFT_OUT for name in fault.names}
-        if lost := lost.difference(plan.names):
-            words.append(f'{len(lost):,} left out')
-        if len(plan) < 2 or not boxes:
+        if not boxes:
             words.append('nothing can touch')
-        return f'{", ".join(words)}: {"sound" if self.sound else "not sound"}'
+        verdict, lacks = self.verdict, ', '.join(self._lacks())
+        if verdict == 'not all judged':
+            verdict += '; what was read is sound'
+            lacks = lacks and f', but {lacks}'
+        else:
+            lacks = lacks and f'; {lacks}'
+        return f'{", ".join(words)}: {verdict}{lacks}'
+
+    def _lacks(self) -> Iterator[str]:
+        """Yield how many boxes or parts of the file lack what a verdict needs."""
+        counts: Counter[str | None] = Counter()
+        for fault in self.plan.faults:
+            counts[fault.lacks] += max(1, len(fault.names))
+        for lack, (one, more) in LACKS.items():
+            if lack and counts[lack]:
+                yield one if counts[lack] == 1 else more.format(counts[lack])
 
     def plot(self) -> Figure:
         """Return a figure of the plan, coloured by verdict, with the load on each box in kN.

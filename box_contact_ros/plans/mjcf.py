@@ -1,47 +1,138 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""MJCF and URDF, read by MuJoCo, in the pose that the file has.
+"""MJCF and URDF, compiled by MuJoCo, in the pose that the file has.
 
-What joints join to each other is one body, and what they join to the world is fixed. Geoms may
-touch as they may in MuJoCo: by contype and conaffinity, <pair>, <exclude> and filterparent.
+`python -m box_contact_ros.plans.mjcf FILE` is the subprocess of `read_mjcf`, with limits of memory
+and time. What joints join to each other is one body, and what they join to the world is fixed.
+Geoms may touch as they may in MuJoCo: by contype and conaffinity, <pair>, <exclude> and
+filterparent.
 """
 from __future__ import annotations
 
+import io
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from ..extras import require
-from .bodies import Solid, Weight, plan_of_bodies, total
-from .plan import Fault, Plan
+from ..resources import open_regular, read_regular
+from .bodies import UNMOVED, Solid, Weight, plan_of_bodies, total
+from .plan import MOST_BYTES, Fault, Plan
+from .sdf import parse_xml
 
 WELDS = ('mjEQ_CONNECT', 'mjEQ_WELD')
 """Equalities that join two bodies."""
 LEAST = 1e-9
 """Mass and inertia of a body whose meshes are left out: MuJoCo takes none without."""
+MOST_KEYS, MOST_GEOMS = 10_000, 100_000
+"""Of a model: keyframes that are not read, and shapes."""
+MOST_DATA, MOST_SECONDS = 700 * 2**20, 8
+"""Limits of the subprocess: memory [bytes], and time of the processor [s]."""
+PATIENCE = 60.0  # for the subprocess, which may wait for a processor [s]
 
 
 def read_mjcf(path: Path) -> Plan:
-    """Return the plan of a model of MuJoCo, or of a robot. Raises ValueError for other files."""
+    """Return the plan of a model of MuJoCo, or of a robot. Raises ValueError for other files.
+
+    Raises OSError for what the file names and is no regular file.
+    """
     require('sim')
+    check_named_files(path)
+    with TemporaryDirectory() as folder:  # MuJoCo writes its log where it is
+        try:
+            done = subprocess.run(
+                [sys.executable, '-m', 'box_contact_ros.plans.mjcf', path.absolute()], cwd=folder,
+                stdin=subprocess.DEVNULL, capture_output=True, timeout=PATIENCE, env=os.environ | {
+                    'OPENBLAS_NUM_THREADS': '1', 'PYTHONPATH': os.pathsep.join(sys.path)})
+        except subprocess.TimeoutExpired:
+            raise ValueError(f'MuJoCo reads it for more than {PATIENCE:g} s') from None
+    if done.returncode == -signal.SIGXCPU:
+        raise ValueError(f'MuJoCo takes more than {MOST_SECONDS} s to read it')
+    try:
+        with np.load(io.BytesIO(done.stdout), allow_pickle=False) as arrays:
+            fields = dict(arrays)
+            texts = json.loads(fields.pop('texts').tobytes())
+    except (OSError, ValueError, KeyError):
+        raise ValueError(f'MuJoCo fails at it, or needs more than {MOST_DATA >> 20} MiB') from None
+    if 'refused' in texts:
+        raise ValueError(texts['refused'])
+    return Plan(**fields, names=texts['names'], faults=[
+        Fault(kind, tuple(names), text, verdict=verdict, lacks=lacks)
+        for kind, names, text, verdict, lacks in texts['faults']])
+
+
+def main() -> None:
+    """Write the plan of a file as arrays to stdout, or why there is none."""
+    import mujoco  # noqa: F401, before its memory is limited
+
+    resource.setrlimit(resource.RLIMIT_DATA, (MOST_DATA, MOST_DATA))
+    resource.setrlimit(resource.RLIMIT_CPU, (MOST_SECONDS, MOST_SECONDS + 1))
+    fields: dict[str, Any] = {}
+    try:
+        plan = compiled_plan(Path(sys.argv[1]))
+        fields = {name: getattr(plan, name) for name in (
+            'sizes', 'poses', 'masses', 'ground', 'centres', 'body', 'apart')}
+        texts: dict[str, Any] = {'names': plan.names, 'faults': [
+            (fault.kind, fault.names, fault.text, fault.verdict, fault.lacks)
+            for fault in plan.faults]}
+    except MemoryError:
+        texts = {'refused': f'MuJoCo needs more than {MOST_DATA >> 20} MiB to read it'}
+    except Exception as error:  # MuJoCo's own are of any kind
+        texts = {'refused': ' '.join(str(error).split())}
+    np.savez(sys.stdout.buffer, texts=np.frombuffer(json.dumps(texts).encode(), np.uint8), **fields)
+
+
+def check_named_files(path: Path) -> None:
+    """Raise OSError if a file that MuJoCo would open for this one is a device, pipe or folder.
+
+    MuJoCo looks for a file beside the first one or in the folders that <compiler> names.
+    """
+    paths, seen = [path], set()
+    while paths:
+        place = paths.pop()
+        if place in seen or not place.exists():  # MuJoCo says so
+            continue
+        seen.add(place)
+        parts = list(parse_xml(read_regular(place, MOST_BYTES)).iter())
+        folders = {'', *(value for part in parts for key, value in part.items()
+                         if key in ('meshdir', 'texturedir', 'assetdir'))}
+        for part in parts:
+            for name in {value for key, value in part.items() if key.startswith('file') and value}:
+                name = name.removeprefix('package://').removeprefix('file://')
+                for other in {base / folder / end for base in (path.parent, place.parent)
+                              for folder in folders for end in (name, Path(name).name)}:
+                    if part.tag in ('include', 'model'):
+                        paths.append(other)
+                    elif other.exists():
+                        open_regular(other).close()
+
+
+def compiled_plan(path: Path) -> Plan:
+    """Return the plan of a model of MuJoCo, or of a robot. Raises ValueError for other files."""
     import mujoco
 
-    before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda text: None)  # else it writes a file in this folder
-    try:
-        with warnings.catch_warnings(action='ignore'):
-            model, meshes = _compiled(path)
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-    finally:
-        mujoco.set_mju_user_warning(before)
+    with warnings.catch_warnings(action='ignore'):
+        model, meshes = _compiled(path)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    if model.ngeom > MOST_GEOMS:
+        raise ValueError(f'it has {model.ngeom:,} shapes, more than {MOST_GEOMS:,}')
     tops = _tops(model)
     faults = [Fault('shape', tuple(meshes), f'{len(meshes)} mesh, height field or SDF: no box, so '
-                                            'left out')] if meshes else []
+                                            'left out', **({} if any(tops) else UNMOVED))
+              ] if meshes else []
     solids = []
     for geom in range(model.ngeom):
         kind = mujoco.mjtGeom(model.geom_type[geom]).name.removeprefix('mjGEOM_').lower()
@@ -71,12 +162,17 @@ def _compiled(path: Path) -> tuple[Any, list[str]]:
     def spec() -> Any:
         model = mujoco.MjSpec.from_file(str(path))
         model.compiler.balanceinertia = True  # nothing turns here
+        if model.nkey > MOST_KEYS:  # it would write them all
+            raise RuntimeError(f'nkey is {model.nkey}, more than {MOST_KEYS}')
         return model
 
     try:
         return spec().compile(), []
     except ValueError as error:
         first = error
+    except RuntimeError as error:  # such as too little memory
+        raise ValueError(f'MuJoCo does not read it, or needs more than {MOST_DATA >> 20} MiB: '
+                         f'{error}') from None
     try:
         model = spec()
         left_out = [geom for geom in model.geoms if geom.type in (
@@ -89,7 +185,7 @@ def _compiled(path: Path) -> tuple[Any, list[str]]:
         model.compiler.boundmass = model.compiler.boundinertia = LEAST
         return model.compile(), names
     except ValueError:
-        raise ValueError(f'MuJoCo does not read it: {" ".join(str(first).split())}') from None
+        raise ValueError(f'MuJoCo does not read it: {first}') from None
 
 
 def _tops(model: Any) -> list[int]:
@@ -135,3 +231,7 @@ def _filter(model: Any) -> Callable[[int, int], bool]:
                 and frozenset((bodies[a], bodies[b])) not in excluded
                 and bool(kinds[a] & others[b] | kinds[b] & others[a]))
     return may_touch
+
+
+if __name__ == '__main__':
+    main()

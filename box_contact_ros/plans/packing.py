@@ -10,7 +10,9 @@ msg_schemas/plan.json is the format in JSON; the columns of a CSV file have the 
 from __future__ import annotations
 
 import csv
+import io
 import math
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -28,6 +30,11 @@ KEYS = (*NEEDED, *TURN, 'mass', 'limit', 'fixed')
 DELIMITERS = ',;\t'
 WORDS = {'true': True, '1': True, 'yes': True, 'false': False, '0': False, 'no': False, '': False}
 """What `fixed` may be in a CSV file."""
+AMOUNT = re.compile(
+    '.*(mass|weight|gewicht|poids|peso|limit|capacity|strength|payload|traglast|auflast).*|'
+    'kgs?|kilos?|kilograms?|lbs?|kn|tons?|tonnes?|gross|net|tare|brutto|'
+    'netto|vgm|max|maximum|stackable|maxload')
+"""Words in the names of columns that may mean a mass or a limit."""
 UNTURNED = (0.0, 0.0, 0.0, 1.0)
 GROUND, GROUND_THICKNESS, GROUND_MARGIN = 'ground', 1.0, 1.0
 """Name, thickness, and how far it reaches beyond the boxes [m]."""
@@ -38,40 +45,107 @@ Row = Mapping[str, Any]
 
 def read_csv(text: str) -> Plan:
     """Return the plan of a CSV file; its faults are rows. Raises ValueError for other files."""
-    lines = text.removeprefix('\ufeff').splitlines()
+    lines = list(io.StringIO(text.removeprefix('\ufeff'), newline=''))
     start = next((n for n, line in enumerate(lines) if line.strip()), None)
     if start is None:
         raise ValueError('it is empty')
     delimiter = max(DELIMITERS, key=lines[start].count)
+    reader = csv.reader(lines[start:], delimiter=delimiter, strict=True)
     try:
-        header, *rows = csv.reader(lines[start:], delimiter=delimiter)
-    except csv.Error as error:
-        raise ValueError(f'it is not CSV: {error}') from None
-    columns = [column.strip().lower() for column in header]
+        header, *rows = reader
+    except csv.Error as error:  # such as a quote that is not closed
+        raise ValueError(f'line {start + reader.line_num}: it is not CSV: {error}') from None
+    names = _stripped(header)
+    columns = [name.lower() for name in names]
+    for key, count in Counter(filter(None, columns)).items():
+        if count > 1:
+            raise ValueError(f'line {start + 1}: the column {key} comes twice')
     for key in NEEDED:
         if key not in columns:
             raise ValueError(f'line {start + 1}: the column {key} is missing'
                              f'{nearest_name(key, columns)}; the columns are {", ".join(KEYS)}')
+    faults: list[Fault] = []
+    rows = [row for row in rows if any(value.strip() for value in row)]
+    is_cut = not text.endswith(('\n', '\r'))
+    keys = [column if column in KEYS else name or f'column {n}'
+            for n, (column, name) in enumerate(zip(columns, names), 1)]
+    return plan_of([(number, _cells(row, number, keys, delimiter)) for number, row in enumerate(
+        rows, 1) if _is_whole(row, number, keys, delimiter, faults,
+                              is_cut and number == len(rows))], faults)
+
+
+def _stripped(cells: Iterable[str]) -> list[str]:
+    """Return cells without blanks around them, and without blank ones at the end."""
+    stripped = [cell.strip() for cell in cells]
+    while stripped and not stripped[-1]:
+        stripped.pop()
+    return stripped
+
+
+def _cells(row: list[str], number: int, keys: list[str], delimiter: str) -> dict[str, str]:
+    """Return what a row says, by key."""
+    cells = {key: value.strip() for key, value in zip(keys, row) if value.strip()}
     if delimiter == ';':  # where a comma is the decimal mark
-        rows = [[value.replace(',', '.') if column != 'name' else value
-                 for column, value in zip(columns, row)] for row in rows]
-    return plan_of({key: value.strip() for key, value in zip(columns, row) if value.strip()}
-                   for row in rows if any(value.strip() for value in row))
+        cells = {key: value if key == 'name' else value.replace(',', '.')
+                 for key, value in cells.items()}
+    return cells
+
+
+def _is_whole(row: list[str], number: int, keys: list[str], delimiter: str, faults: list[Fault],
+              is_cut: bool) -> bool:
+    """Return whether a row can be read; add what seems to be missing.
+
+    is_cut: whether the file ends within the row, so that its last cell may be a part of one.
+    """
+    name = _cells(row, number, keys, delimiter).get('name', f'row {number}')
+    count = min(len(row), max(len(keys), len(_stripped(row))))
+    hidden = sum(delimiter in line for cell in row for line in cell.strip().splitlines()[1:])
+    if hidden:
+        faults.append(Fault('cut', (name,), f'row {number}: a quote goes on over {hidden} lines '
+                                            'that may be rows'))
+    if count == len(keys):
+        return True
+    left_out = is_cut or count > len(keys) or not set(NEEDED) <= {*keys[:count]}
+    faults.append(Fault('cut', (name,), f'row {number} has {count} cells, and the header '
+                                        f'{len(keys)}{": left out" if left_out else ""}',
+                        lacks='place' if left_out else None))
+    return not left_out
 
 
 def read_packing(document: Any) -> Plan | None:
     """Return the plan of a JSON document, or None if it has another form."""
     if isinstance(document, Mapping):
         if isinstance(document.get('boxes'), list):
-            return plan_of(document['boxes'])
+            return plan_of(enumerate(document['boxes'], 1), unread(
+                {key: value for key, value in document.items() if key != 'boxes'}))
         if isinstance(document.get('containers'), list):
-            return plan_of(_side_by_side(map(_placements, document['containers'])))
+            return plan_of(enumerate(_side_by_side(map(_placements, document['containers'])), 1))
         if document and all(isinstance(order, list) and order and all(
                 isinstance(entry, Mapping) and 'flb_coordinates' in entry for entry in order)
                 for order in document.values()):
-            return plan_of(_side_by_side(_order(name, order)
-                                         for name, order in document.items()))
+            return plan_of(enumerate(_side_by_side(_order(name, order)
+                                                   for name, order in document.items()), 1))
     return None
+
+
+def unread(values: Mapping[str, Any]) -> list[Fault]:
+    """Return faults that name columns or keys that are not read; values: one of each."""
+    amounts = tuple(key for key in values if means_amount(key))
+    parts = tuple(key for key, value in values.items() if key not in amounts and (
+        isinstance(value, Mapping) or (isinstance(value, list) and any(
+            isinstance(part, Mapping) for part in value))))
+    others = tuple(key for key in values if key not in amounts + parts)
+    return [Fault('column', names, text, verdict=verdict, lacks=lacks) for names, text, verdict,
+            lacks in ((amounts, 'not read, and may mean masses or limits, which are in mass and '
+                       'limit [kg]', 'not all judged', 'part'),
+                      (parts, 'not read, and may have boxes', 'not all judged', 'part'),
+                      (others, 'not read', 'sound', '')) if names]
+
+
+def means_amount(key: str) -> bool:
+    """Return whether a name may mean a mass or a limit, such as gross_weight, kg or maxLoad."""
+    words = re.findall('[a-zäöüß]+', re.sub('([a-z])([A-Z])', r'\1 \2', key).lower())
+    return any(map(AMOUNT.fullmatch, words)) or words[-1:] == ['load']
 
 
 def _placements(container: Any) -> Iterator[dict[str, Any]]:
@@ -79,9 +153,9 @@ def _placements(container: Any) -> Iterator[dict[str, Any]]:
     try:
         for n, entry in enumerate(container['stack']['placements']):
             goods = entry['stackable']
-            yield _from_corner(f'{container.get("name")}/{goods.get("name") or n + 1}/{n + 1}',
-                               [goods[key] for key in ('dx', 'dy', 'dz')],
-                               [entry[key] for key in ('x', 'y', 'z')])
+            name = f'{container.get("name")}/{goods.get("name") or n + 1}/{n + 1}'
+            yield {**_from_corner(name, [goods[key] for key in ('dx', 'dy', 'dz')],
+                                  [entry[key] for key in ('x', 'y', 'z')]), **_amounts(goods)}
     except (LookupError, TypeError, AttributeError) as error:
         raise ValueError(f'a container lacks {error}') from None
 
@@ -95,9 +169,14 @@ def _order(name: str, entries: Sequence[Row]) -> Iterator[dict[str, Any]]:
             if entry['orientation'] == 1:
                 extents[:2] = extents[1::-1]
             yield {**_from_corner(f'{name}/{item["sequence"]}', extents, corner),
-                   'mass': item['weight/kg']}
+                   'mass': item['weight/kg'], **_amounts(item)}
         except (LookupError, TypeError) as error:
             raise ValueError(f'order {name}, entry {n}: it lacks {error}') from None
+
+
+def _amounts(goods: Row) -> Row:
+    """Return what may mean a mass or a limit and is not read."""
+    return {key: value for key, value in goods.items() if key != 'weight/kg' and means_amount(key)}
 
 
 def _from_corner(name: str, extents: Sequence[Any], corner: Sequence[Any]) -> dict[str, Any]:
@@ -118,14 +197,20 @@ def _side_by_side(stacks: Iterable[Iterable[dict[str, Any]]]) -> Iterator[Row]:
         start += max((end for end in ends if math.isfinite(end)), default=0.0) + ROOM
 
 
-def plan_of(rows: Iterable[Any]) -> Plan:
-    """Return the plan of rows; those that cannot be placed are left out, and named as faults.
+def plan_of(rows: Iterable[tuple[int, Any]], faults: Iterable[Fault] = ()) -> Plan:
+    """Return the plan of numbered rows; those that cannot be placed are left out, and named.
 
-    Raises ValueError where none can be placed.
+    faults: what is already known to be wrong.
+    Raises ValueError where no row can be placed.
     """
-    faults: list[Fault] = []
-    boxes = [box for number, row in enumerate(rows, 1)
-             if (box := _box(row if isinstance(row, Mapping) else {}, number, faults))]
+    faults, boxes = list(faults), []
+    others: dict[str, Any] = {}
+    for number, row in rows:
+        row = row if isinstance(row, Mapping) else {}
+        others |= {key: value for key, value in row.items() if key not in KEYS}
+        if box := _box(row, number, faults):
+            boxes.append(box)
+    faults += unread(others)
     if not boxes:
         raise ValueError(f'no box can be placed: {faults[0].text}' if faults else 'it has no box')
     names = [box.name for box in boxes]
@@ -192,7 +277,8 @@ def _box(row: Row, number: int, faults: list[Fault]) -> _Box | None:
         value = _number(row[key]) if row.get(key) is not None else None
         if value is not None and not 0.0 <= value <= most:
             faults.append(Fault('mass', (name,), f'{place}{key} is {short_repr(row[key])}: taken '
-                                                 f'as {"0" if key == "mass" else "unknown"}'))
+                                                 f'as {"0" if key == "mass" else "unknown"}',
+                                lacks='weight' if key == 'mass' else 'limit'))
             value = 0.0 if key == 'mass' else None
         amounts.append(value)
     fixed = WORDS.get(str(row.get('fixed', '')).lower())

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,15 +22,35 @@ from ..solver.checks import (
     short_repr,
 )
 
-FAULT_KINDS = ('gap', 'twice', 'cut', 'slot', 'size type', 'mass', 'dimension', 'pose', 'shape')
-"""What may be wrong with a row of a file."""
+MOST_BYTES = 2**28
+"""Of a file: 256 MiB, some hundred times the largest ship's plan."""
+VERDICTS = ('not sound', 'not all judged', 'sound')
+"""On a plan, from the worst to the best."""
+FAULT_KINDS = {
+    'gap': ('not sound', ''), 'twice': ('not sound', ''), 'overlap': ('not sound', ''),
+    'cut': ('not all judged', 'part'), 'slot': ('not all judged', 'place'),
+    'size type': ('not all judged', 'place'), 'dimension': ('not all judged', 'place'),
+    'pose': ('not all judged', 'place'), 'mass': ('not all judged', 'weight'),
+    'shape': ('not all judged', 'shape'), 'support': ('not all judged', 'support'),
+    'column': ('sound', '')}
+"""What may be wrong with a row of a file: the best verdict with it, and what it lacks."""
+LACKS = {
+    '': ('', ''), 'place': ('1 box was not placed', '{:,} boxes were not placed'),
+    'weight': ('1 has no weight', '{:,} have no weight'),
+    'sure weight': ('1 has a doubtful weight', '{:,} have a doubtful weight'),
+    'limit': ('1 has no known limit', '{:,} have no known limit'),
+    'support': ('support not judged: nothing is fixed',) * 2,
+    'judgement': ('1 was not judged', '{:,} were not judged'),
+    'shape': ('1 shape is not known', '{:,} shapes are not known'),
+    'part': ('1 part of the file was not read', '{:,} parts of the file were not read')}
+"""What boxes or rows may lack, as the last line says it of one and of more."""
 
 
 @dataclass(frozen=True)
 class Fault:
     """What a file says wrongly, or what could not be taken from it.
 
-    Raises ValueError for a kind that is not one of FAULT_KINDS.
+    Raises ValueError for a kind, a verdict or a lack that is not one of those below.
     """
 
     kind: str
@@ -39,11 +59,24 @@ class Fault:
     """The boxes or rows that are concerned, as the file names them."""
     text: str
     """What is wrong, for people."""
+    verdict: str = field(default='', kw_only=True)
+    """The best of VERDICTS that a plan with this fault can have; '': that of its kind."""
+    lacks: str | None = field(default=None, kw_only=True)
+    """What each of the boxes or rows lacks, one of LACKS; None: what its kind says."""
 
     def __post_init__(self) -> None:
         if self.kind not in FAULT_KINDS:
             raise ValueError(f'kind must be one of {", ".join(FAULT_KINDS)}, not '
                              f'{short_repr(self.kind)}')
+        verdict, lacks = FAULT_KINDS[self.kind]
+        object.__setattr__(self, 'verdict', self.verdict or verdict)
+        if self.verdict not in VERDICTS:
+            raise ValueError(f'verdict must be one of {", ".join(VERDICTS)}, not '
+                             f'{short_repr(self.verdict)}')
+        object.__setattr__(self, 'lacks', lacks if self.lacks is None else self.lacks)
+        if self.lacks not in LACKS:
+            raise ValueError(f'lacks must be one of {", ".join(filter(None, LACKS))}, or nothing, '
+                             f'not {short_repr(self.lacks)}')
 
 
 @dataclass(frozen=True, eq=False, init=False)

@@ -6,15 +6,16 @@ from __future__ import annotations
 
 import json
 import os
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from .plan import Plan
+from ..resources import read_regular
+from ..solver.checks import short_repr
+from .plan import MOST_BYTES, Plan
 
 FORMATS = ('SMDG BAPLIE, SDF, MJCF, URDF, a scene file (YAML), and packing plans as CSV or JSON')
-MOST_BYTES = 2**28
-"""Of a file: 256 MiB, some hundred times the largest ship's plan."""
 
 
 class ReadPlan(NamedTuple):
@@ -37,11 +38,13 @@ def read_plan(path: str | os.PathLike[str]) -> Plan:
 def read_any(path: str | os.PathLike[str]) -> ReadPlan:
     """Return the plan of a file as `read_plan` does, and how its boxes stand on each other."""
     file = Path(path)
-    if file.is_file() and file.stat().st_size > MOST_BYTES:
-        raise ValueError(f'{file}: it has more than {MOST_BYTES >> 20} MiB')
-    data = file.read_bytes()
     try:
+        data = read_regular(file, MOST_BYTES)
         return _read(file, data)
+    except OSError as error:
+        if error.filename is not None:
+            raise
+        raise ValueError(f'{file}: {error}') from None
     except RecursionError:
         raise ValueError(f'{file}: it is nested too deeply') from None
     except UnicodeDecodeError as error:
@@ -87,11 +90,20 @@ def _read_xml(file: Path, data: bytes) -> Plan:
     raise ValueError(f'line 1: <{root.tag}> begins no format that is read: {FORMATS}')
 
 
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return a JSON object. Raises ValueError for a key that comes twice."""
+    document = dict(pairs)
+    if len(document) < len(pairs):
+        twice = next(key for key, count in Counter(key for key, _ in pairs).items() if count > 1)
+        raise ValueError(f'the key {short_repr(twice)} comes twice')
+    return document
+
+
 def _read_json(file: Path, data: bytes) -> Plan:
     from .packing import read_packing
 
     try:
-        document = json.loads(data)
+        document = json.loads(data, object_pairs_hook=_object)
     except json.JSONDecodeError as error:
         raise ValueError(f'line {error.lineno}: it is not JSON: {error.msg}') from None
     plan = read_packing(document)

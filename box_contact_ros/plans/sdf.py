@@ -26,6 +26,10 @@ from .plan import Fault, Plan
 ALL_BITS, DENSITY, MASS = 0xffff, 1000.0, 1.0
 """Defaults of SDF: of <collide_bitmask>, <density> [kg/m³] and <mass> [kg]."""
 WORLD = 'world'
+COMMENT = b'<!--'
+CLOSING = {COMMENT: b'-->', b'<![CDATA[': b']]>', b'<?': b'?>'}
+"""What ends what is no element."""
+OPENING = re.compile(b'|'.join(map(re.escape, CLOSING)))
 
 
 class Unreadable(ValueError):
@@ -61,18 +65,37 @@ def parse_xml(data: bytes) -> Element:
     require('plans')
     from defusedxml import sax
 
-    # As Gazebo's reader, it takes comments with `--` within, and blanks before the declaration.
-    data = re.sub(rb'<!--.*?-->', lambda found: b'\n' * found[0].count(b'\n'), data,
-                  flags=re.DOTALL)
     tree = _Tree()
     try:
         sax.parseString(data.lstrip(), tree)
         return tree.builder.close()
     except SAXParseException as error:
+        # Gazebo's reader takes comments with `--` within, which XML does not.
+        plain = without_comments(data)
+        if len(plain) < len(data):
+            return parse_xml(plain)
         raise ValueError(f'line {error.getLineNumber()}: it is not XML: {error.getMessage()}'
                          ) from None
     except (SAXException, LookupError, AssertionError) as error:
         raise ValueError(f'it is not XML: {error}') from None
+
+
+def without_comments(data: bytes) -> bytes:
+    """Return XML with the line ends of its comments alone; with a document type it is as it was.
+
+    What looks like a comment in CDATA or in an instruction is none.
+    """
+    if b'<!DOCTYPE' in data:
+        return data
+    parts, end = [], 0
+    while (found := OPENING.search(data, end)) and (
+            close := data.find(CLOSING[found[0]], found.end())) >= 0:
+        start, last = found.start(), close + len(CLOSING[found[0]])
+        parts.append(data[end:start])
+        parts.append(b'\n' * data.count(b'\n', start, last) if found[0] == COMMENT
+                     else data[start:last])
+        end = last
+    return b''.join((*parts, data[end:]))
 
 
 @dataclass
@@ -103,9 +126,9 @@ class _World:
         if a != b:
             self.joined[max(a, b)] = min(a, b)
 
-    def fault(self, kind: str, name: str, text: str) -> None:
+    def fault(self, kind: str, name: str, text: str, lacks: str | None = None) -> None:
         """Name what is wrong with a part."""
-        self.faults.append(Fault(kind, (name,), text))
+        self.faults.append(Fault(kind, (name,), text, lacks=lacks))
 
 
 def read_sdf(root: Element) -> Plan:
@@ -113,12 +136,16 @@ def read_sdf(root: Element) -> Plan:
     places = root.findall('world') or [root]
     world = _World()
     for other in places[1:]:
-        world.fault('shape', other.get('name', WORLD), 'is another world: left out')
+        world.fault('shape', other.get('name', WORLD), 'is another world: left out', 'part')
+    for other in root if places[0] is not root else ():
+        if other.tag in ('model', 'include'):
+            world.fault('shape', other.get('name', other.tag), 'is beside the world: left out',
+                        'part')
     for state in places[0].findall('state'):
         _read_state(state, world)
     for part in ('population', 'road'):
         for other in places[0].findall(part):
-            world.fault('shape', other.get('name', part), f'is a <{part}>: not read')
+            world.fault('shape', other.get('name', part), f'is a <{part}>: not read', 'part')
             world.missing += 1
     models = places[0].findall('model')
     if not models and places[0].find('include') is None and not places[0].tag == WORLD:
@@ -167,14 +194,14 @@ def _read_state(state: Element, world: _World) -> None:
                 except Unreadable as error:
                     world.fault(error.kind, path, f'in <state>, {error}')
     for part in state.findall('insertions/model'):
-        world.fault('shape', part.get('name', ''), '<state> inserts it: not read')
+        world.fault('shape', part.get('name', ''), '<state> inserts it: not read', 'part')
         world.missing += 1
 
 
 def _read_includes(place: Element, scope: str, world: _World) -> None:
     for part in place.findall('include'):
         world.fault('shape', scope + (part.findtext('name') or part.findtext('uri') or 'include'),
-                    'is included from another file: not read')
+                    'is included from another file: not read', 'part')
         world.missing += 1
 
 
@@ -184,7 +211,7 @@ def _read_model(model: Element, scope: str, frame: np.ndarray, is_static: bool, 
     name = scope + model.get('name', '')
     is_static = is_static or _flag(model, 'static')
     if name in world.names:
-        world.fault('twice', name, 'two models have this name: the second is left out')
+        world.fault('twice', name, 'two models have this name: the second is left out', 'place')
         return
     world.names.add(name)
     try:
@@ -260,7 +287,7 @@ def _read_joint(joint: Element, scope: str, world: _World) -> None:
         world.fixed.add(known[0])
         if WORLD not in links:
             world.fault('shape', known[0], f'is joined to {", ".join({*links} - {*known})}, which '
-                                           'is not read: taken as fixed')
+                                           'is not read: taken as fixed', 'judgement')
 
 
 def pose_of(part: Element, bases: set[str]) -> tuple[np.ndarray, str]:
@@ -351,7 +378,8 @@ def _bits(part: Element, name: str, world: _World) -> int:
     try:
         return int(text, 0) if text else ALL_BITS
     except ValueError:
-        world.fault('shape', name, f'its collide_bitmask {text!r} is not known: taken as all')
+        world.fault('shape', name, f'its collide_bitmask {text!r} is not known: taken as all',
+                    'judgement')
         return ALL_BITS
 
 

@@ -35,6 +35,11 @@ EVERY_PAIR = (('*', '*'),)
 MOVES = (': leave `pose` out of a box that moves, and give its pose in the call; or, in Python, '
          'ask contacts_of(sizes, poses)')
 """What to do about boxes that are all fixed."""
+POSES = ('topics', 'array', 'named')
+"""How the poses of what moves come: on a topic each; in one message, in the order of the scene; in
+one message, by names. The boxes that move change in scenes of the last kind alone."""
+MOST_BOXES = 100_000
+"""Of a scene that changes."""
 ALONE = -1
 """Instead of box b, in rows of boxes: all pairs of box a that patterns ask for."""
 
@@ -158,6 +163,35 @@ class Pair(NamedTuple):
         return cls(f'{a}_{b}', a, b)
 
 
+class Places(NamedTuple):
+    """In which order boxes came first, also those that are gone."""
+
+    numbers: np.ndarray  # (n,) of the boxes of a scene, ascending
+    next: int
+    former: Mapping[str, int]
+    """Numbers of the last MOST_BOXES boxes that went, by name."""
+
+    def changed(self, gone: Sequence[int], gone_names: Sequence[str], added: Sequence[str],
+                ) -> tuple[np.ndarray | None, Places]:
+        """Return the order (n,) of the boxes that stay and then of those added; None: as they are.
+
+        gone: indices of boxes; gone_names: their names.
+        """
+        if not gone and self.former.keys().isdisjoint(added):
+            numbers = np.arange(self.next, self.next + len(added))
+            return None, Places(np.concatenate((self.numbers, numbers)), self.next + len(added),
+                                self.former)
+        former, following = dict(self.former), count(self.next)
+        came = [former.pop(name) if name in former else next(following) for name in added]
+        former.update(zip(gone_names, self.numbers[gone].tolist()))
+        for name in list(former)[:max(0, len(former) - MOST_BOXES)]:
+            del former[name]
+        numbers = np.concatenate((np.delete(self.numbers, gone), np.array(came, np.int64)))
+        order = np.argsort(numbers)
+        is_sorted = bool((order[1:] > order[:-1]).all())
+        return None if is_sorted else order, Places(numbers[order], next(following), former)
+
+
 Pattern = tuple[str, str]
 """Names of the boxes or bodies a and b of some pairs, with `*`, `?` and `[..]`."""
 
@@ -176,8 +210,8 @@ class Scene:
     """The pairs that are listed by the names of their boxes."""
     frame_id: str = ''
     """The common frame that all poses must be in; empty: any, as long as it is the same."""
-    pose_array: bool = False
-    """Whether one message has the poses of all that moves; else each box or body has a topic."""
+    poses: str = 'topics'
+    """How the poses of what moves come: one of POSES."""
     patterns: tuple[Pattern, ...] = ()
     bodies: Mapping[str, Frame] = field(default_factory=dict)
     """Bodies by name; each box names the one that it is a part of."""
@@ -198,58 +232,111 @@ class Scene:
         return np.array([is_alike(name) is not None or box.body in bodies
                          for name, box in self.boxes.items()])
 
-    def changed(self, changes: Mapping[str, Box | None]) -> Scene:
+    @property
+    def in_one_message(self) -> bool:
+        """Whether one message has the poses of all that moves; else each has a topic."""
+        return self.poses != 'topics'
+
+    def changed(self, changes: Mapping[str, Box | None], frames: Mapping[str, Frame | None],
+                ) -> tuple[Scene, np.ndarray]:
         """Return the scene in which boxes are new, or replaced where they are, or gone (None).
 
-        New ones come last. Patterns may match no box then. Raises SceneError for a listed pair that
-        lacks a box, or whose boxes no longer move against each other. The time goes into copies:
-        only what changes is looked at.
+        frames: the same of bodies.
+        New boxes come last, but one that comes back has its former place. Patterns may match no box
+        then. Returns also the index (n,) of each box in this scene, -1 where pose or size differ.
+        Raises SceneError for a listed pair whose boxes no longer move against each other. The time
+        goes into copies: only what changes is looked at.
         """
         given = {name: box for name, box in changes.items() if box is not None}
-        boxes = dict(self.boxes)  # a copy without a look at any
-        boxes.update(given)
         gone = [self.index_of[name] for name in changes.keys() - given.keys()]
+        boxes = {**self.boxes, **given}
         for name in changes.keys() - given.keys():
             del boxes[name]
-        scene, part = self._with(boxes), self._with(given)
+        bodies: dict[str, Frame] = {name: frame for name, frame in {**self.bodies, **frames}.items()
+                                    if frame is not None}
+        part = self._with(given, bodies)
+        # Rows of this scene's arrays, and behind them of those of `part`.
+        source = np.arange(len(self.boxes))
         is_new = np.array([name not in self.boxes for name in given], bool)
-        replaced = [self.index_of[name] for name in given if name in self.boxes]
+        source[[self.index_of[name] for name in given if name in self.boxes]] = (
+            len(source) + np.flatnonzero(~is_new))
+        source = np.concatenate((np.delete(source, gone), len(source) + np.flatnonzero(is_new)))
+        order, places = self._places.changed(
+            gone, [self.names[index] for index in gone],
+            [name for name in given if name not in self.boxes])
+        if order is not None:
+            names, source = list(boxes), source[order]
+            boxes = {names[index]: boxes[names[index]] for index in order.tolist()}
+        scene = self._with(boxes, bodies)
+        vars(scene)['_places'] = places
+        kept = self._keep_arrays(scene, part, source)
+        self._keep_groups(scene, part, source)
+        if not gone and order is None:
+            added = tuple(name for name in given if name not in self.boxes)
+            vars(scene)['names'] = self.names + added
+            index_of = vars(scene)['index_of'] = dict(self.index_of)
+            index_of.update(zip(added, count(len(index_of))))
+            vars(scene)['rows'] = self.rows
+        vars(scene)['listed_names'] = self.listed_names
+        if not self.in_one_message:  # topics stay
+            vars(scene)['moving'] = self.moving
+        if self.pairs and (frames or not self.listed_names.isdisjoint(changes)):
+            _check_pairs(scene)
+        return scene, kept
 
-        def merged(rows: np.ndarray, values: np.ndarray) -> np.ndarray:
-            rows = np.concatenate((rows, values[is_new]))
-            if replaced:
-                rows[replaced] = values[~is_new]
-            return np.delete(rows, gone, axis=0) if gone else rows
+    def _keep_arrays(self, scene: Scene, part: Scene, source: np.ndarray) -> np.ndarray:
+        """Make the arrays of a changed scene; return the index (n,) in this one of each box, or -1.
 
-        for key in ('sizes', 'box_poses', 'body_of', 'is_fixed'):
-            vars(scene)[key] = merged(getattr(self, key), getattr(part, key))
+        part: what is new. source (n,): rows of the arrays of this scene and of `part`.
+        """
+        index = {name: number for number, name in enumerate(scene.bodies)}
+        renumbered = np.array([index.get(name, -1) for name in self.bodies] + [-1], np.int32)
+        for key, rows in (('sizes', self.sizes), ('box_poses', self.box_poses),
+                          ('body_of', renumbered[self.body_of])):
+            vars(scene)[key] = np.concatenate((rows, getattr(part, key)))[source]
+        frames = [frame.pose is not None for frame in scene.bodies.values()]
+        vars(scene)['is_fixed'] = np.where(
+            scene.body_of < 0, ~np.isnan(scene.box_poses[:, 0]),
+            np.array([*frames, False])[scene.body_of])
+        is_same = [self.bodies.get(name) is frame for name, frame in scene.bodies.items()]
+        return np.where((source < len(self.boxes)) & np.array([*is_same, True])[scene.body_of],
+                        source, -1)
+
+    def _keep_groups(self, scene: Scene, part: Scene, source: np.ndarray) -> None:
+        """Take over which patterns match the boxes of a changed scene."""
         kinds, kind = self._kinds
         number_of = {row.tobytes(): number for number, row in enumerate(kinds)}
         numbers = [number_of.setdefault(row.tobytes(), len(number_of)) for row in part.sides]
-        if self.patterns and len(number_of) <= len(boxes):  # else kinds of no box any more go
-            kind = merged(kind, np.array(numbers, np.int32))
-            if len(number_of) == len(kinds):
-                vars(scene)['groups'] = kind, self.groups[1]
-            else:
-                kinds = np.frombuffer(b''.join(number_of), bool).reshape(-1, kinds.shape[1])
-            vars(scene)['_kinds'] = kinds, kind
-        if not gone:
-            added = tuple(name for name in given if name not in self.boxes)
-            vars(scene)['names'] = self.names + added
-            index = vars(scene)['index_of'] = dict(self.index_of)
-            index.update(zip(added, count(len(index))))
-            vars(scene)['rows'] = self.rows
-        vars(scene)['listed_names'] = self.listed_names
-        if not self.listed_names.isdisjoint(changes):
-            _check_pairs(scene)
+        if not self.patterns or len(number_of) > len(scene.boxes):  # kinds of no box any more go
+            return
+        kind = np.concatenate((kind, np.array(numbers, np.int32)))[source]
+        if len(number_of) == len(kinds):
+            vars(scene)['groups'] = kind, self.groups[1]
+        else:
+            kinds = np.frombuffer(b''.join(number_of), bool).reshape(-1, kinds.shape[1])
+        vars(scene)['_kinds'] = kinds, kind
+
+    def with_boxes(self, boxes: Mapping[str, Box], bodies: Mapping[str, Frame]) -> Scene:
+        """Return the scene of other boxes and bodies, which a changed scene may have.
+
+        Raises SceneError.
+        """
+        scene = self._with(boxes, bodies)
+        _check_kinds(scene)
+        _check_bodies(scene)
+        _check_pairs(scene)
         return scene
 
-    def _with(self, boxes: Mapping[str, Box]) -> Scene:
-        """Return an unchecked scene of other boxes."""
+    def _with(self, boxes: Mapping[str, Box], bodies: Mapping[str, Frame]) -> Scene:
+        """Return an unchecked scene of other boxes and bodies."""
         scene = object.__new__(Scene)
         vars(scene).update({key: getattr(self, key) for key in self.__dataclass_fields__},
-                           boxes=boxes)
+                           boxes=boxes, bodies=bodies)
         return scene
+
+    @cached_property
+    def _places(self) -> Places:
+        return Places(np.arange(len(self.boxes)), len(self.boxes), {})
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -319,15 +406,11 @@ class Scene:
         local = np.where(of_body[:, None], self.box_poses, AT_FRAME)
         return np.where(of_body, len(self.boxes) + self.body_of, -1).astype(np.int64), local
 
-    def fixed_poses(self, spare: int = 0) -> np.ndarray:
-        """Return new poses (n + m, 7) of boxes and bodies, by `row_of`: NaN for what moves.
-
-        spare: how many rows of NaN follow.
-        """
-        nowhere = np.full((spare, 7), np.nan)
-        poses = np.concatenate((self.box_poses, _poses_of(self.bodies), nowhere))
+    def fixed_poses(self) -> np.ndarray:
+        """Return new poses (n + m, 7) of boxes and bodies, by `row_of`: NaN for what moves."""
+        poses = np.concatenate((self.box_poses, _poses_of(self.bodies)))
         if self.bodies:
-            self.place_boxes(poses[:len(poses) - spare])
+            self.place_boxes(poses)
         return poses
 
     def place_boxes(self, poses: np.ndarray) -> None:
@@ -395,6 +478,32 @@ class Scene:
         return (a, b) in self._listed or bool(self.patterns and self.rigid[a] != self.rigid[b] and (
             allowed[group[min(a, b)], group[max(a, b)]] == (1 if a < b else 2)))
 
+    @property
+    def is_matched(self) -> np.ndarray:
+        """Return which boxes (n,) some side of a pattern matches."""
+        kinds, kind = self._kinds
+        matched: np.ndarray = np.any(kinds, axis=1, keepdims=True)
+        return matched[kind, 0] if self.patterns else np.zeros(len(kind), bool)
+
+    @cached_property
+    def is_paired(self) -> np.ndarray:
+        """Return which boxes (n,) are in a pair."""
+        paired = np.zeros(len(self.boxes), bool)
+        paired[self.rows.ravel()] = True
+        if not self.patterns:
+            return paired
+        group, allowed = self.groups
+        meet = (allowed > 0).astype(np.int64)
+        partners = (np.bincount(group, minlength=len(meet)) @ meet)[group]
+        # Fixed boxes do not meet, nor do boxes of one body, nor a box and itself.
+        own = meet[group, group]
+        held = self.is_fixed | (self.body_of >= 0)
+        sets = np.where(self.is_fixed, 0, 1 + self.body_of)[held]
+        shape = 1 + len(self.bodies), len(meet)
+        counts = np.bincount(sets * len(meet) + group[held], minlength=shape[0] * shape[1])
+        own[held] = (counts.reshape(shape) @ meet)[sets, group[held]]
+        return paired | (partners > own)
+
     @cached_property
     def is_asked(self) -> np.ndarray:
         """Return which boxes (n,) patterns pair with others."""
@@ -443,9 +552,9 @@ class Scene:
 
     @cached_property
     def moving(self) -> tuple[str, ...]:
-        """Names of boxes, then of bodies that move; without an array, only of those in a pair."""
+        """Names of boxes, then of bodies that move; with topics, only of those in a pair."""
         moves = ~self.is_fixed
-        if not self.pose_array:
+        if not self.in_one_message:
             asked = self.is_asked.copy()
             asked[self.rows.ravel()] = True
             moves &= asked
@@ -499,12 +608,12 @@ def _check_kinds(scene: Scene) -> None:
             for value in row:
                 check(isinstance(value, str), (part, number), 'of text', row)
     check(isinstance(scene.frame_id, str), ('frame_id',), 'text', scene.frame_id)
-    check(isinstance(scene.pose_array, bool), ('pose_array',), 'True or False', scene.pose_array)
+    check(scene.poses in POSES, ('poses',), f'one of {", ".join(POSES)}', scene.poses)
     for path, names in ((('frame_id',), (scene.frame_id,)), (('boxes',), scene.boxes),
                         (('bodies',), scene.bodies)):
         for name in names:
             if fault := name_fault(name):
-                raise SceneError(path, fault)
+                raise SceneError(path, f'{short_repr(name)} {fault}')
 
 
 def _check_bodies(scene: Scene) -> None:
@@ -529,7 +638,7 @@ def _check_pairs(scene: Scene) -> None:
         path = ('pairs', number)
         fault = name_fault(pair.name)
         if fault and pair.name != f'{pair.a}_{pair.b}':
-            raise SceneError((*path, 'name'), fault)
+            raise SceneError((*path, 'name'), f'{short_repr(pair.name)} {fault}')
         for side, name in (('a', pair.a), ('b', pair.b)):
             if name not in boxes:
                 raise SceneError((*path, side), f'{short_repr(name)} is ' + (

@@ -50,15 +50,12 @@ class SceneCheck:
         """Take scene and model; most_near: pairs that one question may leave to the model."""
         self.solver, self._scene, self.most_near = solver, solver.scene, most_near
         scene = self._scene
-        self._names = ['' for _ in range(MOST_BOXES)] + list(scene.names)
-        self._size_of = {name: tuple(box.size) for name, box in scene.boxes.items()}
-        self._size_rows = [A_GUEST for _ in range(MOST_BOXES)] + list(self._size_of.values())
-        self._sizes = np.array(self._size_rows)
-        fixed = scene.fixed_poses()
-        self._fixed = {name: tuple(pose) for name, pose in zip(scene.row_of, fixed.tolist())
-                       if not np.isnan(pose[0])}
-        self._rows = np.concatenate((np.full((MOST_BOXES, 7), np.nan), fixed))
-        self._poses = self._rows[:len(self._names)]
+        self._guests = ['' for _ in range(MOST_BOXES)]  # their names
+        self._sizes = np.concatenate((np.broadcast_to(A_GUEST, (MOST_BOXES, 3)), scene.sizes))
+        self._asked_sizes: dict[int, Row] = {}
+        """Sizes by row, where a question had others than the scene."""
+        self._rows = np.concatenate((np.full((MOST_BOXES, 7), np.nan), scene.fixed_poses()))
+        self._poses = self._rows[:len(self._sizes)]
         self._body_of = np.concatenate((np.full(MOST_BOXES, -1), scene.body_of)).astype(np.int32)
         self._is_fixed = np.concatenate((np.zeros(MOST_BOXES, bool), scene.is_fixed))
         self._by_margin: dict[float, tuple[native.BroadPhase, ContactSolver]] = {}
@@ -84,7 +81,7 @@ class SceneCheck:
 
     def __call__(self, names: Sequence[str], poses: Sequence[Row], sizes: Sequence[Row],
                  pairs: Sequence[tuple[str, str]] = (), margin: float = 0.0,
-                 ) -> Found:
+                 ) -> tuple[Found, np.ndarray]:
         """Return which boxes touch, and which are apart by the distance `margin` [m] at most.
 
         names, poses (n, 7), sizes (n, 3): of the boxes and bodies of a question. A size of zeros is
@@ -92,6 +89,7 @@ class SceneCheck:
         the scene's.
         pairs: those that are asked for. Without, the scene's pairs of these boxes are. Guests meet
         all boxes of the question and all fixed ones. `names_of` tells the names of the answer.
+        With it come the areas (k,) by which the faces of what touches meet [m²].
         Raises ValueError, with field and value, for what is refused.
         """
         margin = as_margin(margin)
@@ -109,14 +107,16 @@ class SceneCheck:
                                  'matter')
             contacts = solver.batch(self._poses, sizes=self._sizes, pairs=places)
             found = touching_and_near(places, contacts, solver, self._sizes, self._poses, margin)
+            areas = native.face_areas(self._sizes, self._poses, found.pairs)
         finally:
             native.write_poses(self._rows, moving, [None] * len(moving))
             self._place_bodies()
-        return found
+        return found, areas
 
     def names_of(self, a: int, b: int) -> tuple[str, str, str]:
         """Return the name of a pair of the last answer, and those of its boxes."""
-        name_a, name_b = self._names[a], self._names[b]
+        name_a, name_b = (self._guests[row] if row < MOST_BOXES else
+                          self._scene.names[row - MOST_BOXES] for row in (a, b))
         if min(a, b) < MOST_BOXES:
             return f'{name_a}_{name_b}', name_a, name_b
         return self._label_of(a - MOST_BOXES, b - MOST_BOXES), name_a, name_b
@@ -139,7 +139,7 @@ class SceneCheck:
         resized: dict[int, Row] = {}  # sizes by row, where they differ from those before
         for number, (name, pose, size) in enumerate(zip(names, poses, sizes)):
             if fault := name_fault(name):
-                raise ValueError(f'boxes[{number}].name: {fault}')
+                raise ValueError(f'boxes[{number}].name: {short_repr(name)} {fault}')
             if name in rows:
                 raise ValueError(f'boxes[{number}]: {short_repr(name)} is the name of '
                                  f'boxes[{names.index(name)}], too')
@@ -152,10 +152,10 @@ class SceneCheck:
             known = self._scene.row_of.get(name)
             row = rows[name] = number if known is None else MOST_BOXES + known
             if known is None:
-                self._names[number] = name
-            if name not in self._fixed:
+                self._guests[number] = name
+            if self._fixed_pose(name) is None:
                 moved[row] = pose
-                if row < len(self._size_rows) and size != self._size_rows[row]:
+                if row < len(self._sizes) and size != self._size_at(row):
                     resized[row] = size
         if resized:
             self._resize(resized)
@@ -163,10 +163,29 @@ class SceneCheck:
         native.write_poses(self._rows, moving, list(moved.values()))
         return rows, moving
 
+    def _size_at(self, row: int) -> Row:
+        """Return the size of the box of a row, as the last question had it."""
+        known = A_GUEST if row < MOST_BOXES else self._size_of(self._scene.names[row - MOST_BOXES])
+        return self._asked_sizes.get(row, known or A_BODY)
+
+    def _size_of(self, name: str) -> Row | None:
+        """Return the size of a box of the scene, None for another name."""
+        box = self._scene.boxes.get(name)
+        return tuple(box.size) if box else None
+
+    def _fixed_pose(self, name: str) -> Row | None:
+        """Return the pose of a box or body that is fixed in the scene, None for another name."""
+        scene = self._scene
+        row = scene.row_of.get(name)
+        if row is None or not (scene.bodies[name].pose is not None if name in scene.bodies else
+                               scene.is_fixed[row]):
+            return None
+        return tuple(self._rows[MOST_BOXES + row].tolist())
+
     def _resize(self, sizes: dict[int, Row]) -> None:
         """Give boxes other sizes, by their rows."""
         for row, size in sizes.items():
-            self._sizes[row] = self._size_rows[row] = size
+            self._sizes[row] = self._asked_sizes[row] = size
         places, numbers = np.array(list(sizes), np.int64), np.array(list(sizes.values()))
         for broad_phase, _ in self._by_margin.values():
             broad_phase.resize(places, numbers)
@@ -176,7 +195,7 @@ class SceneCheck:
 
         Raises ValueError for what contradicts the scene.
         """
-        known, fixed = self._size_of.get(name), self._fixed.get(name)
+        known, fixed = self._size_of(name), self._fixed_pose(name)
         if name in self._scene.bodies:
             if any(size):
                 raise ValueError('is a body of the scene, whose boxes have their sizes there')
@@ -209,7 +228,7 @@ class SceneCheck:
             if name in rows and name not in scene.bodies:
                 return [rows[name]]
             mover = scene.mover(name) if name in scene.boxes else name
-            if not (mover in rows or mover in self._fixed):
+            if not (mover in rows or self._fixed_pose(mover)):
                 if name in scene.row_of:
                     raise ValueError(f'{field}: {short_repr(name)} moves, and its pose is not in '
                                      f'the request: add {short_repr(mover)} to boxes')

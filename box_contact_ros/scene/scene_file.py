@@ -12,12 +12,11 @@ import os
 import re
 from collections.abc import KeysView, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import yaml
 
-from ..resources import find_file, resource_path
+from ..resources import find_file, read_regular, resource_path
 from ..solver.checks import SHOWN, short_repr
 from .scene import Box, Frame, KeyPath, Pair, Scene, SceneError
 
@@ -68,7 +67,7 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
     if not isinstance(path, str | os.PathLike) or not _is_name(os.fspath(path)):
         raise SceneError(('path',), f'must be that of a file, not {short_repr(path)}')
     try:
-        text = _read(find_file(path))
+        text = read_regular(find_file(path), MOST_BYTES).decode('utf-8')
         _check_yaml(text)
         return _scene_of(yaml.load(text, Loader=_Loader))
     except OSError as error:
@@ -80,17 +79,6 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
         if len(reason) > 2 * SHOWN:  # it shows what is refused
             reason = f'{reason[:SHOWN]} ... {reason[-SHOWN:]}'
         raise SceneError(fault.path, reason, f'{path}') from error
-
-
-def _read(path: Path) -> str:
-    """Return the text of a regular file, or raise OSError or ValueError."""
-    if path.exists() and not path.is_file():  # a pipe would be waited for
-        raise OSError('it is not a regular file')
-    with path.open('rb') as file:
-        content = file.read(MOST_BYTES + 1)
-    if len(content) > MOST_BYTES:
-        raise OSError(f'it has more than {MOST_BYTES} bytes')
-    return content.decode('utf-8')
 
 
 @dataclass
@@ -153,10 +141,11 @@ def _is_name(path: str | bytes) -> bool:
 def _scene_of(data: Any) -> Scene:
     """Return the scene that data means, or raise SceneError."""
     _check_schema(data)
-    boxes = {name: _box(entry, ('boxes', name)) for name, entry in data.get('boxes', {}).items()}
+    boxes = {name: _box(entry, ('boxes', name), entry.get('body', ''))
+             for name, entry in data.get('boxes', {}).items()}
     bodies = data.get('bodies', {})
     for body, parts in bodies.items():
-        for part, entry in parts['boxes'].items():
+        for part, entry in parts.get('boxes', {}).items():
             name, place = f'{body}_{part}', ('bodies', body, 'boxes', part)
             if name in boxes:
                 raise SceneError(place, f'{short_repr(name)} is the name of another box')
@@ -172,7 +161,7 @@ def _scene_of(data: Any) -> Scene:
         scene = Scene(
             boxes, tuple(Pair(entry.get('name', f'{entry["a"]}_{entry["b"]}'), entry['a'],
                               entry['b']) for entry in listed.values()),
-            data.get('frame_id', ''), data.get('poses') == 'array',
+            data.get('frame_id', ''), data.get('poses', 'topics'),
             tuple((entry['a'], entry['b']) for entry in patterns.values()),
             {name: _frame(name, entry) for name, entry in bodies.items()})
     except SceneError as fault:  # the file has both in one list
@@ -180,9 +169,9 @@ def _scene_of(data: Any) -> Scene:
         if part in ('pairs', 'patterns') and path:
             path[0] = list(listed if part == 'pairs' else patterns)[int(path[0])]
         raise SceneError(('pairs' if part == 'patterns' else part, *path), fault.reason) from None
-    if not scene.pose_array and len(scene.moving) > MOST_STREAMS:
+    if not scene.in_one_message and len(scene.moving) > MOST_STREAMS:
         raise SceneError(('boxes',), f'{len(scene.moving)} boxes and bodies have a topic of their '
-                                     f'own, and at most {MOST_STREAMS} may: set poses: array')
+                                     f'own, and at most {MOST_STREAMS} may: set poses: named')
     return scene
 
 

@@ -10,7 +10,7 @@ somebody asks for them.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ from ..solver.contacts_of import find_contacts, touching_and_near
 from ..solver.model import Model
 from ..solver.nearest import Nearest, Nearests
 from .changes import checked_changes
-from .scene import NOWHERE, Box, Pair, Scene
+from .scene import NOWHERE, Box, Frame, Pair, Scene
 
 NO_BODIES = np.zeros(0, np.int64)
 """The bodies of boxes, where a scene has none."""
@@ -66,6 +66,28 @@ class Answer(NamedTuple):
         return [self.scene.pair_of(a, b) for a, b in self.stale.tolist()]
 
 
+class _Revision(NamedTuple):
+    """A revision of a scene, and what finds its pairs."""
+
+    scene: Scene
+    number: int
+    rows: np.ndarray  # (m, 7) poses of boxes and of bodies
+    moving_rows: np.ndarray  # (l,) of what moves
+    broad_phase: native.BroadPhase
+
+    @classmethod
+    def of(cls, scene: Scene, number: int, margin: float) -> _Revision:
+        """Begin without poses."""
+        moving_rows = np.array([scene.row_of[name] for name in scene.moving], np.int64)
+        return cls(scene, number, scene.fixed_poses(), moving_rows, native.BroadPhase(
+            scene.sizes, scene.is_fixed, margin, scene.rows, *scene.groups, scene.body_of))
+
+    @property
+    def poses(self) -> np.ndarray:
+        """(n, 7) of the boxes."""
+        return self.rows[:len(self.scene.boxes)]
+
+
 class SceneSolver:
     """Contacts of all pairs of a scene, one tick at a time.
 
@@ -86,73 +108,73 @@ class SceneSolver:
         self._most_near = as_whole(most_near, 'most_near', 0, sys.maxsize)
         self.model = model
         self._solver = ContactSolver(model=model, margin=self.margin)
-        self._take(scene, scene.moving, 0)
+        self._at = _Revision.of(scene, 0, self.margin)
         self._refuse_sizes(*(np.unique(sizes, axis=0)
                              for sizes in (scene.sizes, scene.sizes[scene.rows].reshape(-1, 6))))
         self([None] * len(self.moving))
 
-    def _take(self, scene: Scene, moving: Sequence[str], revision: int) -> None:
-        """Begin anew with a scene. moving: whose poses a tick has, in their order."""
-        self.scene = scene
-        self.revision = revision
+    @property
+    def scene(self) -> Scene:
+        """Return the scene as it is now."""
+        return self._at.scene
+
+    @property
+    def revision(self) -> int:
         """How often the scene has been changed."""
-        self.moving = tuple(moving)
-        """Whose poses a call takes, in their order. What moves no more has a row still, which is
-        not read."""
-        self._rows = scene.fixed_poses(spare=1)
-        """Poses of boxes, of bodies, and of what moves no more."""
-        self._poses = self._rows[:len(scene.boxes)]
-        is_moving = set(scene.moving)
-        self._moving = np.array([scene.row_of[name] if name in is_moving else len(self._rows) - 1
-                                 for name in self.moving], np.int64)
-        self._broad_phase = native.BroadPhase(scene.sizes, scene.is_fixed, self.margin, scene.rows,
-                                              *scene.groups, scene.body_of)
+        return self._at.number
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """Whose poses a call takes, in their order."""
+        return self.scene.moving
 
     def __reduce__(self) -> tuple[Callable[..., SceneSolver], tuple[Any, ...]]:
         """Pickle what makes the solver."""
-        return _made_again, (self.scene, self.model, self.margin, self._most_near, self.moving,
-                             self.revision)
+        return _made_again, (self.scene, self.model, self.margin, self._most_near, self.revision)
 
-    def changed(self, *, fixed: Mapping[str, Box] | None = None,
-                moving: Mapping[str, Box] | None = None, absent: Collection[str] = (),
-                ) -> SceneSolver:
-        """Return the solver of the scene that `set_boxes` makes; this one stays as it is."""
-        changes = checked_changes(self.scene, fixed or {}, moving or {}, absent)
-        # A box that moves again has its former row.
-        scene = self.scene.changed(changes)
-        kept = np.arange(len(self.scene.boxes))
-        index = self.scene.index_of
-        kept[[index[name] for name in changes if name in index]] = -1
-        if gone := [index[name] for name, box in changes.items() if box is None]:
-            kept = np.delete(kept, gone)
-        kept = np.concatenate((kept, np.full(len(scene.boxes) - len(kept), -1)))
-        rows = (*self.moving, *(name for name in moving or {} if name not in self.moving))
+    def changing(self, *, fixed: Mapping[str, Box] | None = None,
+                 moving: Mapping[str, Box] | None = None, parts: Mapping[str, Box] | None = None,
+                 bodies: Mapping[str, Frame] | None = None, absent: Collection[str] = (),
+                 ) -> Generator[None, None, SceneSolver]:
+        """Return, in steps, the solver of the scene that `set_boxes` makes; this one stays."""
+        changes = checked_changes(self.scene, fixed or {}, moving or {}, parts or {}, bodies or {},
+                                  absent)
+        yield
+        scene, kept = self.scene.changed(*changes)
+        yield
+        later = _Revision.of(scene, self.revision + 1, self.margin)
+        yield
+        later.broad_phase.take_fixed(self._at.broad_phase, kept)
         solver = object.__new__(SceneSolver)
-        vars(solver).update(vars(self))
-        solver._take(scene, rows, self.revision + 1)
-        solver._broad_phase.take_fixed(self._broad_phase, kept)
-        sizes = np.array([box.size for box in changes.values() if box is not None]).reshape(-1, 3)
-        listed = [] if scene.listed_names.isdisjoint(changes) else scene.sizes[scene.rows]
-        solver._refuse_sizes(sizes, np.reshape(listed, (-1, 6)))
+        solver.model, solver.margin, solver._at = self.model, self.margin, later
+        solver._most_near, solver._solver = self._most_near, self._solver
+        sizes = np.array([box.size for box in changes.boxes.values() if box is not None])
+        listed = ([] if scene.listed_names.isdisjoint(changes.boxes) else
+                  scene.sizes[scene.rows])
+        solver._refuse_sizes(sizes.reshape(-1, 3), np.reshape(listed, (-1, 6)))
         return solver
 
     def with_model(self, model: str | Model, most_near: int = sys.maxsize) -> SceneSolver:
         """Return a solver of the same scene by another model."""
-        return _made_again(self.scene, model, self.margin, most_near, self.moving, self.revision)
+        return _made_again(self.scene, model, self.margin, most_near, self.revision)
 
     def set_boxes(self, *, fixed: Mapping[str, Box] | None = None,
-                  moving: Mapping[str, Box] | None = None, absent: Collection[str] = ()) -> int:
+                  moving: Mapping[str, Box] | None = None, parts: Mapping[str, Box] | None = None,
+                  bodies: Mapping[str, Frame] | None = None, absent: Collection[str] = ()) -> int:
         """Change boxes of the scene, all or none; return the new `revision`.
 
         fixed: boxes with poses, by name: new ones, or ones that replace those of the scene.
-        moving: boxes without poses, which move from now on, in a scene with `pose_array`. Those of
-        the scene that moved before keep their places in `moving`; others come last.
-        absent: names of boxes that are there no more.
+        moving: boxes without poses, which move from now on.
+        parts: boxes with a `body` of the scene or of `bodies`, which they become parts of.
+        bodies: new ones by name, or ones that start or stop to move.
+        absent: names of boxes that are there no more, or of bodies with all their boxes.
 
-        Listed pairs, patterns and bodies stay; new boxes are in the pairs whose patterns match.
+        What moves changes with `poses` of the scene 'named' alone. Listed pairs and patterns stay;
+        new boxes are in the pairs whose patterns match. A body whose last box goes is gone.
         Raises SceneError, a ValueError with field and value.
         """
-        vars(self).update(vars(self.changed(fixed=fixed, moving=moving, absent=absent)))
+        self._at = finished(self.changing(fixed=fixed, moving=moving, parts=parts, bodies=bodies,
+                                          absent=absent))._at
         return self.revision
 
     def _refuse_sizes(self, sizes: np.ndarray, listed: np.ndarray) -> None:
@@ -181,46 +203,56 @@ class SceneSolver:
         """
         self._set_poses(poses)
         if self.scene.bodies:
-            self.scene.place_boxes(self._rows[:-1])
+            self.scene.place_boxes(self._at.rows)
         pairs, contacts, stale = find_contacts(
-            self._broad_phase, self._solver, self.scene.sizes, self._poses,
+            self._at.broad_phase, self._solver, self.scene.sizes, self._at.poses,
             lambda box: f'pose of {self.scene.names[box]}:', most_near=self._most_near)
-        found = touching_and_near(pairs, contacts, self._solver, self.scene.sizes, self._poses,
+        found = touching_and_near(pairs, contacts, self._solver, self.scene.sizes, self._at.poses,
                                   self.margin)
         return Answer(*found, len(pairs), stale, self.scene, self.revision)
 
-    def parts(self) -> tuple[native.BroadPhase, ContactSolver, float, int, np.ndarray, np.ndarray,
-                             np.ndarray, np.ndarray, np.ndarray]:
+    def _parts(self) -> tuple[native.BroadPhase, ContactSolver, float, int, np.ndarray, np.ndarray,
+                              np.ndarray, np.ndarray, np.ndarray]:
         """Return what native.TickWriter answers ticks of the scene by: its first nine arguments."""
-        scene, solver, sizes = self.scene, self._solver, self.scene.sizes
+        at, scene, solver, sizes = self._at, self.scene, self._solver, self.scene.sizes
         if (sizes[1:] == sizes[:-1]).all():  # model `paper` is in C++ for boxes of one size
             solver = ContactSolver(sizes[0], sizes[0], model=self.model, margin=self.margin)
-        bodies = scene.placement if scene.bodies else (NO_BODIES, self._rows[:0])
-        return (self._broad_phase, solver, self.margin, self._most_near, sizes, self._rows,
-                self._moving, *bodies)
+        bodies = scene.placement if scene.bodies else (NO_BODIES, at.rows[:0])
+        return (at.broad_phase, solver, self.margin, self._most_near, sizes, at.rows,
+                at.moving_rows, *bodies)
 
     def _set_poses(self, poses: Sequence[np.ndarray | None] | ArrayLike) -> None:
         """Take the poses of the boxes and bodies that move."""
-        if native.write_poses(self._rows, self._moving, poses):  # those of every node
+        rows, moving_rows = self._at.rows, self._at.moving_rows
+        if native.write_poses(rows, moving_rows, poses):  # those of every node
             return
         if not isinstance(poses, Sequence) or isinstance(poses, str):
             poses = as_floats(poses, 'poses', 'a list of a pose or None for each box and body that '
                               'moves, or an array (n, 7)', (None, 7))
-        if len(poses) != len(self._moving):
-            raise ValueError(f'{len(poses)} poses, but {len(self._moving)} boxes and bodies move: '
+        if len(poses) != len(moving_rows):
+            raise ValueError(f'{len(poses)} poses, but {len(moving_rows)} boxes and bodies move: '
                              f'{short_repr(list(self.moving))}; give a list of a pose or '
                              'None for each')
         if isinstance(poses, np.ndarray):
-            self._rows[self._moving] = poses
+            rows[moving_rows] = poses
             return
-        for name, index, pose in zip(self.moving, self._moving, poses):
-            self._rows[index] = NOWHERE if pose is None else as_floats(
+        for name, index, pose in zip(self.moving, moving_rows, poses):
+            rows[index] = NOWHERE if pose is None else as_floats(
                 pose, f'pose of {name}', 'a pose (x y z qx qy qz qw)', (7,))
 
 
-def _made_again(scene: Scene, model: str | Model, margin: float, most_near: int,
-                moving: tuple[str, ...], revision: int) -> SceneSolver:
+def finished(steps: Generator[None, None, Any]) -> Any:
+    """Return what steps make, after all of them."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            return end.value
+
+
+def _made_again(scene: Scene, model: str | Model, margin: float, most_near: int, revision: int,
+                ) -> SceneSolver:
     """Return a solver that was pickled."""
     solver = SceneSolver(scene, model=model, margin=margin, most_near=most_near)
-    solver._take(scene, moving, revision)
+    solver._at = _Revision.of(scene, revision, solver.margin)
     return solver

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import numbers
+import re
 import reprlib
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
@@ -25,10 +26,17 @@ SHOWN = 200  # characters of a refused value that an error shows
 MOST_NAME_BYTES = 255
 """Of the name of a box or pair, and of a frame_id, in UTF-8; ROS's own names have no more. A
 response may repeat a name thousands of times."""
+NAME = re.compile('[A-Za-z0-9_-]+')
+"""Of a box or body, as containers have them: MSKU-123. A topic takes no `-`, and no digit first."""
 _REPR = reprlib.Repr()
 _REPR.maxlist = _REPR.maxtuple = 8  # a pose, and whether there is more
 _REPR.maxlevel = 3
 _REPR.maxstring = _REPR.maxother = SHOWN
+
+
+def printable(text: str) -> str:
+    """Return a text in which what no terminal shows is a question mark."""
+    return ''.join(mark if mark.isprintable() else '?' for mark in text)
 
 
 def short_repr(value: Any) -> str:
@@ -50,12 +58,15 @@ def nearest_name(name: object, known: Iterable[str]) -> str:
     return nearest and f' (did you mean {spelled[nearest]}?)'
 
 
-def name_fault(name: str) -> str | None:
-    """Return why a text is too long to be a name or a frame_id, or None."""
+def name_fault(name: str, *, of_box: bool = False) -> str | None:
+    """Return what follows a text that is no name or frame_id, as to why; or None.
+
+    of_box: names are letters, digits, _ and -, as in msg_schemas/scene.json.
+    """
+    if of_box and not NAME.fullmatch(name):
+        return 'is no name of letters, digits, _ and -'
     size = len(name.encode(errors='surrogatepass'))
-    if size <= MOST_NAME_BYTES:
-        return None
-    return f'{short_repr(name)} has {size} bytes, more than {MOST_NAME_BYTES}'
+    return f'has {size} bytes, more than {MOST_NAME_BYTES}' if size > MOST_NAME_BYTES else None
 
 
 _POSITION, _QUATERNION = ('position ({0:g}, {1:g}, {2:g})',
@@ -110,11 +121,11 @@ def as_number(value: Any, name: str) -> float:
     raise ValueError(f'{name} must be a number, not {short_repr(value)}')
 
 
-def as_margin(value: Any) -> float:
-    """Return the separation up to which pairs apart are listed [m]; ValueError for no length."""
-    margin = as_number(value, 'margin')
+def as_margin(value: Any, name: str = 'margin') -> float:
+    """Return the separation up to which pairs apart count [m]; ValueError for no length."""
+    margin = as_number(value, name)
     if not 0.0 <= margin <= LENGTH_MAX:
-        raise ValueError(f'margin must lie within 0 and {LENGTH_MAX:g} m, not {margin:g}')
+        raise ValueError(f'{name} must lie within 0 and {LENGTH_MAX:g} m, not {margin:g}')
     return margin
 
 

@@ -66,25 +66,6 @@ FIELDS = tuple(field.name for field in fields(Contacts))
 """Names of the fields of Contact and Contacts, in the order of their arguments."""
 
 
-def patch_areas(contacts: Contacts) -> np.ndarray:
-    """Return the areas (n,) of contacts' patches [m²]: 12·√(e₁·e₂), NaN without a covariance.
-
-    e₁ and e₂ are the eigenvalues of the covariance across the normal. The area is exact where the
-    overlap is a cuboid along the normal. Raises ValueError for what is not Contacts.
-    """
-    if not isinstance(contacts, Contacts):
-        raise ValueError(f'contacts must be Contacts, not {short_repr(contacts)}')
-    return native.patch_areas(contacts.normal, contacts.covariance)
-
-
-def patch_area(contact: Contact) -> float:
-    """Return the area of one contact's patch [m²], as `patch_areas` does; ValueError likewise."""
-    if not isinstance(contact, Contact):
-        raise ValueError(f'contact must be a Contact, not {short_repr(contact)}')
-    areas = native.patch_areas(contact.normal[None], contact.covariance[None])
-    return float(areas[0])
-
-
 def without_patch(contacts: Contacts) -> Contacts:
     """Return contacts of which the point alone is known.
 

@@ -238,7 +238,7 @@ class ContactSolver(native.PairSolver):
                     clearance: float | None, tolerance: float, threads: int) -> Approaches:
         names = 'ends_a', 'ends_b', 'centre_a', 'centre_b'
         if pairs is not None:
-            if not centre_a is centre_b is ends_b is None:
+            if any(value is not None for value in (centre_a, centre_b, ends_b)):
                 raise ValueError('pairs are places in starts, ends, sizes and centres: there is '
                                  'neither ends_b nor centre_a nor centre_b')
             names = 'ends', 'ends', 'centres', 'centres'

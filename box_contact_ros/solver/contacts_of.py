@@ -20,7 +20,7 @@ from ..core import native
 from .checks import as_boxes, as_margin, as_places, pose_fault, short_repr
 from .contact import Contacts
 from .contact_solver import ContactSolver
-from .faces import as_tolerance
+from .faces import as_tolerances
 from .nearest import Nearests
 
 
@@ -34,14 +34,20 @@ class Found(NamedTuple):
 
 
 class TooManyNear(ValueError):
-    """More pairs near each other than were to be answered."""
+    """More pairs near each other than were to be answered; `pairs` (k, 2) are the first ones."""
 
     reason = 'too many pairs near'
+
+    def __init__(self, most: int, pairs: np.ndarray) -> None:
+        super().__init__(f'more than {most} pairs are near each other, and so many are not '
+                         'answered')
+        self.pairs = pairs
 
 
 def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = None, *,
                 to: tuple[ArrayLike, ArrayLike] | None = None, fixed: ArrayLike | None = None,
-                margin: float = 0.0, tolerance: float = 0.0, threads: int = 1,
+                margin: float = 0.0, tolerance: float | np.ndarray = 0.0,
+                threads: int = 1, most_near: int = sys.maxsize,
                 ) -> tuple[np.ndarray, Contacts]:
     """Return which boxes touch, as rows (k, 2) of their indices a and b, and the k contacts.
 
@@ -52,8 +58,10 @@ def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = No
     box j of the second one; no two boxes of one set are a pair. Without `pairs` and `fixed`.
     fixed: (n,) bool, boxes that never move. Without `pairs`, two of them are no pair.
     margin: pairs apart are listed too, behind those in contact, up to this separation [m].
-    tolerance: the gap up to which boxes touch [m]. Above 0, contacts are those of boxes that are
+    tolerance: the gap up to which boxes touch [m]; an array (n,) has that of each box, and a pair
+    the smaller one. Above 0, contacts are those of boxes that are
     larger by it, with the separation and the volume of the boxes as they are.
+    most_near: raise TooManyNear, a ValueError, for more pairs whose bounding boxes are this near.
 
     Raises ValueError, with the field and the value, for what is not a size, a pose, a pair, a
     margin or a tolerance.
@@ -70,31 +78,32 @@ def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = No
     listed = as_places([] if pairs is None else pairs, 'pairs', count)
     if (alone := np.flatnonzero(listed[:, 0] == listed[:, 1])).size:
         raise ValueError(f'pairs[{alone[0]}] is box {listed[alone[0], 0]} with itself')
-    tolerance = as_tolerance(tolerance, sizes)
+    tolerances = as_tolerances(tolerance, sizes)
     meet = np.array([[to is None, True], [False, False]], np.uint8)  # by the sets of both boxes
     sets = min(1 + (to is not None), count) if pairs is None else 0
     of_set = np.minimum(np.arange(count) >= first, max(0, sets - 1)).astype(np.int32)
     broad_phase = native.BroadPhase(
-        sizes + tolerance, _as_flags(fixed, 'fixed', count), margin, listed, of_set,
+        sizes + tolerances[:, None], _as_flags(fixed, 'fixed', count), margin, listed, of_set,
         meet[:sets, :sets].copy(), np.full(count, -1, np.int32))
-    near, contacts = _contacts_of_near(broad_phase, sizes, poses, margin, tolerance, threads)
+    near, contacts = _contacts_of_near(broad_phase, sizes, poses, margin, tolerances, most_near,
+                                       threads)
     return near - [0, 0 if to is None else first], contacts
 
 
 def _contacts_of_near(broad_phase: native.BroadPhase, sizes: np.ndarray, poses: np.ndarray,
-                      margin: float, tolerance: float, threads: int,
+                      margin: float, tolerances: np.ndarray, most_near: int, threads: int,
                       ) -> tuple[np.ndarray, Contacts]:
-    """Return the pairs (k, 2) that touch, up to the tolerance, or are within the margin."""
-    grown = sizes + tolerance
+    """Return the pairs (k, 2) that touch, up to their tolerance, or are within the margin."""
+    grown = sizes + tolerances[:, None]
     solver = ContactSolver(margin=margin)
     near, contacts, _ = find_contacts(broad_phase, solver, grown, poses, 'poses[{}]'.format,
-                                      threads=threads)
+                                      most_near=most_near, threads=threads)
     near, contacts = in_contact(near, contacts, margin)
-    if not tolerance:
+    if not tolerances.any():
         return near, contacts
     # Turned boxes grow by more along some axes.
     as_they_are = solver.batch(poses, sizes=sizes, pairs=near, threads=threads)
-    touches = as_they_are.separation <= tolerance
+    touches = as_they_are.separation <= tolerances[near].min(axis=1)
     return in_contact(near, replace(
         as_they_are, colliding=touches, axis=np.where(touches, contacts.axis, as_they_are.axis),
         normal=np.where(touches[:, None], contacts.normal, as_they_are.normal),
@@ -135,8 +144,7 @@ def find_contacts(broad_phase: native.BroadPhase, solver: ContactSolver, sizes: 
     if refused >= 0:
         raise ValueError(f'{name_of(refused)} {pose_fault(poses[refused])}')
     if len(pairs) > most_near:
-        raise TooManyNear(f'more than {most_near} pairs are near each other, and so many are not '
-                          'answered')
+        raise TooManyNear(most_near, pairs)
     return pairs, solver.batch(poses, sizes=sizes, pairs=pairs, threads=threads), stale
 
 

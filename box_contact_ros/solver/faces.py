@@ -4,8 +4,9 @@
 """The patch of two faces: where the faces by which two boxes meet are within a tolerance.
 
 Of each box it is the face most parallel to the normal. Both are projected along the normal and
-intersected; what is left is cut where the gap of their planes exceeds the tolerance. The overlap of
-boxes at rest is a wedge of a micron, whose moments tell little of this patch.
+intersected; what is left is cut where the gap of their planes exceeds the tolerance. Where edges
+meet, at more than 0.1 rad from both faces, there is no patch. The overlap of boxes at rest is a
+wedge of a micron, whose moments tell little of it.
 """
 from __future__ import annotations
 
@@ -13,9 +14,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..core import native
-from .checks import as_number
+from .checks import as_boxes, as_floats, as_margin, as_number, as_places
 
 TOLERANCE = 1e-4
 """Gap up to which faces touch [m]: that of a simulation at rest."""
@@ -31,6 +33,16 @@ def as_tolerance(value: Any, sizes: np.ndarray) -> float:
     return tolerance
 
 
+def as_tolerances(value: Any, sizes: np.ndarray) -> np.ndarray:
+    """Return the tolerances of boxes (n,), of a number or an array; ValueError for others."""
+    if not isinstance(value, np.ndarray) or not value.ndim:
+        return np.full(len(sizes), as_tolerance(value, sizes))
+    array = as_floats(value, 'tolerance', f'a number, or numbers ({len(sizes)},)', (len(sizes),))
+    for row in range(len(array)):
+        as_tolerance(float(array[row]), sizes[row])
+    return array
+
+
 @dataclass(frozen=True, eq=False)
 class FacePatches:
     """The patches of k pairs of boxes, in the common frame, midway between both faces."""
@@ -38,7 +50,7 @@ class FacePatches:
     polygon: np.ndarray
     """(k, 9, 3) corners, counter-clockwise about the normal; then the first one again [m]."""
     corner_count: np.ndarray
-    """(k,) how many corners there are: 3 to 9; 0: the faces are apart, and places are NaN."""
+    """(k,) how many corners there are: 3 to 9; 0: there is no patch, and places are NaN."""
     area: np.ndarray
     """(k,) [m²] across the normal."""
     centre: np.ndarray
@@ -57,13 +69,23 @@ class FacePatches:
                            self.centre[rows], self.rectangle[rows])
 
 
-def face_patches(sizes: np.ndarray, poses: np.ndarray, pairs: np.ndarray, normal: np.ndarray,
-                 tolerance: float) -> FacePatches:
-    """Return the patches of pairs (k, 2) with normals (k, 3) from A to B.
+def face_patches(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike, normal: ArrayLike, *,
+                 tolerance: float = TOLERANCE) -> FacePatches:
+    """Return the patches of the faces by which pairs of boxes meet.
 
-    sizes: (n, 3). poses: (n, 7). tolerance: the largest gap within a patch [m].
+    sizes: full extents (n, 3), or (3,) of all boxes [m]. poses: (n, 7) in a common frame.
+    pairs: (k, 2), boxes A and B by index.
+    normal: (k, 3) unit vectors from A to B, as `normal` of the pairs' contacts.
+    tolerance: the largest gap of two faces within their patch [m].
+
+    Raises ValueError, with the field and the value, for bad input.
     """
-    return FacePatches(*native.face_patches(sizes, poses, pairs, normal, tolerance))
+    sizes, poses = as_boxes(sizes, poses)
+    rows = as_places(pairs, 'pairs', len(poses))
+    count = len(rows)
+    normals = as_floats(normal, 'normal', f'unit vectors ({count}, 3)', (count, 3))
+    return FacePatches(*native.face_patches(sizes, poses, rows, normals,
+                                            as_margin(tolerance, 'tolerance')))
 
 
 def corner_shares(rectangle: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -52,6 +52,7 @@ class ReadContacts(NamedTuple):
     """(m,) their nearest points."""
     stale: list[str]  # names of the pairs, or boxes, that could not be answered
     revision: int  # of the node's scene
+    epoch: int  # of the node's configuration
 
 
 def read_contacts(data: bytes) -> ReadContacts:
@@ -63,8 +64,10 @@ def read_contacts(data: bytes) -> ReadContacts:
     names: tuple[list[Any], list[Any]] = [], []  # of three each
     starts: tuple[list[int], list[int]] = [], []
     at = FRAME_AT + length
-    at += (ENCAPSULATION - at) % 8
+    at += -at % 4
     try:
+        (epoch,), at = count_at(data, at), at + 4
+        at += (ENCAPSULATION - at) % 8
         (revision,), at = struct.unpack_from(f'{order}Q', data, at), at + 8
         for listed, places, size in zip(names, starts, (CONTACT_BYTES, NEAR_BYTES)):
             at += -at % 4
@@ -94,7 +97,7 @@ def read_contacts(data: bytes) -> ReadContacts:
         body[(np.array(places, np.int64)[:, None] - ENCAPSULATION) // 8 + np.arange(size // 8)
              ].astype(np.float64) for places, size in zip(starts, (CONTACT_BYTES, NEAR_BYTES)))
     return ReadContacts(sec * NANOSECONDS + nanosec, frame_id, names[0], _contacts(touching),
-                        names[1], _nearests(near), stale, revision)
+                        names[1], _nearests(near), stale, revision, epoch)
 
 
 def _contacts(rows: np.ndarray) -> Contacts:

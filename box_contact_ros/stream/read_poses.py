@@ -13,7 +13,7 @@ import struct
 import numpy as np
 
 from ..core import native
-from ..solver.checks import pose_fault
+from ..solver.checks import pose_fault, short_repr
 from .cdr import (
     ENCAPSULATION,
     FRAME_AT,
@@ -26,6 +26,8 @@ from .cdr import (
 from .pairing import StampedPose
 
 POSE_BYTES = 8 * 7
+TWIST_BYTES = 8 * 6  # and those of a wrench
+NAMED = 'MultiDOFJointState'
 _new_tuple = tuple.__new__  # a named tuple's own constructor is Python code
 
 
@@ -65,6 +67,75 @@ def read_poses(data: bytes) -> StampedPose:
                                               f'{at + count * POSE_BYTES}')
     numbers = np.frombuffer(data, f'{order}f8', 7 * count, at).reshape(count, 7).astype(np.float64)
     return StampedPose(numbers, parse_frame(data, length, 'PoseArray'), _stamp(sec, nanosec))
+
+
+class NamedPoses:
+    """Reads the poses of what moves from MultiDOFJointState messages.
+
+    unknown: the names of the last message that move nothing.
+    """
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        """Take the names of all that moves, in the order of the rows of an answer."""
+        self._names, self._native = names, native.NamedPoses(names)
+        self.unknown: tuple[str, ...] = ()
+
+    def __call__(self, data: bytes) -> StampedPose:
+        """Return poses (n, 7), NaN for what the message does not name, or raise MessageError.
+
+        A row may be no pose: the box of that row has none.
+        """
+        found = self._native.read(data)
+        if found is None:
+            return self._read_in_python(bytes(data))
+        numbers, frame_id, stamp, self.unknown = found
+        return StampedPose(numbers, frame_id, stamp)
+
+    def _read_in_python(self, data: bytes) -> StampedPose:
+        order, sec, nanosec, length = parse_head(data, NAMED)
+        frame_id = parse_frame(data, length, NAMED)
+        try:
+            given, poses = _parse_named(data, order, FRAME_AT + length)
+        except struct.error as error:
+            raise MessageError(f'not a {NAMED}', f'{len(data)} bytes: {error}') from None
+        row_of = {name: row for row, name in enumerate(self._names)}
+        numbers = np.full((len(row_of), 7), np.nan)
+        for number, (name, pose) in enumerate(zip(given, poses)):
+            if name in given[:number]:
+                raise MessageError('doubled name', f'joint_names[{number}]: {short_repr(name)} is '
+                                                   f'joint_names[{given.index(name)}], too')
+            if name in row_of:
+                numbers[row_of[name]] = pose
+        self.unknown = tuple(name for name in given if name not in row_of)
+        return StampedPose(numbers, frame_id, _stamp(sec, nanosec))
+
+
+def _parse_named(data: bytes, order: str, at: int) -> tuple[list[str], np.ndarray]:
+    """Return names and poses (n, 7) from a place of a message on; struct.error: it ends there."""
+    def count_at(at: int) -> tuple[int, int]:
+        at += -at % 4
+        return struct.unpack_from(f'{order}I', data, at)[0], at + 4
+
+    count, at = count_at(at)
+    names = []
+    for _ in range(count):
+        length, at = count_at(at)
+        if at + length > len(data):
+            raise struct.error(f'a name of {length} bytes ends behind them')
+        names.append(data[at:at + length].removesuffix(b'\0').decode(errors='backslashreplace'))
+        at += length
+    poses = np.zeros((0, 7))
+    for part, size in (('transforms', POSE_BYTES), ('twist', TWIST_BYTES), ('wrench', TWIST_BYTES)):
+        rows, at = count_at(at)
+        at += (ENCAPSULATION - at) % 8 if rows else 0
+        if part == 'transforms':
+            if rows != count:
+                raise MessageError(f'not a {NAMED}', f'{count} joint_names, but {rows} transforms')
+            poses = np.array(struct.unpack_from(f'{order}{7 * count}d', data, at)).reshape(-1, 7)
+        at += rows * size
+    if not 0 <= len(data) - at <= PADDING:
+        raise struct.error(f'{at} are told')
+    return names, poses
 
 
 def _stamp(sec: int, nanosec: int) -> int:

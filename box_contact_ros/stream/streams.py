@@ -18,12 +18,12 @@ ALL_BOXES = 'all boxes'
 
 def streams_of(scene: Scene) -> tuple[str, ...]:
     """Return the names of the streams: each of `scene.moving`, or ALL_BOXES instead of them."""
-    return (ALL_BOXES,) if scene.pose_array else scene.moving
+    return (ALL_BOXES,) if scene.in_one_message else scene.moving
 
 
 def topics_of(scene: Scene) -> Mapping[str, str]:
     """Return the topics of poses, by stream."""
-    if scene.pose_array:
+    if scene.in_one_message:
         return {ALL_BOXES: POSE_ARRAY}
     parts: dict[str, Box | Frame] = {**scene.boxes, **scene.bodies}
     return {name: parts[name].pose_topic or f'{name}/pose' for name in scene.moving}

@@ -22,18 +22,22 @@ many pairs are in contact; the boxes of stale pairs, as `Answer.stale` has them.
 class TickWriter:
     """Answers the ticks of one scene, each in one call of the core (write_contacts.hpp)."""
 
-    def __init__(self, solver: SceneSolver, topics: Mapping[tuple[str, str], Any]) -> None:
-        """Take what solves the scene, and whatever stands for the topics of pairs of boxes."""
+    def __init__(self, solver: SceneSolver, topics: Mapping[tuple[str, str], Any],
+                 epoch: int = 0) -> None:
+        """Take what solves the scene, and whatever stands for the topics of pairs of boxes.
+
+        epoch: of the configuration of a node.
+        """
         self.solver, scene = solver, solver.scene
-        self._streams = (ALL_BOXES,) if scene.pose_array else solver.moving
+        self._streams = (ALL_BOXES,) if scene.in_one_message else solver.moving
         place, index = {name: number for number, name in enumerate(self._streams)}, scene.index_of
         known = {pair: topic for pair, topic in topics.items() if scene.boxes.keys() >= set(pair)}
         watched = [(*map(index.__getitem__, pair),
                     *(place.get(scene.mover(box), -1) for box in pair)) for pair in known]
         self._write = native.TickWriter(
-            *solver.parts(), scene.names, scene.rows, tuple(pair.label for pair in scene.pairs),
+            *solver._parts(), scene.names, scene.rows, tuple(pair.label for pair in scene.pairs),
             np.array(watched, np.int64).reshape(-1, 4), tuple(known.values()), scene.frame_id,
-            solver.revision)
+            epoch, solver.revision)
 
     def __call__(self, poses: TickPoses) -> Written:
         """Return what is published of a tick; ValueError: it is refused.
@@ -44,6 +48,6 @@ class TickWriter:
         if written is None:
             check_frames(self.solver.scene, self._streams, poses)
             numbers: list[Any] = [pose and pose.numbers for pose in poses]
-            self.solver(numbers[0] if self.solver.scene.pose_array else numbers)
+            self.solver(numbers[0] if self.solver.scene.in_one_message else numbers)
         assert written is not None
         return written

@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import program_parser, within
+from ..arguments import one_line, program_main, program_parser, within
 from ..extras import MissingExtra, require
-from ..plans.inspect_files import NOT_READ, one_line
+from ..plans.inspect_files import NOT_READ
 from ..plans.inspect_plan import inspect_plan
 from ..plans.inspection import Inspection
 from ..plans.plot import COLOURS
@@ -143,10 +143,12 @@ def table(title: str, found: Inspection) -> str:
 
 
 def _section(name: str, content: str, style: str = '') -> str:
+    content = content.encode('utf-8', 'replace').decode()  # names of files are of any bytes
     return (f'<div id="{name}" style="padding:0.3em 0.7em;font-size:0.85em;{style}">{content}'
             '</div>')
 
 
+@program_main
 def main(args: Sequence[str] | None = None) -> int:
     """Serve the plan of a file until SIGINT or SIGTERM; return 2 for what is no plan."""
     parser = program_parser('view', __doc__)

@@ -7,9 +7,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from ..arguments import outside_ros_args
+from ..arguments import outside_ros_args, program_main
 
 
+@program_main
 def main(args: Sequence[str] | None = None) -> int:
     """Serve the page until SIGINT or SIGTERM; return the exit status."""
     args = sys.argv[1:] if args is None else args

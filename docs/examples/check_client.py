@@ -12,13 +12,14 @@ It prints:
 """
 import rclpy
 from geometry_msgs.msg import Point, Pose, Vector3
+from rclpy.qos import QoSProfile
 
 from box_contact_msgs.msg import Box
 from box_contact_msgs.srv import Check
 
 rclpy.init()
 node = rclpy.create_node('check_client')
-check = node.create_client(Check, 'contact_node/check')
+check = node.create_client(Check, 'contact_node/check', qos_profile=QoSProfile(depth=128))
 check.wait_for_service()
 container = Vector3(x=12.192, y=2.438, z=2.591)
 boxes = [Box(name='load', size=container, pose=Pose(position=Point(z=2.581))),

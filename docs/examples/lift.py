@@ -3,54 +3,62 @@
 
 """Lift a container from the yard to a lorry: `python docs/examples/lift.py`.
 
-Start a node first, whose scene gets its poses as one message:
+Start a node first, whose scene gets its poses by name:
 
     box_contact_contact_node --ros-args -p scene:=config/scenes/lift.yaml -p pair_topics:=false
 
 It prints:
 
-    scene 0: spreader_c1
-    scene 1: spreader_c1
-    scene 1: spreader_c1, c1_lorry
-    scene 2: spreader_c1
+    on the ground: spreader_frame_c1
+    lifted: nothing
+    on the lorry: c1_lorry
+    detached: spreader_frame_c1
 """
 import rclpy
-from geometry_msgs.msg import Point, Pose, PoseArray
+from geometry_msgs.msg import Point, Pose, Transform, Vector3
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import MultiDOFJointState
 
-from box_contact_msgs.msg import Box, Contacts
+from box_contact_msgs.msg import Body, Box, Contacts
 from box_contact_msgs.srv import SetBoxes
 
 rclpy.init()
 node = rclpy.create_node('lift')
-change = node.create_client(SetBoxes, 'contact_node/set_boxes')
-poses = node.create_publisher(PoseArray, 'poses', 10)
+change = node.create_client(SetBoxes, 'contact_node/set_boxes', qos_profile=QoSProfile(depth=128))
+poses = node.create_publisher(MultiDOFJointState, 'poses', 10)
 answers: list[Contacts] = []
 node.create_subscription(Contacts, 'contacts', answers.append, 10)
 
 
-def set_boxes(**boxes: list[Box]) -> int:
-    """Change boxes of the scene; return the number of the new scene."""
-    future = change.call_async(SetBoxes.Request(**boxes))
+def set_boxes(**changes: list[Box] | list[Body]) -> SetBoxes.Response:
+    """Change boxes of the scene; return the answer, which has the number of the new scene."""
+    future = change.call_async(SetBoxes.Request(**changes))
     rclpy.spin_until_future_complete(node, future)
-    return int(future.result().revision)
+    if not future.result().success:
+        raise SystemExit(future.result().message)
+    return future.result()
 
 
-def show(revision: int, *places: tuple[float, float]) -> None:
-    """Send y and z of all that moves until a scene has answered; print what touches."""
-    array, sent = PoseArray(poses=[Pose(position=Point(y=y, z=z)) for y, z in places]), []
-    while not (answers and answers[-1].header.stamp in sent and answers[-1].revision == revision):
-        array.header.stamp = node.get_clock().now().to_msg()
-        sent.append(array.header.stamp)
-        poses.publish(array)
+def show(when: str, scene: SetBoxes.Response, y: float, z: float) -> None:
+    """Send the place of the spreader until the scene has answered; print what touches."""
+    state, sent = MultiDOFJointState(joint_names=['spreader']), []
+    state.transforms = [Transform(translation=Vector3(y=y, z=z))]
+    while not (answers and answers[-1].header.stamp in sent and (
+            answers[-1].epoch, answers[-1].revision) == (scene.epoch, scene.revision)):
+        state.header.stamp = node.get_clock().now().to_msg()
+        sent.append(state.header.stamp)
+        poses.publish(state)
         rclpy.spin_once(node, timeout_sec=0.1)
-    print(f'scene {revision}:', ', '.join(contact.pair for contact in answers[-1].contacts))
+    touching = [contact.pair for contact in answers[-1].contacts]
+    print(f'{when}:', ', '.join(touching) or 'nothing')
 
 
 change.wait_for_service()
-show(0, (0.0, 2.79))  # the spreader is on the container
-lifted = set_boxes(moving=[Box(name='c1')])  # of its size, and after the spreader in the array
-show(lifted, (3.0, 6.79), (3.0, 5.2955))
-show(lifted, (6.0, 4.29), (6.0, 2.7955))  # on the lorry
-landed = set_boxes(fixed=[Box(name='c1', pose=Pose(position=Point(y=6.0, z=2.7955)))])
-show(landed, (6.0, 4.29), (0.0, 0.0))  # its place in the array stays, and is not read
+ground, lorry = Pose(position=Point(z=1.2955)), Pose(position=Point(y=6.0, z=2.7955))
+below = Pose(position=Point(z=-1.4945))  # where c1 hangs, in the frame of the spreader
+show('on the ground', set_boxes(fixed=[Box(name='c1', pose=ground)]), 0.0, 2.79)
+attached = set_boxes(bodies=[Body(name='spreader', boxes=[Box(name='c1', pose=below)])])
+show('lifted', attached, 3.0, 6.79)
+show('on the lorry', attached, 6.0, 4.29)
+show('detached', set_boxes(fixed=[Box(name='c1', pose=lorry)]), 6.0, 4.29)
 rclpy.shutdown()

@@ -24,6 +24,8 @@ from box_contact_ros.bench.bench import loops
 from box_contact_ros.bench.bench import main as bench_main
 from box_contact_ros.node.runtime import GuardedNode, running_node, spin_for
 
+pytestmark = pytest.mark.reports
+
 DEEP = QoSProfile(depth=1000)
 
 

@@ -19,6 +19,8 @@ from benchmarks.errors import ContactErrors, contact_errors
 from benchmarks.pose_sets import CUBE, SETS, Pairs
 from box_contact_ros import Contacts, ContactSolver
 
+pytestmark = pytest.mark.reports
+
 
 def on_a_cube(turn: np.ndarray, depth: float = 1e-3) -> Pairs:
     """Return a cube, turned, that comes down on the middle of another's top face."""

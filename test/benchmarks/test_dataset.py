@@ -16,6 +16,8 @@ from benchmarks.pose_sets import CUBE
 from box_contact_ros import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix
 
+pytestmark = pytest.mark.reports
+
 COUNT = 4000
 SMALL = (300, 200, 400)
 
@@ -177,6 +179,7 @@ def all_inputs(sets: dict[str, dataset.Patterns]) -> np.ndarray:
     return np.concatenate([patterns.inputs for patterns in sets.values()])
 
 
+@pytest.mark.reports
 def test_paper_sets() -> None:
     """The paper's sizes, all patterns distinct, outputs within the paper's ranges."""
     sets = dataset.paper(1)
@@ -196,6 +199,7 @@ def test_sets_by_signs_have_the_signs_of_their_names() -> None:
         assert np.all(np.sign(all_inputs(sets)[:, 3:]) == wanted)
 
 
+@pytest.mark.reports
 def test_sets_come_from_the_seed_alone() -> None:
     """Again the same; another seed, nothing in common."""
     for make in (lambda *a, **k: {'paper': dataset.paper(*a, **k)},

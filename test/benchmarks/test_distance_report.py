@@ -11,8 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import apart, distance
+from benchmarks import apart, distance, native_calls
 from box_contact_ros.core import instruction_sets
+
+pytestmark = pytest.mark.reports
 
 
 @pytest.mark.parametrize('family', ['random', 'yaw, stacked, moved', 'tilts 1e-17 to 1e-12'])
@@ -48,14 +50,16 @@ def test_fuzz(capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch) ->
     assert len(distance.fuzz('needles', 1, 500)[2]) == 3
 
 
+@pytest.mark.reports
 @pytest.mark.skipif(shutil.which('g++') is None, reason='no compiler')
 def test_all_answer_as_the_judge(tmp_path: Path) -> None:
     """To what their tolerances leave."""
     pytest.importorskip('mujoco')
-    program, _ = distance.compiled(tmp_path)
+    program = native_calls.compiled(tmp_path, 'distance')
     pairs, proof = distance.drawn_apart('swaying containers', 50)
-    found = distance.timed(program, pairs, proof, instruction_sets()[-1], rounds=1, calls=50)
-    assert {'bc_distance, single', 'bc_distance_rows, batch', distance.UNIT} <= set(found.times)
-    for name, errors in found.errors.items():
-        assert errors.shape == (50,)
+    found = distance.timed(program, pairs, proof, instruction_sets()[-1],
+                           native_calls.Effort(1, 50, 1, 50))
+    assert {'bc_distance, single', 'bc_distance_rows, batch', distance.UNIT} <= set(found)
+    for name, (nanoseconds, errors) in found.items():
+        assert nanoseconds.shape == (1, 1) and errors.shape == (50,)
         assert errors.max() < (1e-15 if name.startswith('bc_') else 1e-3), name

@@ -15,6 +15,8 @@ from benchmarks import trials  # noqa: E402
 from benchmarks.engines import drake_engines  # noqa: E402
 from benchmarks.pose_sets import SETS  # noqa: E402
 
+pytestmark = pytest.mark.reports
+
 
 def planted(corners: np.ndarray, pressures: list[float]) -> SimpleNamespace:
     """Return a surface of one face with these corners (n, 3) and pressures."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import pytest
 
 pytest.importorskip('mujoco')
 
-from benchmarks import force_lines, stack_scenes, stacks
+from benchmarks import force_lines, output, stack_scenes, stacks
 from benchmarks.force_lines import MILLISECOND, Line, runs
 from benchmarks.loops import FRAME, TIMINGS, Boxes, Scene, Timing, steps
 from box_contact_ros.forces.patch_forces import GRAVITY
@@ -100,6 +101,19 @@ def test_the_program(monkeypatch: pytest.MonkeyPatch, tmp_path: Path,
         assert [row['case'] for row in csv.DictReader(file)] == list(figures)
     figures.update(missed=1.0, never=0.0)
     assert force_lines.main(['--out', str(tmp_path)]) == 0
+
+
+def test_the_page_lists_all_numbers_of_the_method() -> None:
+    """Each constant of the header, with what it means, is on the page that was written last."""
+    text = force_lines.TUNING.read_text('utf-8')
+    numbers = force_lines.tuned_numbers(text)
+    names = [name for number in numbers for name in number.names.split(', ')]
+    lines = '\n'.join(re.findall('^constexpr.*', text, re.MULTILINE))
+    assert names == re.findall(r'(\w+) = ', lines) and len(names) > 40
+    assert all(number.meaning and number.subject for number in numbers)
+    page = (output.ROOT / output.RESULTS / 'force_lines.md').read_text('utf-8')
+    for number in numbers:
+        assert f'| {number.names} | {number.values} | {number.meaning} |' in page
 
 
 def test_patterns_are_as_long_as_they_say() -> None:

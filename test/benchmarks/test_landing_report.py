@@ -30,6 +30,8 @@ from benchmarks.landing_ways import (
 from box_contact_ros.demo import landing as demo_landing
 from box_contact_ros.demo.crane import CraneScenario
 
+pytestmark = pytest.mark.reports
+
 RESTS = Landed(settled=1.0, corner_speed=1e-4, rope_tension=0.0, force_worst=1e-9,
                static_tilt=1e-4, depth=1e-3, gap=0.0)
 WELL_AIMED = PlannedLanding(name='grid: well aimed', overhang=(0.1, 0.0), scenario=CraneScenario(
@@ -114,6 +116,7 @@ def sigterm_is_handled() -> Iterator[None]:
     signal.signal(signal.SIGTERM, before)
 
 
+@pytest.mark.reports
 @pytest.mark.usefixtures('sigterm_is_handled')
 def test_a_run_writes_table_and_rows(tmp_path, monkeypatch, capsys):
     """One landing of the grid, and one added; the picture is of a real one."""

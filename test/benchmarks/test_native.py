@@ -14,10 +14,13 @@ import numpy as np
 import pytest
 from test_library import EACH_FUNCTION_ONCE
 
-from benchmarks import native, settled
+from benchmarks import native, native_calls, output, settled
 from benchmarks.contestant import MLP_SIZES
+from benchmarks.native_calls import Effort, Program
 from benchmarks.pose_sets import FLUSH, LOADS, SETS, Pairs
 from box_contact_ros.core import instruction_sets
+
+pytestmark = pytest.mark.reports
 
 needs_compiler = pytest.mark.skipif(shutil.which('g++') is None, reason='no compiler')
 
@@ -28,30 +31,30 @@ def containers() -> Pairs:
 
 
 @pytest.fixture(scope='module')
-def program(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
-    """Return the program and what it lacks; networks are compiled for answers, not for speed."""
+def program(tmp_path_factory: pytest.TempPathFactory) -> Program:
+    """Return the program; its networks are compiled for answers, not for speed."""
     pytest.importorskip('mujoco')
     sets = [name for name in instruction_sets() if name != 'baseline']
-    flags_of = native.library_flags
+    flags_of = native_calls.library_flags
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(native, 'library_flags', lambda name: [
+        patch.setattr(native_calls, 'library_flags', lambda name: [
             *flags_of(name), '-O0', EACH_FUNCTION_ONCE])
-        return native.compiled(tmp_path_factory.mktemp('native'), sets)
+        return native_calls.compiled(tmp_path_factory.mktemp('native'), 'contact', sets)
 
 
+@pytest.mark.reports
 @needs_compiler
-def test_all_answer_as_exact(program: tuple[Path, list[str]], containers: Pairs) -> None:
+def test_all_answer_as_exact(program: Program, containers: Pairs) -> None:
     """No verdict differs, and depths agree to what single precision and iterations leave."""
-    path, missing = program
     n = len(containers.pose_a)
     pose_b = containers.pose_b.copy()
     pose_b[::2, :3] *= 1.5  # these are apart
-    found = native.timed(path, containers._replace(pose_b=pose_b), instruction_sets()[-1],
-                         rounds=1, calls=n)
+    found = native.timed(program, containers._replace(pose_b=pose_b), instruction_sets()[-1],
+                         Effort(1, n, 1, n))
     expected = {'mjc_BoxBox, single', 'mj_geomDistance, single', 'exact covariance, batch',
                 *(f'{name} volume, batch' for name in MLP_SIZES), 'paper, single'}
-    expected |= {'Coal ComputeCollision, single'} if 'coal' not in missing else set()
-    expected |= {'Bullet btBoxBoxDetector, single'} if 'bullet' not in missing else set()
+    expected |= {'Coal ComputeCollision, single'} if 'coal' not in program.missing else set()
+    expected |= {'Bullet btBoxBoxDetector, single'} if 'bullet' not in program.missing else set()
     assert expected <= set(found)
     for name, one in found.items():
         assert (one.judged, one.missed, one.invented) == (n, 0, 0), name
@@ -60,16 +63,17 @@ def test_all_answer_as_exact(program: tuple[Path, list[str]], containers: Pairs)
     assert max(found['exact covariance, batch'].depth_errors) == 0.0
 
 
+@pytest.mark.reports
 @needs_compiler
-def test_a_copy_has_a_library_of_its_own(program: tuple[Path, list[str]], containers: Pairs,
+def test_a_copy_has_a_library_of_its_own(program: Program, containers: Pairs,
                                          tmp_path: Path) -> None:
     """Whatever LD_LIBRARY_PATH names: a broken one beside the program ends the run."""
-    copy = native.copied(program[0], tmp_path / 'copy')
-    best = instruction_sets()[-1]
-    assert native.UNIT in native.timed(copy, containers, best, rounds=1, calls=1)
-    copy.with_name(native.LIBRARY.name).write_bytes(b'')
-    with pytest.raises(RuntimeError, match=native.LIBRARY.name):
-        native.timed(copy, containers, best, rounds=1, calls=1)
+    copy, best = program.copied(tmp_path / 'copy'), instruction_sets()[-1]
+    effort = Effort(1, 1, 1, 1)
+    assert native.UNIT in native.timed(copy, containers, best, effort)
+    copy.path.with_name(native_calls.LIBRARY.name).write_bytes(b'')
+    with pytest.raises(RuntimeError, match=native_calls.LIBRARY.name):
+        native.timed(copy, containers, best, effort)
 
 
 def planted(*rounds: list[float]) -> native.Times:
@@ -80,13 +84,13 @@ def planted(*rounds: list[float]) -> native.Times:
 def test_a_ratio_has_the_range_of_the_copies() -> None:
     """A copy counts by the median of its rounds' ratios, so one disturbed round moves nothing."""
     unit = planted([100.0, 300.0, 100.0])
-    found = native.of_copies([{native.UNIT: unit, 'exact volume, single': planted(rounds)}
+    found = native_calls.of_copies([{native.UNIT: unit, 'exact volume, single': planted(rounds)}
                               for rounds in ([140.0, 420.0, 9e9], [120.0, 360.0, 120.0],
                                              [150.0, 450.0, 150.0])])
     assert found['exact volume, single'].nanoseconds.shape == (3, 3)
-    ratio = native.Ratio.of(found, 'exact volume, single')
+    ratio = native_calls.Ratio.of(found, 'exact volume, single', native.UNIT)
     assert str(ratio) == '1.40 [1.20, 1.50]'
-    assert native.Ratio.of(found, native.UNIT) == (1.0, 1.0, 1.0)
+    assert native_calls.Ratio.of(found, native.UNIT, native.UNIT) == (1.0, 1.0, 1.0)
     table = native.sets_table({'stacks': found, 'parcels': {
         **found, 'Bullet contactPairTest, single': unit, 'exact volume, batch': unit,
         'mlp volume, single': unit}}, 'single')
@@ -95,13 +99,14 @@ def test_a_ratio_has_the_range_of_the_copies() -> None:
     assert table.splitlines()[2] == '| stacks | 100 | 1.40 [1.20, 1.50] | – | – |'
 
 
+@pytest.mark.reports
 @needs_compiler
-def test_each_contact_has_its_time(program: tuple[Path, list[str]], containers: Pairs) -> None:
+def test_each_contact_has_its_time(program: Program, containers: Pairs) -> None:
     """Contacts alone, equally many of each set; the table compares with the median of all."""
     pose_b = containers.pose_b.copy()
     pose_b[::2, :3] *= 1.5  # these are apart
     by_set = {'half apart': containers._replace(pose_b=pose_b), 'containers': containers}
-    found = native.each_contact(program[0], by_set, instruction_sets()[-1], 60, passes=2)
+    found = native.each_contact(program, by_set, instruction_sets()[-1], 60, passes=2)
     assert [(name, times.shape) for name, times in found.items()] == [
         ('half apart', (2, 30)), ('containers', (2, 30))]
     assert all((times > 0.0).all() for times in found.values())
@@ -131,13 +136,14 @@ def test_a_wrong_verdict_is_counted(containers: Pairs) -> None:
     assert (found.missed, found.invented) == (1, 0)
 
 
+@pytest.mark.reports
 @needs_compiler
-def test_quick_run(tmp_path: Path, program: tuple[Path, list[str]],
+def test_quick_run(tmp_path: Path, program: Program,
                    monkeypatch: pytest.MonkeyPatch) -> None:
     """Every set, scene and instruction set; the page shows the code of each call."""
-    monkeypatch.setattr(native, 'compiled', lambda folder, sets: program)
-    for name, count in (('PAIRS', 200), ('CALLS', 20), ('CONTACTS', 500)):
-        monkeypatch.setattr(native, f'QUICK_{name}', count)
+    monkeypatch.setattr(native_calls, 'compiled', lambda folder, query, networks: program)
+    monkeypatch.setattr(native, 'QUICK', Effort(2, 200, 1, 20))
+    monkeypatch.setattr(native, 'QUICK_CONTACTS', 500)
     assert native.main(['--quick', '--out', str(tmp_path)]) == 0
     with (tmp_path / 'native.csv').open(encoding='utf-8') as file:
         rows = list(csv.DictReader(file))
@@ -152,7 +158,7 @@ def test_quick_run(tmp_path: Path, program: tuple[Path, list[str]],
     text = (tmp_path / 'native.md').read_text('utf-8')
     for call in ('bc_collide(', 'bc_collide_rows(', 'mj_geomDistance(', 'box_box('):
         assert call in text
-    tables = runpy.run_path(str(native.ROOT / 'docs' / 'tables.py'))
+    tables = runpy.run_path(str(output.ROOT / 'docs' / 'tables.py'))
     monkeypatch.setitem(tables['rows'].__globals__, 'RESULTS', tmp_path)
     mujoco, = (choice for choice in tables['CHOICES'] if choice.native == native.UNIT[:-8])
     shown = tables['from_c'](mujoco, 'single', tables['SWAY'])
@@ -163,11 +169,11 @@ def test_quick_run(tmp_path: Path, program: tuple[Path, list[str]],
 def test_flags_of_a_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The library is found when the program starts; its standard is not taken over."""
     monkeypatch.setenv('PKG_CONFIG_PATH', str(tmp_path))
-    assert native.package_flags('planted') is None
+    assert native_calls.package_flags('planted') is None
     (tmp_path / 'planted.pc').write_text(
         'Name: planted\nDescription: none\nVersion: 7.1\n'
         'Cflags: -std=c++11 -I/p/include\nLibs: -L/p/lib -lplanted\n')
-    assert native.package_flags('planted') == [
+    assert native_calls.package_flags('planted') == [
         '-I/p/include', '-L/p/lib', '-lplanted', '-Wl,-rpath,/p/lib']
     monkeypatch.setenv('PATH', str(tmp_path))
-    assert native.package_flags('planted') is None
+    assert native_calls.package_flags('planted') is None

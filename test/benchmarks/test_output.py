@@ -16,6 +16,8 @@ import pytest
 from benchmarks import output
 from box_contact_ros.core import native
 
+pytestmark = pytest.mark.reports
+
 
 def test_folders_are_made_before_the_work(tmp_path: Path,
                                           capsys: pytest.CaptureFixture[str]) -> None:

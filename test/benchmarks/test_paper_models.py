@@ -17,6 +17,8 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.models.weights_file import WeightsError, load_weights
 from box_contact_ros.resources import resource_path
 
+pytestmark = pytest.mark.reports
+
 EXACT = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
 
 

@@ -12,6 +12,8 @@ from benchmarks.errors import degrees_between
 from benchmarks.pose_sets import CUBE, SETS, Pairs
 from box_contact_ros.solver.pose import rotation_matrix
 
+pytestmark = pytest.mark.reports
+
 N = 200
 DEPTHS = {'random cubes': (2e-3, 0.2), 'touching': (0.0, 0.0), 'stacks': (1e-3, 1e-3),
           'tilted stacks': (1e-3, 1e-3), 'containers': (2.438e-3, 0.2438)}
@@ -41,6 +43,8 @@ def test_stacks_are_tilted_as_stated(name: str, least: float, most: float) -> No
     up = rotation_matrix(pairs.pose_b[:, 3:])[:, :, 2]
     tilt = np.radians(degrees_between(up, np.tile([0.0, 0.0, 1.0], (len(up), 1))))
     assert (tilt > 0.999 * least).all() and (tilt < 1.001 * most).all()
+    decades = np.histogram(np.log10(tilt), np.arange(np.log10(least), np.log10(most) + 0.5))[0]
+    assert (decades > 0.7 * len(tilt) / len(decades)).all()
 
 
 def test_what_is_laid_lies_on_a_face() -> None:

@@ -18,6 +18,8 @@ from patience import PATIENCE
 
 from benchmarks import output
 
+pytestmark = pytest.mark.reports
+
 ROOT = Path(__file__).resolve().parents[2]
 STAND_IN = """#!/bin/sh
 echo "$@" >>called
@@ -60,10 +62,11 @@ def test_a_quick_run_leaves_the_results_alone(tmp_path: Path) -> None:
 
 
 def test_every_program_is_listed() -> None:
-    """The search for the worst case, which takes long, and the limits of ~/check are run alone."""
+    """The search for the worst case and the limits of services are run alone."""
     programs = {f'benchmarks.{path.stem}' for path in (ROOT / 'benchmarks').glob('*.py')
                 if "__name__ == '__main__'" in path.read_text('utf-8')}
-    assert programs - {'benchmarks.searched', 'benchmarks.service'} <= set(listed())
+    alone = {'benchmarks.searched', 'benchmarks.service', 'benchmarks.yard_clients'}
+    assert programs - alone <= set(listed())
 
 
 @pytest.mark.parametrize('name', [

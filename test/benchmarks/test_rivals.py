@@ -22,6 +22,8 @@ from benchmarks.rivals import Engine
 from benchmarks.stack_scenes import Scene
 from box_contact_ros.forces.patch_forces import FRICTION, GRAVITY
 
+pytestmark = pytest.mark.reports
+
 NAMES = (rivals.OURS, rivals.ANY_DEPTH, 'Box3D', 'Jolt', 'Rapier', 'MuJoCo')
 needs_compiler = pytest.mark.skipif(shutil.which('g++') is None, reason='no compiler')
 

@@ -9,6 +9,8 @@ import pytest
 
 from benchmarks import scenes
 
+pytestmark = pytest.mark.reports
+
 
 def test_bricks_touch_their_neighbours_alone():
     """In a wall: one beside, and two of the layer above."""

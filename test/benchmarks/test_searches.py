@@ -15,6 +15,8 @@ from benchmarks.errors import contact_errors
 from benchmarks.pose_sets import LOADS, SETS, Pairs
 from box_contact_ros import ContactSolver
 
+pytestmark = pytest.mark.reports
+
 N = 200
 
 

@@ -13,6 +13,8 @@ from benchmarks import speed
 from benchmarks.contestant import CORE_MODELS
 from benchmarks.output import processor, versions
 
+pytestmark = pytest.mark.reports
+
 
 def test_the_gain_of_threads_is_the_ratio_of_medians() -> None:
     gains = speed.threads_table({'exact': ([9.0, 10.0, 90.0], [5.0, 5.0, 5.0])})
@@ -26,6 +28,7 @@ def test_forces_by_two_threads_have_the_poses_of_one() -> None:
     assert speed.shared_table(rows).startswith('|  | one thread [ms] | two threads / one |')
 
 
+@pytest.mark.reports
 def test_quick_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip('mujoco')
     assert speed.main(['--quick', '--out', str(tmp_path)]) == 0

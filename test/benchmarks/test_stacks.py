@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 import pytest
@@ -16,7 +17,16 @@ import pytest
 pytest.importorskip('mujoco')
 
 from benchmarks import output, rivals, settled, stacks, stacks_picture
-from benchmarks.loops import MUJOCO, TIMINGS, Boxes, Scene, Timing, corner_speeds, steps
+from benchmarks.loops import (
+    FRAME,
+    MUJOCO,
+    TIMINGS,
+    Boxes,
+    Scene,
+    Timing,
+    corner_speeds,
+    steps,
+)
 from benchmarks.stack_scenes import (
     ORDERS,
     card_house,
@@ -27,11 +37,15 @@ from benchmarks.stack_scenes import (
     ratio,
     sideways,
     slope,
+    timbers,
     tower,
     turntable,
 )
 from benchmarks.stacks import run, stays
 from box_contact_ros.forces.patch_forces import GRAVITY
+
+OWN_FRAMES = Timing.uneven((FRAME,))
+"""Steps of 1/60 s with contacts of their own."""
 
 
 @pytest.mark.parametrize('timing', [None, TIMINGS[0]])
@@ -69,6 +83,29 @@ def test_a_turntable_carries_its_tower(timing: Timing | None) -> None:
 def test_a_pallet_of_light_and_heavy_boxes_comes_to_rest_soon_after_it_lands(order: str) -> None:
     """Boxes of 0.2 to 100 kg, by own contacts at uneven steps of up to 8 ms."""
     assert run(partial(landed_pallet, order), TIMINGS[3]).rest < 2.0
+
+
+@pytest.mark.parametrize('order', [ORDERS[0], ORDERS[3], ORDERS[4]])
+def test_goods_that_land_in_steps_of_a_frame_rest_no_deeper_than_wanted(order: str) -> None:
+    """With contacts anew in finer sub-steps, which heavy goods on light ones take at once."""
+    outcome = run(partial(landed_pallet, order), OWN_FRAMES)
+    assert outcome.rest < 2.0 and outcome.deepest < 1.0
+
+
+def test_a_jittered_tower_hardly_sways_in_steps_of_a_frame() -> None:
+    """By over-relaxation: without it, at 25 mm/s after 8 s."""
+    assert run(partial(tower, 20, jitter=0.03), OWN_FRAMES).end_speed < 1e-3
+
+
+def test_loads_that_roll_are_no_impact() -> None:
+    """24 t on timbers take 1.5 times as long a step at 1/60 s as at 1 ms; as impacts, 3 times."""
+    def cost(timing: Timing) -> float:
+        start = process_time()
+        list(steps(replace(timbers(), seconds=1.5), timing))
+        return process_time() - start
+
+    frames, fine = (min(cost(timing) for _ in range(3)) for timing in (TIMINGS[2], TIMINGS[0]))
+    assert frames < 0.13 * fine
 
 
 @pytest.mark.parametrize('make', [card_house, pallet])

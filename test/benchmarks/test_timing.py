@@ -12,6 +12,8 @@ import pytest
 
 from benchmarks import timing
 
+pytestmark = pytest.mark.reports
+
 
 def test_what_was_pinned_and_switched_off_is_given_back() -> None:
     cores = os.sched_getaffinity(0)

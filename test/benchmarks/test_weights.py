@@ -13,6 +13,8 @@ from test_weights_file import WIDTHS, layers
 from benchmarks.weights import CARD_FIELDS, save_weights
 from box_contact_ros.models.weights_file import load_weights
 
+pytestmark = pytest.mark.reports
+
 CARD = {**dict.fromkeys(CARD_FIELDS, 'x'), 'architecture': list(WIDTHS)}
 
 

@@ -32,8 +32,6 @@ static void check_contacts(void) {
   check(contact.normal[2] == 1.0 && fabs(contact.point[2] - 0.75) < 1e-9, "normal, point");
   check(fabs(contact.volume - 2.0) < 1e-9 && fabs(contact.covariance[0][0] - 1.0 / 3.0) < 1e-9,
         "volume, covariance");
-  check(fabs(bc_patch_area(contact.normal, contact.covariance[0]) - 4.0) < 1e-8, "area");
-  check(isnan(bc_patch_area(contact.normal, NULL)), "no area");
   bc_query query = bc_default_query();
   check(query.model == BC_EXACT && query.patch == BC_COVARIANCE, "the default query");
   query.patch = BC_VOLUME;
@@ -190,6 +188,38 @@ static void check_motion(void) {
   check(bc_time_of_impact_rows(&rows, 0.0, 1e-9, &results, 1, NULL) == BC_BAD_ABI, "another struct");
 }
 
+/* Cubes of which one is half a metre aside; faces apart; and what is refused. */
+static void check_face_patches(void) {
+  bc_box a = cube_at(0.0), b = cube_at(1.99);
+  b.pose.position[0] = 0.5;
+  double up[3] = {0.0, 0.0, 1.0}, long_one[3] = {0.0, 0.0, 2.0};
+  bc_polygon patch = {.size = sizeof patch};
+  check(bc_face_patch(&a, &b, up, 1e-4, &patch) == BC_OK && patch.count == 4, "a patch");
+  check(patch.area == 3.0 && patch.centre[0] == 0.25 && patch.centre[1] == 0.0, "area, centre");
+  check(fabs(patch.centre[2] - 0.995) < 1e-15, "midway between both faces");
+  for (int k = 0; k < BC_CORNERS_MAX; ++k)
+    check((patch.corners[k][0] == -0.5 || patch.corners[k][0] == 1.0) &&
+              fabs(patch.corners[k][1]) == 1.0,
+          "a corner");
+  check(patch.corners[8][0] == patch.corners[0][0], "the first corner again");
+  b = cube_at(2.001);
+  check(bc_face_patch(&a, &b, up, 1e-4, &patch) == BC_OK && patch.count == 0, "apart");
+  check(patch.area == 0.0 && isnan(patch.centre[0]) && isnan(patch.corners[0][2]), "no patch");
+  check(bc_face_patch(&a, &b, up, 1e-2, &patch) == BC_OK && patch.area == 4.0, "by a tolerance");
+  check(bc_face_patch(&a, &b, long_one, 0.0, &patch) == BC_BAD_ARGUMENT, "a long normal");
+  check(strstr(bc_error_text(), "normal (0, 0, 2) must be of length 1") != NULL, "its words");
+  check(bc_face_patch(&a, &b, up, NAN, &patch) == BC_BAD_ARGUMENT, "no tolerance");
+  check(bc_face_patch(&a, &b, NULL, 0.0, &patch) == BC_BAD_ARGUMENT, "no normal");
+  check(patch.area == 4.0, "the patch is as it was");
+  b.pose.quaternion[3] = 0.0;
+  check(bc_face_patch(&a, &b, up, 0.0, &patch) == BC_BAD_POSE, "a bad pose");
+  check(strstr(bc_error_text(), "pose_b quaternion") != NULL, "its words");
+  a.size.extent[1] = INFINITY;
+  check(bc_face_patch(&a, &a, up, 0.0, &patch) == BC_BAD_SIZE, "a bad size");
+  patch.size = 8;
+  check(bc_face_patch(&a, &b, up, 0.0, &patch) == BC_BAD_ABI, "another struct");
+}
+
 static void check_refusals(void) {
   bc_box a = cube_at(0.0), flat = cube_at(1.0), nowhere = cube_at(NAN);
   bc_contact contact = {0};
@@ -303,6 +333,7 @@ int main(void) {
   check_rows();
   check_distances();
   check_motion();
+  check_face_patches();
   check_broad_phase();
   check_fixed_that_stay();
   check_refusals();

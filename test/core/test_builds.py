@@ -66,8 +66,8 @@ def tower() -> np.ndarray:
     return np.hstack([poses, velocities])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize('name', ['clang++', pytest.param('arm', marks=pytest.mark.arm)])
+@pytest.mark.parametrize('name', [
+    pytest.param('clang++', marks=pytest.mark.builds), pytest.param('arm', marks=pytest.mark.arm)])
 def test_another_build_has_the_same_bits(name: str, tmp_path: Path) -> None:
     """Verdict, separation, normal of both models, distances, motion; a row is its single call."""
     compiler, emulator = BUILDS[name]

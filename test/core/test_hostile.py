@@ -41,7 +41,7 @@ def test_bad_arguments_are_refused() -> None:
     assert min(attack(36, 20_000)) > 1000
 
 
-@pytest.mark.slow
+@pytest.mark.builds
 def test_with_sanitizers(tmp_path: Path) -> None:
     """No access out of bounds and no undefined behaviour in the library and its binding."""
     extension, kernel = tmp_path / Path(native.__file__).name, tmp_path / 'kernel.o'

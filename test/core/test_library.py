@@ -27,7 +27,7 @@ import pytest
 from patience import PATIENCE
 from poses import Pairs, assert_same_bits, fields
 
-from box_contact_ros import Body, ContactSolver, PatchForces, make_model
+from box_contact_ros import Body, ContactSolver, PatchForces, face_patches, make_model
 from box_contact_ros.core import FORCE, instruction_sets
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.pose import rotation_matrix
@@ -174,6 +174,15 @@ def test_a_broad_phase_allocates_no_memory_and_reads_what_changed(tmp_path: Path
     assert run(program).endswith(' 0 failures\n0 wrong answers\n')
 
 
+def test_where_memory_ends_a_call_is_as_if_it_had_not_been(tmp_path: Path) -> None:
+    """At each allocation of create, take_fixed, find, set_boxes, hold, copy and advance in turn."""
+    program = tmp_path / 'no_memory_test'
+    run(tool('g++'), '-std=c++17', *STRICT, INCLUDES, ROOT / 'test/core/no_memory_test.cpp',
+        *LINKED, '-o', program)
+    for line in run(program).splitlines():
+        assert line.endswith(' allocations, 0 faults')
+
+
 @pytest.mark.parametrize('source', ['force_test.c', 'force_test.cpp'])
 def test_forces_have_the_bits_of_python(tmp_path: Path, source: str) -> None:
     """A load that is dropped and pushed: 2,000 steps in C, in C++ and here."""
@@ -226,6 +235,7 @@ def test_by_the_compiler_alone(tmp_path: Path) -> None:
         assert example(tmp_path / standard) == EXAMPLE_SAYS
 
 
+@pytest.mark.builds
 def test_without_exceptions(tmp_path: Path) -> None:
     """The header compiles; the words of what would be thrown are printed, and the program ends."""
     source, program = tmp_path / 'one.cpp', tmp_path / 'one'
@@ -356,6 +366,44 @@ def test_distances_in_cpp(tmp_path: Path) -> None:
         'pose_b quaternion (0, 0, 0, 0) has no length within 1e-100 to 1e100\n')
 
 
+class Polygon(ctypes.Structure):
+    """`bc_polygon`."""
+
+    _fields_ = [('size', c_size_t), ('count', c_int32), ('corners', 9 * (3 * c_double)),
+                ('area', c_double), ('centre', 3 * c_double)]
+
+
+def test_patches_of_faces_have_the_bits_of_python(library: ctypes.CDLL, tmp_path: Path) -> None:
+    """In C, by ctypes, and in C++, without memory: containers, tilted by nothing and by degrees."""
+    pairs = poses.joined(poses.near_parallel_pairs(np.random.default_rng(5), 500), some_pairs())
+    found = ContactSolver(model='exact').batch(*pairs[:2], size_a=pairs.size_a, size_b=pairs.size_b)
+    pairs, normal = Pairs(*(part[found.colliding] for part in pairs)), found.normal[found.colliding]
+    count = len(normal)
+    rows = np.column_stack((np.arange(count), count + np.arange(count)))
+    wanted = face_patches(np.concatenate(pairs[2:]), np.concatenate(pairs[:2]), rows, normal)
+    assert {0, 3, 4, 5, 6, 7} <= set(wanted.corner_count.tolist())
+    want = np.column_stack((wanted.corner_count, wanted.area, wanted.centre,
+                            wanted.polygon.reshape(-1, 27)))
+
+    given = np.column_stack((*pairs, normal))
+    patch = Polygon(ctypes.sizeof(Polygon))
+    for pair, row in zip(given, want):
+        a, b = (pair[[*range(7 * k, 7 * k + 7), *range(14 + 3 * k, 17 + 3 * k)]] for k in (0, 1))
+        pointers = [array.ctypes.data_as(POINTER(c_double)) for array in (a, b, pair[20:].copy())]
+        assert library.bc_face_patch(*pointers, c_double(1e-4), byref(patch)) == 0
+        assert np.array_equal(row, [patch.count, patch.area, *patch.centre,
+                                    *np.ravel(patch.corners)], equal_nan=True)
+
+    program = tmp_path / 'face_patch_test'
+    run(tool('g++'), '-std=c++17', '-O2', *STRICT, INCLUDES,
+        ROOT / 'test/core/face_patch_test.cpp', *LINKED, '-o', program)
+    (tmp_path / 'pairs').write_text('\n'.join(' '.join(map(float.hex, row)) for row in given))
+    *lines, allocated = run(program, tmp_path / 'pairs').splitlines()
+    assert allocated == '0 allocations'
+    assert np.array_equal(want, [[float.fromhex(word) for word in line.split()] for line in lines],
+                          equal_nan=True)
+
+
 def test_a_debug_build_is_as_fast(tmp_path: Path) -> None:
     """The library is optimised whatever the simulator's configuration."""
     run(tool('cmake'), '-S', ROOT, '-B', tmp_path, '-DCMAKE_BUILD_TYPE=Debug',
@@ -374,6 +422,7 @@ add_subdirectory({ROOT} box_contact)
 """
 
 
+@pytest.mark.builds
 @pytest.mark.parametrize('wanted', ['OFF', 'ON'])
 def test_a_part_of_a_project_without_exceptions_and_with_sanitizers(
         tmp_path: Path, wanted: str) -> None:

@@ -27,6 +27,8 @@ from box_contact_ros.demo.landing import Landing
 from box_contact_ros.forces.patch_forces import GRAVITY
 from box_contact_ros.node.messages import make_header
 
+pytestmark = pytest.mark.reports
+
 
 @pytest.fixture
 def contact_node(program):

@@ -220,6 +220,23 @@ def test_two_feet_stand_on_a_floor() -> None:
             forces.hold([(0, 1)], **times)
 
 
+def test_a_late_answer_may_tell_of_boxes_that_were_joined_since() -> None:
+    """Their contact is passed over, and the others are taken."""
+    cube, pairs = (1.0, 1.0, 1.0), np.array([(0, 1), (1, 2)])
+    upright = [(0, 0, z, 0, 0, 0, 1) for z in (-0.4999, 0.5, 1.4999)]
+    contacts = ContactSolver().batch(np.array(upright, float), sizes=np.full((3, 3), 1.0),
+                                     pairs=pairs)
+    forces = PatchForces([FIXED, Body.of_box((1, 1, 2), 10.0)])
+    forces.set_boxes([cube] * 3, body=[0, 1, 1], poses=[upright[0], (0, 0, -0.5, 0, 0, 0, 1),
+                                                        (0, 0, 0.5, 0, 0, 0, 1)])
+    poses = np.array([[0, 0, 0, 0, 0, 0, 1.0], [0, 0, 1.0, 0, 0, 0, 1]])
+    forces.hold(pairs, contacts, poses)
+    forces.advance(STEP, poses, np.zeros((2, 6)))
+    assert forces.loads().pairs.tolist() == [[0, 1]]
+    with pytest.raises(ValueError, match=r'pairs\[0\]: both boxes are of body 1'):
+        forces.hold(np.array([(1, 1), (0, 1)]), contacts, poses)
+
+
 def test_a_body_of_boxes_has_their_moments() -> None:
     """A container of eight octants, one turned by a right angle, is one box of the same density."""
     whole, size = Body.of_box(CONTAINER, 20_000.0), 0.5 * np.array(CONTAINER)

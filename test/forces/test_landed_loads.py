@@ -12,7 +12,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from box_contact_ros import Body, PatchForces, contacts_of, support
+from box_contact_ros import Body, PatchForces, Plan, contacts_of, inspect_plan
 from box_contact_ros.solver.pose import rotation_matrix
 
 G = 9.81
@@ -86,7 +86,7 @@ def test_a_load_that_has_landed_weighs_on_its_corners_as_statics_say(size, mass,
     loads, sizes, poses = land(size, mass, off, step, own=own)
     wanted = [mass * G / 4 * (1 + x * off[0]) * (1 + y * off[1]) for x in (1, -1) for y in (1, -1)]
     assert_at_rest(loads, sizes, poses, wanted, mass * G, off)
-    found = support(sizes, poses, *contacts_of(sizes, poses, tolerance=1e-4), ground=0)
+    found = inspect_plan(Plan(sizes, poses, ground=0))
     assert found.stands[1] and found.share[1] > 0.999
     assert found.margin[1] == pytest.approx(min(size[:2]) / 2, rel=1e-3)
 
@@ -101,8 +101,8 @@ def test_a_cube_on_a_slope_weighs_on_its_lower_edge(step, own):
     pressing = G * np.cos(slope)
     wanted = [pressing / 4 * (1 + x * np.tan(slope)) for x in (1, 1, -1, -1)]
     assert_at_rest(loads, sizes, poses, wanted, pressing, (1, 0))
-    found = support(sizes, poses, *contacts_of(sizes, poses, tolerance=1e-4), ground=0,
-                    up=(-np.sin(slope), 0, np.cos(slope)))
+    found = inspect_plan(Plan(sizes, poses, ground=0),
+                         acceleration=(G * np.sin(slope), 0, -G * np.cos(slope)))
     assert found.stands[1] and found.share[1] > 0.999
 
 
@@ -122,7 +122,7 @@ def test_a_stack_that_has_landed_weighs_on_each_of_its_boxes_as_statics_say(own)
     forces = PatchForces([Body(mass=0, inertia=np.zeros(3)), *[Body.of_box(FORTY, mass)] * count])
     forces.set_boxes(sizes)
     poses = settled(forces, sizes, poses, weights, 1e-3, own=own)
-    found = support(sizes, poses, *contacts_of(sizes, poses, tolerance=1e-4), ground=0)
+    found = inspect_plan(Plan(sizes, poses, ground=0))
     assert found.stands.all() and found.share[1] > 0.999 and found.share.min() > 0.96
     loads = forces.loads()
     assert np.sort(loads.pairs).tolist() == [[n, n + 1] for n in range(count)]

@@ -4,12 +4,10 @@
 """Blocks of patches that are solved side by side have the bits that they have alone."""
 from __future__ import annotations
 
-import copy
 import hashlib
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +17,6 @@ from worlds import FLOOR, World, turned
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import instruction_sets
 
-ROOT = Path(__file__).resolve().parents[2]
 TOWERS, HEIGHT = 11, 3
 KINDS = ('steady', 'uneven', 'impacts', 'springs', 'belts', 'turntable', 'spins', 'late', 'finer')
 SPINS = np.array([300.0, 1e-10, 30.0])  # of a tower's boxes by their sizes beyond 0.4 m [rad/s/m]
@@ -114,50 +111,6 @@ def test_instruction_sets_have_the_same_bits() -> None:
 
 def test_threads_have_the_same_bits() -> None:
     assert pile(1) == pile(3)
-
-
-def block_of_boxes(kind: str, threads: int) -> bytes:
-    """Return all that moves of 216 boxes that overlap: an island that threads advance in parts."""
-    random = np.random.default_rng(6)
-    rows = [((0.5, 0.5, 0.5), 10.0 ** (random.integers(2) if kind == 'finer' else 0),
-             (0.5 * np.array((k % 6, k // 6 % 6, k // 36)) + (0, 0, 0.25)) * 0.998,
-             turned((0, 0, 1), 1e-3 * random.normal())) for k in range(216)]
-    pairs = [(0, 1 + k) for k in range(36)] + [
-        (1 + k, 1 + k + step) for k in range(216)
-        for step, is_in in ((1, k % 6 < 5), (6, k // 6 % 6 < 5), (36, k < 180)) if is_in]
-    world = World(FLOOR, *rows, pairs=[] if kind == 'late' else pairs, threads=threads)
-    if kind == 'impacts':
-        world.velocities[1::6, 2] = -3.0  # of one part alone
-    solver, found = ContactSolver(), []
-    for k in range(6 if kind == 'finer' else 40):
-        if kind == 'late' and k % 5 == 0:
-            contacts = solver.batch(world.poses, sizes=world.size, pairs=pairs)
-            world.forces.hold(pairs, contacts, world.poses, age=0.01, period=0.025)
-        if k == 3:
-            world.forces = copy.copy(world.forces)
-        world.step(0.01)
-        found += [world.poses.tobytes(), world.velocities.tobytes(), world.wrenches.tobytes()]
-    return b''.join(found)
-
-
-@pytest.mark.parametrize('kind', ['steady', 'impacts', 'finer', 'late'])
-def test_parts_of_an_island_have_the_bits_of_the_whole(kind: str) -> None:
-    whole = block_of_boxes(kind, 1)
-    assert all(block_of_boxes(kind, threads) == whole for threads in (2, 3))
-
-
-def test_parts_take_turns_in_the_order_of_the_whole(tmp_path: Path) -> None:
-    """Whichever part of an island goes on, bodies see their blocks in turn.
-
-    A slab and boxes at random are cut; a tower and a star, whose blocks follow each other, are not.
-    """
-    program = tmp_path / 'parts'
-    subprocess.run([*os.environ.get('CXX', 'c++').split(), '-std=c++17', '-O1', '-Wall', '-Werror',
-                    '-Wno-psabi', '-I', ROOT / 'box_contact_ros' / 'core' / 'src',
-                    Path(__file__).with_name('parts_law.cpp'), '-o', program], check=True)
-    out = subprocess.run([program], capture_output=True, text=True, check=True).stdout
-    assert out.splitlines() == ['slab 2 0', 'slab 3 0', 'slab 5 0', *['chance 3 0'] * 5,
-                                'tower 0 0', 'star 0 0']
 
 
 def advance_here_and_in_a_fork() -> None:

@@ -54,8 +54,7 @@ def exact() -> Any:
 
 def forces(n: int = 2) -> Any:
     """Return the forces on n bodies of 1 kg."""
-    return native.PatchForces(np.ones(n), np.ones((n, 3)), np.zeros((n, 3)), 2, 5, 2, 1, 0.5, 1e-3,
-                              1e-4, True)
+    return native.PatchForces(np.ones(n), np.ones((n, 3)), np.zeros((n, 3)), 2, 1, 0.5, 1e-3, True)
 
 
 def held(pairs: int = 1) -> list[Any]:
@@ -78,7 +77,16 @@ def writer_arguments(n: int = 4) -> list[Any]:
     return [native.BroadPhase(*phase_arguments(n)), ContactSolver(), 0.1, 9, np.ones((n, 3)),
             rows(n + 1), np.array([n - 1, n]), np.array([n] * (n - 1) + [-1]), rows(n),
             tuple('abcd'), np.array([[1, 0]]), ('named',), np.array([[1, 0, 1, 1]]), (None,),
-            'map', 3]
+            'map', 2, 3]
+
+
+def some_names(rng: np.random.Generator) -> bytes:
+    """Return a MultiDOFJointState of two names, in which some bytes are others."""
+    message = bytearray(b'\0\1\0\0' + bytes(8) + b'\1\0\0\0' + bytes(4) + b'\2\0\0\0'
+                        + b'\2\0\0\0a\0\0\0' + b'\2\0\0\0b\0\0\0' + b'\2\0\0\0' + bytes(120))
+    for at in rng.integers(len(message), size=rng.integers(4)):
+        message[at] = rng.integers(256)
+    return bytes(message[:rng.integers(len(message)) if rng.random() < 0.3 else None])
 
 
 STAMPED = [(POSE, 'map', 5), (POSE, 'map', 7)]
@@ -347,14 +355,17 @@ def random_calls(seed: int, rounds: int) -> None:
          [native.BroadPhase(*phase_arguments()), np.array([1, 0, -1, 3])], {}),
         (native.BroadPhase(*phase_arguments()).resize, [np.arange(4), np.ones((4, 3))], {}),
         (native.read_pose, [rng.bytes(int(rng.integers(90)))], {}),
+        (native.NamedPoses, [tuple('abcd')], {}),
+        (native.NamedPoses(tuple('abcd')).read, [some_names(rng)], {}),
         (native.TickWriter, writer_arguments(), {}),
         (native.TickWriter(*writer_arguments()), [list(STAMPED)], {}),
         (native.TickWriter(*writer_arguments()), [[odd(rng, STAMPED[0]), STAMPED[1]]], {}),
         (native.message_numbers, [np.ones((4, 3)), np.ones((4, 3)), np.ones(4), np.ones(4),
-                                  np.ones((4, 3, 3))], {}),
-        (native.patch_areas, [np.ones((4, 3)), np.ones((4, 3, 3))], {}),
-        (native.PatchForces, [np.ones(2), np.ones((2, 3)), np.zeros((2, 3)), 2, 5, 2, 1, 0.5, 1e-3,
-                              1e-4, True], {}),
+                                  np.ones((4, 3, 3)), np.ones(4)], {}),
+        (native.face_areas, [boxes, rows(), places], {}),
+        (native.face_patches, [boxes, rows(), places, np.eye(3)[:2], 1e-4], {}),
+        (native.PatchForces,
+         [np.ones(2), np.ones((2, 3)), np.zeros((2, 3)), 2, 1, 0.5, 1e-3, True], {}),
         (law.hold, held(), {}), (law.forget, [[1]], {}),
         (law.advance, [0.001, rows(2), np.zeros((2, 6)), None], {})]
     answered = 0

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain, repeat
 from typing import Any
 
 import numpy as np
@@ -16,10 +17,12 @@ from geometry_msgs.msg import (
     PoseArray,
     PoseStamped,
     Quaternion,
+    Transform,
     Vector3,
     Vector3Stamped,
 )
 from rclpy.serialization import serialize_message
+from sensor_msgs.msg import MultiDOFJointState
 from std_msgs.msg import Header
 
 from box_contact_msgs.msg import Box, BoxPair, Contacts
@@ -28,7 +31,7 @@ from box_contact_msgs.msg import Near as NearMessage
 from box_contact_ros.node.messages import make_header
 from box_contact_ros.scene.scene import Pair
 from box_contact_ros.solver.checks import pose_fault
-from box_contact_ros.solver.contact import FIELDS, Contact, patch_area
+from box_contact_ros.solver.contact import FIELDS, Contact
 from box_contact_ros.solver.nearest import Nearest
 from box_contact_ros.stream.cdr import NANOSECONDS, MessageError
 from box_contact_ros.stream.pairing import StampedPose
@@ -48,6 +51,16 @@ def pose_stamped(numbers: Iterable[float], frame_id: str, stamp: int) -> PoseSta
 def pose_array(rows: Iterable[Iterable[float]], frame_id: str, stamp: int) -> PoseArray:
     """Return the message of poses (n, 7); stamp [ns]."""
     return PoseArray(header=make_header(stamp, frame_id), poses=[_pose(row) for row in rows])
+
+
+def joint_state(poses: Mapping[str, Iterable[float]], frame_id: str, stamp: int,
+                ) -> MultiDOFJointState:
+    """Return the message of poses by name; stamp [ns]."""
+    moved = [_pose(row) for row in poses.values()]
+    return MultiDOFJointState(
+        header=make_header(stamp, frame_id), joint_names=list(poses),
+        transforms=[Transform(translation=Vector3(x=p.position.x, y=p.position.y, z=p.position.z),
+                              rotation=p.orientation) for p in moved])
 
 
 def a_box(name: str, pose: Iterable[float], size: Iterable[float] = (0.0, 0.0, 0.0)) -> Box:
@@ -150,9 +163,13 @@ def make_normal(header: Header, contact: Contact) -> Vector3Stamped:
 
 
 def make_contacts(header: Header, listed: Iterable[tuple[Pair, Contact]],
-                  stale: Iterable[str] = (), near: Iterable[tuple[Pair, Nearest]] = ()) -> Contacts:
-    """Return `contacts`: the pairs in contact, those near, and the names of the stale."""
-    return Contacts(header=header, stale=list(stale), contacts=_entries(listed),
+                  stale: Iterable[str] = (), near: Iterable[tuple[Pair, Nearest]] = (),
+                  areas: Iterable[float] = ()) -> Contacts:
+    """Return `contacts`: the pairs in contact, those near, and the names of the stale.
+
+    areas: of the patches in contact; 0 where there are none.
+    """
+    return Contacts(header=header, stale=list(stale), contacts=_entries(listed, areas),
                     near=[NearMessage(pair=pair.label, box_a=pair.a, box_b=pair.b,
                                       distance=float(n.distance), normal=_vector(n.normal),
                                       point_a=_point(n.point_a), point_b=_point(n.point_b))
@@ -171,11 +188,13 @@ def contacts_by_pair(message: Contacts) -> dict[str, Contact]:
         answer.names, answer.contacts)}
 
 
-def _entries(listed: Iterable[tuple[Pair, Contact]]) -> list[ContactMessage]:
+def _entries(listed: Iterable[tuple[Pair, Contact]], areas: Iterable[float],
+             ) -> list[ContactMessage]:
     return [ContactMessage(
         pair=pair.label, box_a=pair.a, box_b=pair.b, point=_point(c.point),
         normal=_vector(c.normal), depth=-float(c.separation), volume=float(c.volume),
-        area=patch_area(c), covariance=c.covariance[UPPER]) for pair, c in listed]
+        area=area, covariance=c.covariance[UPPER])
+        for (pair, c), area in zip(listed, chain(areas, repeat(0.0)))]
 
 
 def contacts_at(stamp: int, touching: Mapping[Pair, Contact], stale: Sequence[str] = (),

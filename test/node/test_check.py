@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterator
 from contextlib import closing
 from functools import partial
 from types import SimpleNamespace
@@ -182,7 +183,7 @@ def test_a_question_is_answered_as_a_tick_of_the_scene_that_it_makes(margin: flo
         response = asked(answerer, *(a_box(name, *guest) for name, guest in guests.items()),
                          *(a_box(name, place) for name, place in named.items()), margin=margin)
         whole = Scene({**{name: Box(size) for name, (_, size) in guests.items()}, **boxes},
-                      scene.pairs, patterns=(('guest*', '*'), *patterns), pose_array=True)
+                      scene.pairs, patterns=(('guest*', '*'), *patterns), poses='array')
         poses_of = {name: place for name, (place, _) in guests.items()} | named
         answer = SceneSolver(whole, margin=margin)([poses_of.get(name) for name in whole.moving])
         listed, near = response.contacts.contacts, response.contacts.near
@@ -361,11 +362,15 @@ def test_costly_requests_wait_for_ticks(client: Client, executor_type: Any) -> N
     assert order.index('cheap') < order.index('second')
 
 
+STEP = 0.01  # time [s] of each step but the last
+
+
 class Bench:
     """A `PacedService` whose requests take a time [s] of their own, by a clock that stands."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, *, in_turn: bool = False) -> None:
-        self.now, self.sent = 0.0, []
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, *, in_turn: bool = False,
+                 steps: int = 1) -> None:
+        self.now, self.sent, self.steps = 0.0, [], steps
         monkeypatch.setattr(paced_service, 'time', SimpleNamespace(
             monotonic=lambda: self.now, thread_time=lambda: self.now))
         monkeypatch.setattr(paced_service, 'answer_later', lambda service, take: None)
@@ -377,9 +382,11 @@ class Bench:
                                     check_module.kind_and_size, in_turn=in_turn)
         self.end_of_pause = node.create_timer.call_args.args[1]
 
-    def answer(self, request: Any, response: Check.Response) -> Check.Response:
+    def answer(self, request: Any, response: Check.Response) -> Iterator[None]:
+        for _ in range(self.steps - 1):
+            self.now += STEP
+            yield
         response.success = request.name != 'bad'
-        return response
 
     def ask(self, name: str, boxes: int, seconds: float, margin: float = 0.0) -> None:
         """Take a request whose answer is sent after so long."""
@@ -452,6 +459,21 @@ def test_where_the_order_matters_none_overtakes(monkeypatch: pytest.MonkeyPatch)
         bench.now += 1.0
         bench.end_of_pause()
     assert bench.sent[3:] == ['next costly', 'behind it']
+
+
+def test_an_answer_is_made_in_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ticks come between them; other requests wait for the last one, and for its pause."""
+    bench = Bench(monkeypatch, in_turn=True, steps=3)
+    bench.ask('first', 80, 0.01)
+    bench.ask('second', 1, 0.01)
+    for _ in range(2):
+        assert not bench.sent and bench.timer.timer_period_ns == 1
+        bench.end_of_pause()
+    assert bench.sent == ['first']
+    assert bench.timer.timer_period_ns == round(1e9 * paced_service.PAUSE * (2 * STEP + 0.01))
+    for _ in range(3):
+        bench.end_of_pause()
+    assert bench.sent == ['first', 'second'] and bench.counts == {'checks answered': 2}
 
 
 @pytest.mark.parametrize('by_topics', [False, True])

@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+import traceback
 from contextlib import closing
 
 import numpy as np
@@ -77,6 +78,23 @@ def test_poses_pair_by_stamp_in_any_order(node, client):
     for stamp in stamps:
         contact = contacts_by_pair(client.contacts[stamp])[PAIR]
         assert -contact.separation == pytest.approx(2 - heights[stamp], abs=1e-14)
+
+
+def test_reports_come_behind_a_tick(node, client, monkeypatch):
+    """So no tick waits for one; without ticks they come, too."""
+    behind = []
+
+    def report(*args, report=node._diagnostics.report):
+        files = [frame.filename for frame in traceback.extract_stack()]
+        behind.append(any(file.endswith('tick.py') for file in files))
+        report(*args)
+
+    monkeypatch.setattr(node._diagnostics, 'report', report)
+    assert client.spin(lambda: len(behind) > 2)
+    assert not any(behind)
+    behind.clear()
+    assert client.spin(lambda: len(behind) > 3 or client.ask(ORIGIN, APART) and False)
+    assert all(behind[1:])
 
 
 def test_two_nodes_on_the_same_topics(node, client, capfd):
@@ -204,6 +222,13 @@ def test_quality_of_service_can_be_overridden(client):
 # --- processes ------------------------------------------------------------------------------------
 
 
+def names_of_containers(folder):
+    """Return a scene file of names that no topic can have."""
+    path = folder / 'containers.yaml'
+    path.write_text('boxes: {MSKU-123: {size: [1, 1, 1]}, 20ft_1: {size: [1, 1, 1]}}\npairs: all')
+    return path
+
+
 def long_topics(folder):
     """Return the path of a scene of two boxes, whose names make topics too long for ROS."""
     path = folder / 'scene.yaml'
@@ -233,6 +258,8 @@ def test_a_bad_start_is_one_clear_line(tmp_path):
         ({'scene': 'config/scenes/two_boxes.yaml'}, 'size_a (2.0, 2.0, 2.0) has no effect while'),
         ({'scene': str(long_topics(tmp_path)), 'size_a': SIZE, 'size_b': SIZE},
          "/contact/point': failed to resolve name: topic length should not exceed"),
+        ({'scene': str(names_of_containers(tmp_path)), 'size_a': SIZE, 'size_b': SIZE},
+         "topic 'MSKU-123_20ft_1/contact/point': failed to resolve name: topic name must not"),
         ({'qos_overrides./box_a/pose.subscription.depth': 'deep'}, "'deep' of type 'STRING'"),
         ({'qos_overrides./box_a/pose.subscription.reliability': 'relyable'},
          'qos_overrides of /box_a/pose: Unexpected QoS override for policy `reliability`'),

@@ -10,13 +10,16 @@ from types import SimpleNamespace
 from unittest.mock import Mock
 
 import pytest
+from geometry_msgs.msg import PoseStamped
 
 from box_contact_ros import SceneSolver
 from box_contact_ros.node import diagnostics
 from box_contact_ros.node.diagnostics import ACTIVE, Diagnostics, TickMonitor
 from box_contact_ros.node.tick import PoseQueue
+from box_contact_ros.node.topics import SceneTopics
 from box_contact_ros.scene.scene import two_boxes
 from box_contact_ros.stream.pairing import OVERTAKEN, StampedPose, StampPairing
+from box_contact_ros.stream.streams import watched_of
 
 MAX_AGE = 10**9  # ns
 SOLVER = SceneSolver(two_boxes((1, 1, 1), (1, 1, 1)))
@@ -47,6 +50,7 @@ def node(monkeypatch):
         report.values = {entry.key: entry.value for entry in status.values}
         return status.message
     report.pairing, report.answer = pairing, lambda: monitor.evaluated(10_000, 0, [])
+    report.monitor = monitor
     return counts, report
 
 
@@ -198,3 +202,33 @@ def test_who_sends_a_stamp_again_is_told_why(stamps, words):
     assert words in line and ('latest' in line) == (len(stamps) == 2)
     shared = rejection.line(reason, publishers=2)
     assert (line == shared) == (len(stamps) == 2) and 'wait longer' not in shared
+
+
+def test_a_scene_that_changes_has_no_pairs_without_an_answer(node):
+    """A tick was answered before each change: pairs that are new count from the next report on."""
+    counts, report = node
+    pairs = watched_of(SOLVER.scene)
+    report.monitor.restart(pairs)
+    for _ in range(8):
+        counts['poses'] += 10
+        report.answer()
+        report.monitor.watch(pairs)
+        assert report(1.0) == 'answering'
+    counts['poses'] += 10
+    report(1.0)
+    counts['poses'] += 10
+    assert report(1.0) != 'answering'  # no tick since
+
+
+def test_the_same_topic_in_another_namespace_is_named():
+    """Of a box that nobody sends poses of, where the one is published and the other heard."""
+    topics = object.__new__(SceneTopics)
+    topics._node = Mock(get_publishers_info_by_topic=lambda topic: [], count_publishers=lambda _: 1)
+    topics._node.get_topic_names_and_types.return_value = [
+        ('/box_a/pose', []), ('/box_b/pose', []), ('/crane_1/box_a/pose', [])]
+    topics._subscriptions = {box: Mock(topic_name=f'/{box}/pose', msg_type=PoseStamped)
+                             for box in ('box_a', 'box_c')}
+    assert topics.why_silent('box_c') == 'nobody publishes /box_c/pose'
+    assert topics.why_silent('box_a') == (
+        'nobody publishes /box_a/pose, but /crane_1/box_a/pose is published: remap the one to the '
+        'other')

@@ -23,15 +23,17 @@ from patience import PATIENCE
 from rclpy.qos import QoSProfile
 from referencing import Registry, Resource
 from ros_client import CUBES, Client, serving
-from typed_messages import a_box, a_pair, make_contacts, pose_array
+from sensor_msgs.msg import MultiDOFJointState
+from typed_messages import a_box, a_pair, joint_state, make_contacts, pose_array
 
-from box_contact_msgs.srv import Check, SetBoxes
+from box_contact_msgs.msg import Body, Boxes
+from box_contact_msgs.srv import Check, GetBoxes, SetBoxes
 from box_contact_ros.core import LENGTH_MAX, QUATERNION_MAX
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
-from box_contact_ros.node.topics import pose_qos
+from box_contact_ros.node.topics import LATCHED, pose_qos
 from box_contact_ros.resources import resource_path
-from box_contact_ros.solver.checks import MOST_NAME_BYTES
+from box_contact_ros.solver.checks import MOST_NAME_BYTES, NAME
 from box_contact_ros.stream.streams import ALL_BOXES
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -40,11 +42,11 @@ DOCUMENT = yaml.safe_load((FOLDER / 'asyncapi.yaml').read_text(encoding='utf-8')
 SCHEMAS = {path.name: json.loads(path.read_text('utf-8')) for path in sorted(FOLDER.glob('*.json'))}
 REGISTRY = Registry().with_resources(
     (name, Resource.from_contents(schema)) for name, schema in SCHEMAS.items())
-SERVICES = ('answerCheck', 'answerSetBoxes')
+SERVICES = ('answerCheck', 'answerSetBoxes', 'answerGetBoxes')
 OPERATIONS = {name: operation for name, operation in DOCUMENT['operations'].items()
               if name not in SERVICES}  # on topics
 ADDRESSES = {name: channel['address'] for name, channel in DOCUMENT['channels'].items()
-             if name not in ('check', 'reset', 'setBoxes')}
+             if name not in ('check', 'reset', 'setBoxes', 'getBoxes')}
 ORIGIN = (0, 0, 0, 0, 0, 0, 1)
 TOUCHING = (0.5, 0.25, 1.875, 0.1, 0.2, 0, 1)
 CLOSE = (0.5, 0.25, 2.0625, 0, 0, 0, 1)
@@ -78,10 +80,10 @@ def message_of(operation: dict[str, Any]) -> dict[str, Any]:
     return follow(message['$ref'])
 
 
-def validator_at(address: str) -> Draft202012Validator:
+def validator_at(channel: str) -> Draft202012Validator:
     """Return what checks the payloads of a topic."""
     operation, = (operation for operation in OPERATIONS.values()
-                  if follow(operation['channel']['$ref'])['address'] == address)
+                  if operation['channel']['$ref'] == f'#/channels/{channel}')
     return validator_of(message_of(operation))
 
 
@@ -167,6 +169,8 @@ def test_limits_are_the_codes():
                  scene['properties']['frame_id'], shared['header']['properties']['frame_id'],
                  shared['box']['properties']['name']):
         assert text['maxLength'] == MOST_NAME_BYTES
+    # JavaScript's $ is the end of the text, Python's also before a last line break.
+    assert scene['$defs']['name']['pattern'] == f'^{NAME.pattern}$(?![\\s\\S])'
 
 
 # --- live messages --------------------------------------------------------------------------------
@@ -190,13 +194,14 @@ def live(node, client) -> dict[str, list[Any]]:
 
     The poses of an array are what a client may send; one box is not there.
     """
-    got: dict[str, list[Any]] = {address: [] for address in ADDRESSES.values()}
-    for topic in ('box_a/pose', 'box_b/pose'):
-        client.node.create_subscription(PoseStamped, topic, got[topic].append, 100)
-    got['/diagnostics'] = client.diagnostics
+    got: dict[str, list[Any]] = {channel: [] for channel in ADDRESSES}
+    for channel in ('boxAPose', 'boxBPose'):
+        client.node.create_subscription(PoseStamped, ADDRESSES[channel], got[channel].append, 100)
+    client.node.create_subscription(Boxes, ADDRESSES['boxes'], got['boxes'].append, LATCHED)
+    got['diagnostics'] = client.diagnostics
     assert client.spin(lambda: len(client.diagnostics) > 1)  # before the first pose
     client.offer_until_answered(ORIGIN, APART)
-    assert client.spin(lambda: got['box_a/pose'] and got['box_b/pose'])
+    assert client.spin(lambda: got['boxAPose'] and got['boxBPose'])
     for pose in (TOUCHING, APART, CLOSE) * 3:
         client.ask(ORIGIN, pose)
     assert client.diagnostic('contacts') == '3'
@@ -204,11 +209,18 @@ def live(node, client) -> dict[str, list[Any]]:
     client.send(ORIGIN, TOUCHING, frames=('map', 'odom'))
     client.ask(ORIGIN, TOUCHING)
     assert client.diagnostic('refused: bad pose') == '1'
-    for topic, messages in (('contact/point', client.points), ('contact/normal', client.normals),
+    for topic, messages in (('contactPoint', client.points), ('contactNormal', client.normals),
                             ('contacts', client.contacts)):
         got[topic] = list(messages.values())
     got['contacts'].insert(0, make_contacts(
         make_header(0, 'map'), [], ['box_a_box_b']))  # a stale pair
+    for k in range(2):
+        client.call(SetBoxes, 'contact_node/set_boxes', SetBoxes.Request(
+            fixed=[a_box(f'stand{k}', APART, (1, 1, 1))], bodies=[Body(
+                name=f'body{k}', fixed=True, boxes=[a_box(f'part{k}', APART, (1, 1, 1))])]))
+        assert client.spin(lambda: got['boxes'] and got['boxes'][-1].revision == k + 1)  # noqa: B023
+    got['namedPoses'] = [joint_state({'a': TOUCHING, 'b': first}, 'map', 0)
+                         for first in (ORIGIN, APART)]
     got['poses'] = [pose_array([TOUCHING, first], 'map', 0) for first in (ORIGIN, (math.nan,) * 7)]
     return got
 
@@ -219,9 +231,9 @@ def test_live_messages_validate(live):
         check = validator_at(address)
         faults = [[error.message for error in check.iter_errors(plain(m))] for m in messages]
         wrong = [fault for fault in faults if fault]
-        assert len(wrong) == (address == 'box_b/pose'), (address, wrong)
+        assert len(wrong) == (address == 'boxBPose'), (address, wrong)
         assert len(messages) > 1
-    texts = {message.status[0].message for message in live['/diagnostics']}
+    texts = {message.status[0].message for message in live['diagnostics']}
     assert {'no poses', 'poses refused: bad pose'} <= {text.split(',')[0] for text in texts}
     for name, field in (('contacts', 'depth'), ('near', 'distance')):
         assert {getattr(entry, field) > 0.0 for message in live['contacts']
@@ -247,7 +259,7 @@ def test_requests_and_responses_validate(node, client, boxes, success):
 
 
 @pytest.mark.parametrize('size, absent, success', [
-    ((2, 2, 2), [], True), ((2, 2, 2), ['nobody'], False), ((2, 2, 1e51), [], False)])
+    ((2, 2, 2), [], True), ((2, 2, 2), ['nobody'], True), ((2, 2, 1e51), [], False)])
 def test_changes_of_boxes_validate(node, client, size, absent, success):
     """A box that comes, with one that was never there, and one that is too large."""
     channel = DOCUMENT['channels']['setBoxes']
@@ -255,13 +267,33 @@ def test_changes_of_boxes_validate(node, client, size, absent, success):
                          for message in channel['messages'].values())
     asked = SetBoxes.Request(fixed=[a_box('stand', ORIGIN, size)], absent=absent)
     answer = client.call(SetBoxes, channel['address'], asked)
+    assert ['is not there' in warning for warning in answer.warnings] == (
+        [True] * len(absent) + [False] * success)  # and the box is in no pair
     assert answer.success == success and request.is_valid(plain(asked)) == (size[2] < 1e50)
     assert not [error.message for error in response.iter_errors(plain(answer))]
     answer.success = not success
     assert not response.is_valid(plain(answer))
     counted = f'changes {"answered" if success else "refused"}'
     assert int(client.diagnostic(counted)) > 0
-    assert validator_at('/diagnostics').is_valid(plain(client.diagnostics[-1]))
+    assert validator_at('diagnostics').is_valid(plain(client.diagnostics[-1]))
+
+
+def test_listings_of_boxes_validate(node, client):
+    """Of boxes that a request has brought, and of no box."""
+    channel = DOCUMENT['channels']['getBoxes']
+    request, response = (validator_of(follow(message['$ref']))
+                         for message in channel['messages'].values())
+    bodies = [Body(name='lorry', fixed=True, boxes=[a_box('bed', ORIGIN, (2, 2, 2))])]
+    assert client.call(SetBoxes, 'contact_node/set_boxes', SetBoxes.Request(bodies=bodies)).success
+    for first in (0, 100):
+        asked = GetBoxes.Request(first=first)
+        answer = client.call(GetBoxes, channel['address'], asked)
+        assert answer.success and request.is_valid(plain(asked))
+        assert not [error.message for error in response.iter_errors(plain(answer))]
+        assert [body.name for body in answer.bodies if body.name == 'lorry'] == (
+            [] if first else ['lorry'])
+        answer.success = False
+        assert not response.is_valid(plain(answer))
 
 
 def set_in(path: str, value: Any):
@@ -276,30 +308,30 @@ def set_in(path: str, value: Any):
 
 def test_a_node_that_answers_requests_alone_says_so(live):
     """No pose has come, but ~/check was called: a state that few listeners see first."""
-    message = plain(next(message for message in live['/diagnostics']
+    message = plain(next(message for message in live['diagnostics']
                          if message.status[0].message == 'no poses'))
     message['status'][0]['message'] = 'answering requests'
-    assert validator_at('/diagnostics').is_valid(message)
+    assert validator_at('diagnostics').is_valid(message)
 
 
 WRONG_MESSAGES = {
-    'NaN in the normal': ('contact/normal', set_in('vector.x', math.nan)),
-    'normal of length 2': ('contact/normal', set_in('vector.z', 2.0)),
-    'NaN in the point': ('contact/point', set_in('point.z', math.nan)),
-    'infinite point': ('contact/point', set_in('point.x', math.inf)),
-    'nanoseconds of a second': ('contact/point', set_in('header.stamp.nanosec', 10**9)),
+    'NaN in the normal': ('contactNormal', set_in('vector.x', math.nan)),
+    'normal of length 2': ('contactNormal', set_in('vector.z', 2.0)),
+    'NaN in the point': ('contactPoint', set_in('point.z', math.nan)),
+    'infinite point': ('contactPoint', set_in('point.x', math.inf)),
+    'nanoseconds of a second': ('contactPoint', set_in('header.stamp.nanosec', 10**9)),
     'a contact without a normal': ('contacts', set_in('contacts.0.normal.x', math.nan)),
     'a contact without a depth': ('contacts', set_in('contacts.0.depth', math.nan)),
     'a contact without half of its point': ('contacts', set_in('contacts.0.point.x', math.nan)),
     'a negative volume': ('contacts', set_in('contacts.0.volume', -1e-9)),
-    'pose at 1e51 m': ('box_a/pose', set_in('pose.position.x', 1e51)),
+    'pose at 1e51 m': ('boxAPose', set_in('pose.position.x', 1e51)),
     'half a pose in an array': ('poses', set_in('poses.0.position.x', math.nan)),
     'half an absent pose': ('poses', set_in('poses.0.orientation.w', math.nan)),
-    'NaN in the quaternion': ('box_a/pose', set_in('pose.orientation.w', math.nan)),
-    'quaternion of zero length': ('box_a/pose', set_in('pose.orientation.w', 0.0)),
-    'unknown level': ('/diagnostics', set_in('status.0.level', b'\x03')),
-    'unknown count': ('/diagnostics', set_in('status.0.values.0.key', 'guesses')),
-    'a count that is no number': ('/diagnostics', set_in('status.0.values.0.value', 'many'))}
+    'NaN in the quaternion': ('boxAPose', set_in('pose.orientation.w', math.nan)),
+    'quaternion of zero length': ('boxAPose', set_in('pose.orientation.w', 0.0)),
+    'unknown level': ('diagnostics', set_in('status.0.level', b'\x03')),
+    'unknown count': ('diagnostics', set_in('status.0.values.0.key', 'guesses')),
+    'a count that is no number': ('diagnostics', set_in('status.0.values.0.value', 'many'))}
 
 
 @pytest.mark.parametrize('name', WRONG_MESSAGES)
@@ -313,7 +345,7 @@ def test_wrong_messages_do_not_validate(live, name):
     assert not check.is_valid(plain(message))
 
 
-@pytest.mark.parametrize('address', ADDRESSES.values())
+@pytest.mark.parametrize('address', ADDRESSES)
 def test_missing_and_extra_fields_do_not_validate(live, address):
     check = validator_at(address)
     message = plain(live[address][0])
@@ -331,7 +363,8 @@ def test_topics_have_the_documents_type_and_qos(node, operation):
     """Of what nothing is said, it is ROS's default: neither deadlines nor lifespans."""
     address = follow(operation['channel']['$ref'])['address']
     if address == 'poses':
-        message_type, qos = PoseArray, pose_qos(ALL_BOXES)
+        array = operation['channel']['$ref'] == '#/channels/poses'
+        message_type, qos = PoseArray if array else MultiDOFJointState, pose_qos(ALL_BOXES)
     else:
         entities = node.publishers if operation['action'] == 'send' else node.subscriptions
         (message_type, qos), = ((entity.msg_type, entity.qos_profile) for entity in entities
@@ -368,7 +401,9 @@ def test_docs_list_the_topics():
             follow(operation['channel']['$ref'])['address'],
             message_of(operation)['name'].replace('/msg', ''),
             {'receive': 'in', 'send': 'out'}[operation['action']],
-            f'{policies["reliability"].replace("_", " ")}, {operation["x-depth"]}'])
+            f'{policies["reliability"].replace("_", " ")}, '
+            f'{"kept, " if policies["durability"] == "transient_local" else ""}'
+            f'{operation["x-depth"]}'])
     page = (ROOT / 'docs' / 'reference' / 'topics.md').read_text('utf-8')
     table = re.search(r'(?:^\|.*\n)+', page.split(' of the contact node\n', 1)[1], re.MULTILINE)
     assert table

@@ -225,7 +225,7 @@ def test_a_slow_node_says_so_and_is_late_by_few_ticks(array_node, array_client, 
 
     slow.solver = tick.solver
     reset = client._client_of(Trigger, 'contact_node/reset')
-    monkeypatch.setattr(tick, '_writers', {len(tick.solver.moving): slow})
+    monkeypatch.setattr(tick, '_writer', slow)
     sent, behind = [], []
 
     def stream(done):

@@ -89,11 +89,12 @@ def test_both_nodes_answer_one_input(client, soup_node):
 def test_its_topics_are_the_documents(client, soup_node):
     """Those of the contact node, with soup/ before what is sent; the same QoS."""
     document = yaml.safe_load(resource_path('msg_schemas', 'asyncapi.yaml').read_text('utf-8'))
-    services = {f'contact_node/{name}' for name in ('check', 'reset', 'set_boxes')}
+    services = {f'contact_node/{name}' for name in (
+        'boxes', 'check', 'get_boxes', 'reset', 'set_boxes')}
     addresses = {channel['address'] for channel in document['channels'].values()} - services
     inputs = {'box_a/pose', 'box_b/pose', '/diagnostics'}
     expected = {f'/{name.lstrip("/")}' if name in inputs else f'/soup/{name}'
-                for name in addresses - {'poses'}}
+                for name in addresses - {'poses'}} | {'/soup_node/boxes'}
     assert {entity.topic_name for entity in (*soup_node.publishers, *soup_node.subscriptions)
             } - {'/parameter_events', '/rosout'} == expected
     with serving(ContactNode, **CUBES) as node:

@@ -14,8 +14,8 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 python=$(realpath -s "${1:-$root/.venv/bin/python}")
 # What an installation changes: programs, messages, and files that are looked up.
 installed=(-m 'not slow' test/package/test_{arguments,help,launch,package,processes,ros2}.py
-    test/core/test_library.py test/models test/demo/test_demo.py
-    test/node/test_{contact_node,msg_schemas,parameters,runtime,soup_node}.py)
+    test/core/test_library.py test/models/test_{paper,soup,weights_file}.py test/demo/test_demo.py
+    test/node/test_{contact_node,msg_schemas,soup_node}.py)
 # For hangs alone: half an hour, then ten seconds to end in.
 limited=(timeout --kill-after=10 1800)
 arguments=("${@:2}")

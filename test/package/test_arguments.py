@@ -13,6 +13,7 @@ from box_contact_ros import arguments
 
 @pytest.mark.parametrize('low, high, text, wanted', [
     (1.0, 4.0, '4', 4.0), (0, 9, '9', 9), (1.0, 4.0, '4.1', None), (0, 9, '-1', None),
+    (1.0, 4.0, '1', 1.0), (0, 9, '0', 0), (1, None, '1', 1), (1.0, 4.0, '0.9', None),
     (1.0, 4.0, 'nan', None), (0, 9, '1.5', None),
     (1, None, '7', 7), (1, None, '0', None)])
 def test_numbers_within(low, high, text, wanted, capsys):

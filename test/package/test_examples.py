@@ -19,11 +19,19 @@ from pathlib import Path
 import pytest
 from patience import PATIENCE
 
+pytestmark = pytest.mark.reports
+
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / 'docs' / 'examples'
-CLIENTS = ('check_client.py', 'lockstep_client.py', 'forces_client.py', 'lift.py')
+CLIENTS = ('check_client.py', 'lockstep_client.py', 'forces_client.py', 'lift.py',
+           'save_yard.py', 'crane_lift.py')
 """Of a contact node."""
-PARAMETERS = {'lift.py': (f'scene:={ROOT}/config/scenes/lift.yaml', 'pair_topics:=false')}
+LIFT = f'{ROOT}/config/scenes/lift.yaml'
+PARAMETERS = dict.fromkeys(('lift.py', 'save_yard.py', 'crane_lift.py'),
+                           (f'scene:={LIFT}', 'pair_topics:=false'))
+ARGUMENTS = {'save_yard.py': (LIFT, '/tmp/yard.yaml')}
+RUNS = {'lift.py': 10, 'lockstep_client.py': 2}
+"""A simulator that is started anew repeats the stamps of its last run, and finds what it left."""
 NEEDS = {'mujoco_loop.py': 'mujoco', 'container_stack.py': 'mujoco',
          'dask_plans.py': 'distributed',
          'tf_to_pose.py': 'tf2_ros'} | dict.fromkeys(CLIENTS, 'box_contact_msgs.msg')
@@ -48,12 +56,11 @@ def test_example(name: str, program, tmp_path: Path) -> None:
         given = PARAMETERS.get(name, ('model:=exact',))
         program('contact_node', '--ros-args', *(word for value in given for word in (
             '-p', value))).wait_for_output('ready')
-    command = [str(EXAMPLES / name)]
+    command = [str(EXAMPLES / name), *ARGUMENTS.get(name, ())]
     if name in QUICK:
         module = name.removesuffix('.py')
         command = ['-c', f'import {module}\nif __name__ == "__main__": {module}.{QUICK[name]}']
-    # A simulator that is started anew repeats the stamps of its last run.
-    for _ in range(2 if name == 'lockstep_client.py' else 1):
+    for _ in range(RUNS.get(name, 1)):
         done = subprocess.run(
             [sys.executable, *command], cwd=tmp_path, capture_output=True, text=True,
             timeout=PATIENCE, env=os.environ | {'PYTHONPATH': os.pathsep.join(

@@ -4,6 +4,7 @@
 """What the moving picture shows, read from its pixels."""
 from __future__ import annotations
 
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -21,14 +22,14 @@ def discs() -> list[tuple[float, float] | None]:
         pictures = []
         for number in range(image.n_frames):
             image.seek(number)
-            pictures.append(np.asarray(image.convert('RGB'), int)[:320])  # the side view
+            pictures.append(np.asarray(image.convert('RGB'))[:320].astype(int))  # the side view
     found: list[tuple[float, float] | None] = []
     for scene in pictures:
         alike = np.abs(scene - CONTACT).max(axis=2) < 20
         # A pixel stays if all those up to RADIUS beside, above and below it are alike.
-        inside = np.ones_like(alike)
-        for shift in range(-RADIUS, RADIUS + 1):
-            inside &= np.roll(alike, shift, axis=1) & np.roll(alike, shift, axis=0)
+        inside = alike.copy()
+        for shift, axis in product(range(1, RADIUS + 1), (0, 1)):
+            inside &= np.roll(alike, shift, axis) & np.roll(alike, -shift, axis)
         rows, columns = np.nonzero(inside)
         found.append((columns.mean(), rows.mean()) if len(rows) else None)
     return found

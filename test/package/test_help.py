@@ -41,13 +41,15 @@ def alone(*words: str) -> subprocess.CompletedProcess[str]:
                           capture_output=True, text=True, timeout=PATIENCE)
 
 
-@pytest.mark.parametrize('program', sorted(INSTALLED | CHECKOUT))
+@pytest.mark.parametrize('program', [*sorted(INSTALLED), *(
+    pytest.param(program, marks=pytest.mark.reports) for program in sorted(CHECKOUT))])
 def test_help_needs_no_extra(program: str) -> None:
     done = alone(program, '--help')
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith('usage: ') and '--help' in done.stdout
 
 
+@pytest.mark.reports
 @pytest.mark.parametrize('program', sorted(CHECKOUT))
 def test_a_program_names_its_extra_before_the_work(program: str, tmp_path: Path) -> None:
     """In one line, with pip's command; nothing is written."""

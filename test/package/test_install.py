@@ -40,7 +40,8 @@ TRACKED = subprocess.run(['git', 'ls-files', '-z', '--cached', '--others', '--ex
 CLEAN = {name: value for name, value in os.environ.items()
          if not name.startswith(('PYTHONPATH', 'AMENT', 'COLCON', 'CMAKE_PREFIX'))}
 
-pytestmark = pytest.mark.skipif(not TRACKED, reason='not a git checkout: what would be copied?')
+pytestmark = [pytest.mark.builds, pytest.mark.skipif(
+    not TRACKED, reason='not a git checkout: what would be copied?')]
 
 ASK = """
 import json, sys

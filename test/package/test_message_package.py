@@ -46,7 +46,7 @@ def test_every_definition_is_built() -> None:
         parts = path.read_text('utf-8').split('\n---\n')
         messages = [made] if len(parts) == 1 else [made.Request, made.Response]
         for part, message in zip(parts, messages, strict=True):
-            names = re.findall(r'^[\w/]+(?:\[\d*\])? (\w+)$', part, re.M)
+            names = re.findall(r'^[\w/]+(?:\[\d*\])? (\w+)(?: -?\d+)?$', part, re.M)
             assert list(message.get_fields_and_field_types()) == names and names
 
 

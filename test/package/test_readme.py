@@ -368,6 +368,7 @@ def test_files_named_in_backticks_exist():
             assert (ROOT / name).is_file(), f'{page.name}: {name}'
 
 
+@pytest.mark.reports
 def test_figures_are_made(tmp_path):
     """The scripts draw all the figures there are; a browser takes the view's."""
     pytest.importorskip('matplotlib')
@@ -397,15 +398,13 @@ HARD = [len(cases.pairs.pose_a) for cases in hard_poses.load().values()]
 LAYERS = [weights.shape for weights, _ in load_weights(
     ROOT / 'weights' / 'mlp.safetensors').networks['patch'].layers]
 STEPS = inspect.signature(PatchForces).parameters
-FORCES, CLOCK, AXIS = 'force/preparing.hpp', 'force/clock.hpp', 'separating_axis.hpp'
+TUNING, AXIS = 'force/tuning.hpp', 'separating_axis.hpp'
 SOFT, LATE, PARALLEL = (constant(file, name) for file, name in (
-    (CLOCK, 'soft_frequency'), (CLOCK, 'late_frequency'), (AXIS, 'parallel')))
+    (TUNING, 'soft_frequency'), (TUNING, 'late_frequency'), (AXIS, 'parallel')))
 LENGTHS, QUATERNIONS = (
     ' to '.join(constant('poses.hpp', f'{what}_{end}') for end in ('min', 'max'))
     for what in ('length', 'quaternion'))
-MORE, MOST, SWAY = (float(constant('force/iterations.hpp', name)) for name in (
-    'more_rounds', 'most_rounds', 'sway_time'))
-FOLD = {3.0: 'threefold', 12.0: 'twelvefold'}
+ITERATIONS = constant(TUNING, 'iterations')
 HEADER = 'box_contact_ros/core/include/box_contact/box_contact.hpp'
 CERTIFICATE = 'overlap/certificate.hpp'
 ROUNDING = constant(CERTIFICATE, 'centroid_rounding')
@@ -418,29 +417,20 @@ LIMITS = {
         f'shallower than {constant("minimum_depth.hpp", "depth_floor")} · size'),
     'contributing/decisions/patch-law.md': (
         f'Frequency of {SOFT}/window', f'Frequency of {LATE}/T',
-        f'Damping ratio {constant(FORCES, "soft_damping_ratio")}',
-        f'{STEPS["substeps"].default} sub-steps of {STEPS["iterations"].default} iterations'),
+        f'Damping ratio {constant(TUNING, "soft_damping_ratio")}',
+        f'{STEPS["substeps"].default} sub-steps of {ITERATIONS} iterations'),
     'contributing/decisions/planes.md': (
         f'less than {constant("overlap/planes.hpp", "flush_limit")} of the overlap',),
     'contributing/testing.md': (f'{sum(HARD):,} cases in {len(HARD)} families',),
     'explanation/force.md': (
-        f'{1e3 * float(constant(CLOCK, "sub_step_limit")):g} ms at most',
-        f'the last half second and {constant(CLOCK, "steps_count")} steps',
-        f'up to {STEPS["iterations"].default} times',
-        f'{STEPS["relaxations"].default} more iterations ',
+        f'{1e3 * float(constant(TUNING, "sub_step_limit")):g} ms at most',
         f'{constant("force/rectangle.hpp", "torsion_share")} times the mean',
-        f'last {constant(CLOCK, "intervals_kept")} intervals',
-        f'shrinks to 1 / {constant(CLOCK, "step_shrinkage")} per step',
-        f'are {FOLD[MORE]}; after {(MOST / MORE - 1.0) * SWAY:g} s of sway, {FOLD[MOST]}',
-        f'{constant("force/iterations.hpp", "impact_change")} m/s and (in what had patches) '
-        f'{constant("force/iterations.hpp", "impact_acceleration")} m/s²·sub-step, up to '
-        f'{constant("force/iterations.hpp", "impact_iterations")} times',
-        f'no more than {constant("force/gaps.hpp", "gap_share")}·g·dt²',
-        f'apart by {1e3 * float(constant("force/gaps.hpp", "pressed_gap")):g} mm',
+        f'up to {constant(TUNING, "finest")} times as many sub-steps',
+        f'grown by {constant(TUNING, "gap_share")}·g·dt²',
+        f'slower than {1e3 * float(constant(TUNING, "sleep_speed")):g} mm/s',
         f'the frequency {SOFT}/window', f'{float(SOFT) ** -2:.1f}·g·h² deep',
-        f'the frequency is {LATE}/T', f'g·T²/{float(LATE) ** 2}',
-        f'faster than {constant(FORCES, "push_out_limit")} m/s',
-        f'older than {constant(CLOCK, "overdue_periods")} periods'),
+        f'If {LATE}/T is less than {SOFT}/step', f'g·T²/{float(LATE) ** 2}',
+        f'older than {constant(TUNING, "overdue_periods")} periods'),
     'explanation/mlp.md': (
         f'reads {LAYERS[0][1]} features',
         f'two hidden layers of {LAYERS[1][0]} rectified units and {LAYERS[-1][0]} outputs'),
@@ -496,6 +486,7 @@ def test_cpp_examples(tmp_path):
         for line in re.findall(r'printf\(.*\);  // (.*)$', text, re.MULTILINE)]
 
 
+@pytest.mark.reports
 def test_pages_build_without_a_warning(tmp_path):
     """`make docs`: every page is in a table of contents, and every link and reference leads on."""
     pytest.importorskip('myst_parser')

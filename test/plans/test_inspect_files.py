@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from box_contact_ros.plans import inspect_files
+from box_contact_ros.plans.inspect_files import STATUSES
 
 pytest.importorskip('clarabel')
 
@@ -39,14 +40,17 @@ def judge(tmp_path, capsys):
      'unsupported           b  share 0.40, centre 100 mm outside'),
     (sheet('a,1,1,1,0,0,0.5', 'b,1,1,1,0,0,1.4'), 1, 'overlap               a  b  100.0 mm deep'),
     (sheet('a,1,1,1,0,0,0.5', 'b,1,1,1,0,0,2.5'), 1,
-     'hangs                 b  share 0.00, centre on nothing'),
+     'hangs                 b  1000.0 mm above what is below'),
     (sheet('a,1,1,1,0,0,0.4'), 1, 'overlap               a  ground  100.0 mm deep'),
     (sheet(f'{PAIR[0]},150', f'{PAIR[1]},', more=',mass,limit'), 1,
      'overloaded            a  200 kg on top'),
     (sheet(*PAIR, more=',mass'), 0, '2 boxes, 300.0 kg, centre of mass 0.000 0.000 1.167 m: sound'),
     (sheet('a,1,1,1,0,0,0.5', 'a,1,1,1,3,0,0.5'), 1, 'twice                 a  2 boxes have this '
                                                      'name'),
-    (sheet('a,1,1,1,0,0,0.5', 'b,1,0,1,0,0,1.5'), 0, '1 box, 1 left out: sound')])
+    (sheet('a,1,1,1,0,0,0.5', 'b,1,0,1,0,0,1.5'), 3, '1 box: not all judged; what was read is '
+                                                     'sound, but 1 box was not placed'),
+    (sheet('a,1,1,1,0,0,0.5', 'b,1,0,1,0,0,1.5', 'c,1,1,1,0,0,0.7'), 1, '2 boxes: not sound; 1 box '
+                                                                        'was not placed')])
 def test_rows(judge, text, status, line):
     """What is wrong with a file decides the exit status."""
     found, lines = judge('p.csv', text)
@@ -59,23 +63,23 @@ def test_rows(judge, text, status, line):
     (['0010082 22G1', '0020082 42G1'], 1, 'overlap'),
     (['0020082 42G1', '0010084 22G1', '0030084 22G1'], 1, 'unsupported'),  # no castings midway
     (['0020082 42G1', '0020084 L5G1', '0020086 42G1'], 0, ''),  # 45 ft has castings as 40 ft
-    (['0010086 22G1'], 1, 'gap'), (['0010082 22G1', '0010084 5EGB'], 0, 'size type'),
-    (['0010082 22G1', '010084 22G1'], 0, 'slot'), (['0010082 22G1 RFF+BM:1'], 0, 'mass'),
-    (['0010082 22U1 DIM+9+CMT:::79'], 0, 'dimension')])
+    (['0010086 22G1'], 1, 'gap'), (['0010082 22G1', '0010084 5EGB'], 3, 'size type'),
+    (['0010082 22G1', '010084 22G1'], 3, 'slot'), (['0010082 22G1 RFF+BM:1'], 3, 'mass'),
+    (['0010082 22U1 DIM+9+CMT:::79'], 3, 'dimension')])
 def test_what_makes_a_ship_unsound(judge, boxes, status, kind):
-    """Gaps, slots taken twice and overlaps do; the others are told."""
+    """Gaps, slots taken twice and overlaps do; with the others not all is judged."""
     found, lines = judge('p.edi', baplie(*boxes))
     assert found == status
     assert kind is None or any(line.startswith(kind) for line in lines), lines
 
 
-def test_a_cut_file_is_not_sound(judge):
+def test_of_a_cut_file_not_all_is_judged(judge):
     text = baplie('0010082 22G1', '0010084 22G1')
     assert judge('p.edi', text)[0] == 0
     status, lines = judge('p.edi', text[:text.index('UNT')])
-    assert status == 1 and lines[0].startswith('cut ')
+    assert status == 3 and lines[0].startswith('cut ')
     assert judge('p.edi', text.replace('MEA+WT++KGM:20000', 'RFF+BM:1', 1).replace(
-        "RFF+BM:1'\n", '', 1))[0] == 1
+        "RFF+BM:1'\n", '', 1))[0] == 3
 
 
 SMALL = collision('<geometry><box><size>1 1 1</size></box></geometry><surface><contact>'
@@ -83,7 +87,7 @@ SMALL = collision('<geometry><box><size>1 1 1</size></box></geometry><surface><c
 
 
 @pytest.mark.parametrize(('text', 'status', 'verdict'), [
-    (world(A), 0, 'sound'), (f'<sdf>{A}</sdf>', 0, 'nothing can touch: sound'),
+    (world(A), 0, 'sound'),
     (f'<sdf><world name="w">{A.replace("<link", "<static>true</static><link")}</world></sdf>', 0,
      'nothing can touch: sound'),
     (world(A, model('b', collision(), 1.4)), 1, 'not sound'),
@@ -144,13 +148,59 @@ def test_options(judge):
     text = sheet(*PAIR, more=',mass')
     assert judge('p.csv', text, '--limit', '199')[0] == 1
     assert judge('p.csv', text, '--limit', '201')[0] == 0
-    assert judge('p.csv', text, '--limit', '199', '--geometry')[0] == 0
+    assert judge('p.csv', text, '--limit', '199', '--geometry')[0] == 3
+    assert judge('p.csv', text, '--geometry')[0] == 0
     assert judge('p.csv', text, '--acceleration', '9.9', '0', '-9.81')[0] == 1
     gap = sheet('a,1,1,1,0,0,0.501')
     assert judge('p.csv', gap)[0] == 1 and judge('p.csv', gap, '--tolerance', '0.002')[0] == 0
     status, lines = judge('p.csv', gap, '--tolerance', '0.9')
-    assert status == 2 and 'tolerance' in lines[0]
+    assert status == 2 and '--tolerance must be from 0 to 0.5 m, half of' in lines[0]
+    assert "box 'a', not 0.9" in lines[0]
     assert judge('p.csv', gap, '--acceleration', '0', '0', '0')[0] == 2
+
+
+def fixed(name, x=0.0):
+    """Return a model that does not move, with a cube on the ground."""
+    return model(name, '<static>1</static>' + collision()).replace('0 0 0.5', f'{x} 0 0.5')
+
+
+LINK = collision() + collision(more='<pose>1 0 0 0 0 0</pose>').replace('"c"', '"d"')
+
+
+@pytest.mark.parametrize(('name', 'text', 'status', 'words'), [
+    ('a.sdf', f'<sdf>{model("a", collision())}</sdf>', 3, 'support not judged: nothing is fixed'),
+    ('a.sdf', f'<sdf>{model("a", collision())}{model("b", collision(), 1.4)}</sdf>', 1, '100.0 mm'),
+    ('a.sdf', f'<sdf>{model("a", collision())}{model("b", collision(), 5)}</sdf>', 3,
+     'support not judged: nothing is fixed'),
+    ('a.sdf', f'<sdf><world name="w">{fixed("a")}{fixed("b", 0.3)}</world></sdf>', 0,
+     '700.0 mm deep, and both are fixed'),
+    ('a.csv', sheet(f'{PAIR[0][:-4]},,150', f'{PAIR[1][:-4]},,', more=',mass,limit'), 3,
+     'has no mass, so limits are not judged'),
+    # An interleave sheet, and a tolerance that nobody gave.
+    ('a.csv', sheet('carton_1,0.4,0.3,0.25,0,0,0.125,6', 'paper,0.8,0.6,0.00015,0,0,0.250075,0.02',
+                    'carton_2,0.4,0.3,0.25,0,0,0.37515,6', more=',mass'), 0, 'sound')])
+def test_what_is_not_judged_is_not_sound(judge, name, text, status, words):
+    """And what is judged and told is."""
+    found, lines = judge(name, text)
+    assert found == status and words in '\n'.join(lines), lines
+
+
+def test_a_limit_without_weights_is_not_judged(judge):
+    text = sheet('a,1,1,1,0,0,0.5', 'b,1,1,1,0,0,1.5')
+    assert judge('p.csv', text)[0] == 0
+    status, lines = judge('p.csv', text, '--limit', '10')
+    assert status == 3 and lines[-2].endswith('what was read is sound, but 2 have no weight')
+
+
+def test_forty_lines_and_what_goes_with_them(judge):
+    text = sheet('a,1,1,1,0,0,2', *(f'b{n},1,1,1,0,0,{n + 3}' for n in range(60)),
+                 'c,1,1,1,5,0,2')
+    status, lines = judge('p.csv', text)
+    assert status == 1 and len(lines) == 43 and lines[-3] == 'and 22 that go with these'
+    assert lines[0].startswith('hangs                 a  1500.0 mm')
+    assert lines[1].startswith('goes with what falls  b0  with a; ')
+    assert [line for line in lines if line.startswith('hangs                 c  ')]
+    assert len(judge('p.csv', text, '--all')[1]) == 64
 
 
 def test_several_files_have_a_line_each(tmp_path, capsys):
@@ -166,16 +216,30 @@ def test_several_files_have_a_line_each(tmp_path, capsys):
     assert len(printed.out.splitlines()) == 2
 
 
+def test_of_several_files_the_worst_counts(tmp_path, capsys):
+    texts = {0: sheet('a,1,1,1,0,0,0.5'), 3: sheet('a,1,1,1,0,0,0.5', 'b,1,0,1,0,0,1.5'),
+             1: sheet('a,1,1,1,0,0,0.7'), 2: 'name'}
+    paths = {status: str(written(tmp_path, f'{status}.csv', text))
+             for status, text in texts.items()}
+    worst = list(paths)
+    for n, status in enumerate(worst):
+        for order in worst[:n + 1], worst[n::-1]:
+            assert inspect_files.main([paths[other] for other in order]) == status
+    assert ': not all judged; ' in capsys.readouterr().out
+
+
 def test_json_is_as_its_schema_has_it(judge):
     jsonschema = pytest.importorskip('jsonschema')
     schema = json.loads((ROOT / 'msg_schemas/inspection.json').read_text('utf-8'))
     jsonschema.Draft202012Validator.check_schema(schema)
     for name, text in (('ship.edi', (FILES / 'ship.edi').read_text('utf-8')),
+                       ('c.csv', sheet('a,1,1,1,0,0,0.5', 'b,1,0,1,0,0,1')),
                        ('a.sdf', f'<sdf>{A}</sdf>'), ('b.csv', sheet(*PAIR, more=',mass'))):
         status, (line,) = judge(name, text, '--json')
         document = json.loads(line)
         jsonschema.validate(document, schema, jsonschema.Draft202012Validator)
         assert document['sound'] == (status == 0)
+        assert STATUSES[document['verdict']] == status
         assert len(document['names']) == len(document['stands']) == len(document['load'])
 
 
@@ -207,3 +271,45 @@ def test_a_picture(tmp_path):
     out = tmp_path / 'ship.png'
     assert inspect_files.main([str(FILES / 'ship.edi'), '--picture', str(out)]) == 1
     assert out.read_bytes().startswith(b'\x89PNG')
+
+
+def test_a_picture_overwrites_no_input(tmp_path, capsys):
+    path = written(tmp_path, 'a.csv', sheet('a,1,1,1,0,0,0.5'))
+    (tmp_path / 'link.png').symlink_to(path)
+    for out in path, tmp_path / 'link.png':
+        with pytest.raises(SystemExit) as ended:
+            inspect_files.main([str(path), '--picture', str(out)])
+        assert ended.value.code == 2 and 'would overwrite' in capsys.readouterr().err
+    assert path.read_text('utf-8').startswith('name')
+
+
+def test_a_picture_that_cannot_be_written(tmp_path, capsys):
+    """It is not a plan that could not be read."""
+    pytest.importorskip('matplotlib')
+    path = str(written(tmp_path, 'a.csv', sheet('a,1,1,1,0,0,0.5')))
+    assert inspect_files.main([path, '--picture', str(tmp_path / 'none' / 'a.png')]) == 74
+    with pytest.raises(SystemExit):
+        inspect_files.main([path, '--picture', str(tmp_path / 'a.odd')])
+    assert 'Traceback' not in capsys.readouterr().err
+
+
+def test_refusals_and_cells_have_no_control_characters(tmp_path, capsys):
+    path = written(tmp_path, 'a\x1b[31m.csv', 'a\x1b[31m,b')
+    assert inspect_files.main([str(path)]) == 2
+    assert '\x1b' not in capsys.readouterr().err
+    path = written(tmp_path, 'b\x1b.csv', sheet('"=1+1\x1b",1,1,1,0,0,7', '@a,1,1,1,5,0,7'))
+    assert inspect_files.main([str(path), '--csv']) == 1
+    printed = capsys.readouterr().out
+    assert '\x1b' not in printed
+    assert [row['boxes'] for row in csv.DictReader(io.StringIO(printed))] == ["'=1+1?", "'@a"]
+    for paths in [str(path)], [str(path)] * 2:
+        inspect_files.main(paths)
+        assert '\x1b' not in capsys.readouterr().out
+
+
+def test_the_hint_can_be_typed(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for name, shown in (('a b;c.csv', "'a b;c.csv'"), ('-a.csv', './-a.csv')):
+        written(tmp_path, name, sheet('a,1,1,1,0,0,0.5'))
+        assert inspect_files.main(['--', name]) == 0
+        assert capsys.readouterr().out.endswith(f'box_contact_view {shown}\n')

@@ -86,6 +86,32 @@ def test_what_falls_has_a_cause(boxes, masses, cause):
     assert np.array_equal(found.stands, found.cause == '')
 
 
+def test_what_beds_press_to_the_rim_stands():
+    """A light box bears on its edge before its neighbour bears all; that one can."""
+    sizes = [(0.23, 0.12, 0.2), (0.23, 0.12, 0.2), (0.31, 0.17, 0.43), (0.31, 0.17, 0.23),
+             (0.18, 0.2, 0.25), (0.19, 0.22, 0.1)]
+    places = [(0.68, 0.66, 0.1), (0.68, 0.54, 0.1), (0.645, 0.45, 0.215), (0.645, 0.63, 0.315),
+              (0.54, 0.51, 0.555), (0.51, 0.51, 0.73)]
+    masses = np.array([0, 0, 0, 0.3, 0.75, 4.8])
+    plan = Plan(sizes, [(*place, *LEVEL) for place in places], masses, ground=[0, 1, 2])
+    found = inspect_plan(plan)
+    assert found.sound and (found.loaded_margin[3:] > found.tolerance).all()
+    load = loads(found)
+    assert load[3, 4] + load[2, 4] == pytest.approx(5.55) and load[4, 5] == pytest.approx(4.8)
+    heavier = Plan(sizes, plan.poses, [0, 0, 0, 0.3, 0.75, 48], ground=[0, 1, 2])
+    assert inspect_plan(heavier).sound  # the post carries any
+
+
+@pytest.mark.parametrize('friction, cause', [
+    (0.5, ['', '', '']), (0.05, ['unsupported', 'unsupported', 'goes with what falls'])])
+def test_friction_holds_an_arch(friction, cause):
+    """Two cubes lean over an edge by 2 cm; the stone across them, held by friction, keeps them."""
+    tables = [((1, 1, 1), (x, 0, 0.5, *LEVEL)) for x in (-1.5, 1.5)]
+    boxes = [box(-0.98, 1.5), box(0.98, 1.5), box(0, 2.5, (1.98, 1, 1))]
+    plan = Plan(*zip(*tables, *boxes), [0, 0, 10, 10, 2], ground=[0, 1])
+    assert inspect_plan(plan, friction=friction).cause[2:].tolist() == cause
+
+
 def test_geometry_alone_does_not_see_a_load_that_holds():
     """A plank that overhangs by 0.6 m, below 30 kg on its inner end."""
     found = inspect_plan(plan_of([box(0, 0.5), box(0.6, 1.5, (2, 1, 1)),
@@ -167,6 +193,13 @@ def test_containers_bear_on_their_corners():
     assert np.isnan(inspect_plan(plan, bears='corners').pressure[1:3]).all()
 
 
+def test_boxes_of_a_body_bear_on_their_corners():
+    """Four boxes in one body, and a fifth on it: the ground is fixed, and none of these."""
+    plan = plan_of([box(0, 0.5 + k) for k in range(5)], [10] * 5, body=[0, 1, 1, 1, 1, 2])
+    found = inspect_plan(plan, bears='corners')
+    assert found.sound and loads(found) == pytest.approx({(0, 1): 50, (4, 5): 10})
+
+
 def test_pressure_is_the_greatest_below_a_load():
     """N / A in the middle, and N / A · (1 + 6 e / a) off it; then a triangle."""
     for off, factor in ((0.0, 1.0), (0.1, 1.6), (0.3, 2 / (3 * 0.2))):
@@ -179,6 +212,56 @@ def test_a_limit_is_on_what_is_on_top():
     found = inspect_plan(plan_of(boxes, CUBES, limits=[np.inf, 19.9, 10, 0]))
     assert found.cause.tolist() == ['', 'overloaded', '', ''] and found.stands.all()
     assert not found.sound and 'overloaded            1  20 kg on top' in str(found)
+
+
+def test_a_pair_that_overlaps_does_not_carry():
+    """Beside an overlap a box stands, and has its own share; it may have two faults."""
+    found = inspect_plan(plan_of([box(0, 0.5), box(0.4, 0.6, (1, 1, 1.2)), box(0, 0.5)], CUBES))
+    assert found.stands.all() and not found.cause.any() and len(found.overlaps) == 3
+    assert found.share[1:].tolist() == pytest.approx([1, 1, 1])
+    hanging = inspect_plan(plan_of([box(0, 3), box(0.9, 3)], [10, 10]))
+    assert [row.kind for row in hanging.rows()] == ['overlap', 'hangs', 'hangs']
+    assert hanging.height[1:].tolist() == [2.5, 2.5]
+    sunk = inspect_plan(plan_of([box(0, 0.5), box(0.2, 1.4)], [10, 10]))  # by nothing else
+    assert sunk.stands.all() and [row.kind for row in sunk.rows()] == ['overlap']
+
+
+def test_what_goes_with_a_box_that_falls_names_it():
+    boxes = [box(0, 0.5), box(0.6, 1.5), box(0.7, 2.5), box(0.7, 3.5), box(9, 5), box(9, 6)]
+    found = inspect_plan(plan_of(boxes, [10] * 6, limits=[np.inf] * 5 + [5, 5]))
+    assert found.goes_with.tolist() == [-1, -1, -1, 2, 2, -1, 5]
+    assert [(row.kind, *row.names) for row in found.rows()][:3] == [
+        ('hangs', '5'), ('goes with what falls', '6'), ('unsupported', '2')]
+    assert all(f'with {n}; ' in str(found) for n in (2, 5))
+
+
+def test_what_was_left_out_comes_first():
+    faults = [Fault('mass', ('b',), 'has no mass'), Fault('pose', ('c',), 'x is missing: left out')]
+    found = inspect_plan(plan_of([box(0, 5)], [10], faults=faults))
+    assert [row.kind for row in found.rows()] == ['pose', 'hangs', 'mass']
+
+
+@pytest.mark.parametrize('start', [0, 50, 500, 5000, 500_000])
+@pytest.mark.parametrize('tolerance', [1e-5, None])
+def test_coordinates_in_float32_need_a_tolerance(start, tolerance):
+    """Ten containers flush side by side overlap by rounding, or the answer says why."""
+    place = np.zeros((11, 7))
+    place[:, 6], place[10, 1:3] = 1, (start + 10, -0.5)
+    place[:10, 1] = np.float32(start + 2.438 * np.arange(10))
+    place[:10, 2] = np.float32(1.2955)
+    plan = Plan([(12.192, 2.438, 2.591)] * 10 + [(100, 200, 1)], place, 2e4, ground=10)
+    found = inspect_plan(plan, tolerance=tolerance)
+    told = 'coordinates are float32' in str(found)
+    assert told == ((tolerance or 1e-4) < 2**-22 * (start + 9 * 2.438))
+    assert told or found.sound
+
+
+def test_a_tolerance_that_nobody_gave_refuses_nothing():
+    boxes = [box(0, 0.5), ((1, 1, 1.5e-4), (0, 0, 1.000075, *LEVEL)), box(0, 1.50015)]
+    found = inspect_plan(plan_of(boxes, [10, 0.1, 10]))
+    assert found.sound and found.carried_by.tolist() == [[0, 1], [1, 2], [2, 3]]
+    with pytest.raises(ValueError, match="half of the thinnest box '2', not 0.0001"):
+        inspect_plan(plan_of(boxes, None), tolerance=1e-4)
 
 
 def test_overlaps_count_beyond_the_tolerance():
@@ -206,10 +289,12 @@ def test_boxes_of_a_body_hold_together():
 
 def test_a_fault_of_the_file_is_a_line():
     faults = [Fault('gap', ('a',), 'nothing is below it'), Fault('mass', ('b',), 'has no weight')]
-    for some, sound in ((faults, False), (faults[1:], True)):
+    told = Fault('shape', ('c',), 'a sphere', verdict='sound', lacks='')
+    for some, verdict in ((faults, 'not sound'), (faults[1:], 'not all judged'), ([told], 'sound')):
         found = inspect_plan(plan_of([box(0, 0.5)], [10], faults=some))
-        assert found.sound == sound and str(found).count('\n') == len(some)
-    assert str(found) == ('mass                  b  has no weight\n1 box, 10.0 kg, centre of mass '
+        assert found.verdict == verdict and found.sound == (verdict == 'sound')
+        assert str(found).count('\n') == len(some)
+    assert str(found) == ('shape                 c  a sphere\n1 box, 10.0 kg, centre of mass '
                           '0.000 0.000 0.500 m: sound')
 
 
@@ -294,3 +379,10 @@ def test_many_boxes_show_progress(monkeypatch, capsys):
     monkeypatch.setattr(sys.modules['box_contact_ros.plans.inspect_plan'], 'MANY', 1)
     assert inspect_plan(plan_of([box(0, 0.5), box(0, 1.5)], [10, 10])).sound
     assert 'loads' in capsys.readouterr().err
+
+
+def test_a_box_that_hangs_and_carries_is_among_those_that_fall():
+    """A plank on a pad and on a cube that hangs: one group, whose cube nothing carries."""
+    found = inspect_plan(plan_of([box(-1, 0.5, PAD), box(1, 0.6, (0.2, 1, 0.8)),
+                                  box(0, 1.05, PLANK)], [1, 1, 12]))
+    assert found.cause.tolist() == ['', '', 'hangs', 'goes with what falls']

@@ -1,12 +1,17 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Mutated files end in a status within a second, and a damaged ship is never sound in silence."""
+"""Mutated files end in a status within a second, and are never sound with boxes that went missing.
+
+BOX_CONTACT_MUTANTS=10000 makes so many.
+"""
 from __future__ import annotations
 
 import io
 import os
 import random
+import re
+import resource
 import time
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
@@ -14,6 +19,8 @@ from pathlib import Path
 import pytest
 
 from box_contact_ros.plans import inspect_files
+from box_contact_ros.plans.packing import GROUND
+from box_contact_ros.plans.read_plan import read_plan
 
 pytest.importorskip('clarabel')
 pytest.importorskip('mujoco')
@@ -31,9 +38,10 @@ from test_read_plan import (
     world,
 )
 
-COUNT = int(os.environ.get('BOX_CONTACT_MUTANTS', '300'))
+COUNT = int(os.environ.get('BOX_CONTACT_MUTANTS', '150'))
 """Files in all."""
-LONGEST = 1.0  # of a file [s of this process]
+LONGEST, STARTING = 1.0, 2.0  # of a file [s of this process; a subprocess imports MuJoCo, too]
+MEMORY = 300 * 2**10  # that this process may need more [kB]
 SHIP = baplie(*(f'{bay:03}{row:02}{tier} 22G1' for bay in (1, 3) for row in (1, 2, 3)
                 for tier in (82, 84, 86)))
 UNT = 56  # segments from UNH on before it
@@ -49,12 +57,39 @@ SEEDS = {
                   '\npairs: all\n'}
 
 
+HIDING = ((b'"', b'"'), (b'<!--', b'-->'), (b'<![CDATA[', b']]>'), (b'FTX+AAA+++', b"'"),
+          (b'"note": [', b'],'), (b'# ', b'\n'), (b'<x>', b'</x>'), (b'?', b'?'))
+"""What may hide a piece of a file."""
+
+
+def counted(name: str, text: str) -> int:
+    """Return how many boxes a file has, as a reader counts them who knows rows and tags alone."""
+    if name.endswith('.csv'):
+        return sum(line.count(',') >= 6 for line in re.split('[\r\n]+', text.strip())[1:])
+    if name.endswith('.json'):
+        return text.count('"length"')
+    if name.endswith('.edi'):
+        return len(re.findall(r"'\s*LOC\+147", re.sub('[\r\n]', '', text).replace("?'", '')))
+    if name.endswith('.yaml'):
+        return len(re.findall(r'\bsize: *\[', re.sub('#.*', '', text)))
+    seen = ''
+    while text:  # a comment or a text that is no element is skipped, one after another
+        closing = next((end for start, end in (('<!--', '-->'), ('<![CDATA[', ']]>'))
+                        if text.startswith(start)), '')
+        at = text.find(closing) + len(closing) if closing in text and closing else 0
+        seen += '' if at else text[0]
+        text = text[at or 1:]
+    tag = r'<geom [^>]*type="box"' if name.endswith('.xml') else (
+        r'<collision\b[^>]*>(?:(?!</collision).)*<box>')
+    return len(re.findall(tag, seen, re.DOTALL))
+
+
 def mutated(data: bytes, draw: random.Random) -> bytes:
     """Return data in which a few bytes or lines are cut, flipped, doubled or moved."""
     for _ in range(draw.choice((1, 1, 1, 2, 5))):
         start = draw.randrange(len(data) + 1)
         end = min(len(data), start + draw.choice((1, 1, 2, 8, 40, 400)))
-        what = draw.randrange(6)
+        what = draw.randrange(7)
         if what == 0:  # the end is missing
             data = data[:start]
         elif what == 1:  # a piece is missing
@@ -69,6 +104,9 @@ def mutated(data: bytes, draw: random.Random) -> bytes:
             place = draw.randrange(len(lines))
             lines[place:place + 1] = draw.choice(([lines[place]] * 2, []))
             data = b''.join(lines)
+        elif what == 5:  # a piece is hidden
+            opening, closing = draw.choice(HIDING)
+            data = data[:start] + opening + data[start:end] + closing + data[end:]
         else:  # a number is another one
             places = [n for n, mark in enumerate(data) if 48 <= mark <= 57] or [0]
             place = draw.choice(places)
@@ -77,25 +115,36 @@ def mutated(data: bytes, draw: random.Random) -> bytes:
 
 
 def judged(path: Path) -> tuple[int, str, float]:
-    """Return the exit status of the program, what it prints, and the time of this process [s]."""
-    out, start = io.StringIO(), time.process_time()
+    """Return the exit status of the program, what it prints, and its time [s].
+
+    It is that of this process, or what a subprocess takes beyond its start.
+    """
+    out, start, before = io.StringIO(), time.process_time(), os.times()
     with redirect_stdout(out), redirect_stderr(out):
         status = inspect_files.main([str(path)])
-    return status, out.getvalue(), time.process_time() - start
+    after = os.times()
+    return status, out.getvalue(), max(
+        time.process_time() - start, after.children_user - before.children_user
+        + after.children_system - before.children_system - STARTING)
 
 
 @pytest.mark.parametrize('name', SEEDS)
 def test_mutants(name: str, tmp_path: Path) -> None:
-    """A ship whose segments are fewer or more than UNT counts is not sound."""
+    """A ship whose segments are fewer or more than UNT counts is not sound, nor are fewer boxes."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss + MEMORY
     draw = random.Random(name)
     path = tmp_path / name
     for n in range(COUNT // len(SEEDS)):
         data = mutated(SEEDS[name].encode(), draw)
         path.write_bytes(data)
         status, printed, seconds = judged(path)
-        assert status in (0, 1, 2) and printed.endswith('\n'), (n, data)
+        assert status in (0, 1, 2, 3) and printed.endswith('\n'), (n, data)
         assert status != 2 or printed.count('\n') == 1, (n, printed)
         assert seconds < LONGEST, (n, seconds, data)
+        assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < peak, (n, data)
+        if status == 0:
+            boxes = len([box for box in read_plan(path).names if box not in (GROUND, 'ship')])
+            assert boxes >= counted(name, data.decode('utf-8', 'replace')), (n, printed, data)
         if status == 0 and name == 'ship.edi':
             tags = [part.strip()[:3] for part in data.split(b"'") if part.strip()]
             assert tags.index(b'UNT') - tags.index(b'UNH') == UNT, (n, data)

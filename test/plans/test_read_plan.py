@@ -5,11 +5,15 @@
 from __future__ import annotations
 
 import json
+import re
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from box_contact_ros.plans.inspect_plan import inspect_plan
+from box_contact_ros.plans.packing import means_amount
 from box_contact_ros.plans.plan import Plan
 from box_contact_ros.plans.read_plan import read_any, read_plan
 from box_contact_ros.solver.contacts_of import contacts_of
@@ -94,6 +98,11 @@ FAULTS = {
     'number twice': ('p.edi', baplie(PLACED, '0010084 22G1').replace('TEST0000001', 'TEST0000000'),
                      'twice', '0010084', 'TEST0000000 is at 0010082, too'),
     'slot of 6': ('p.edi', baplie(PLACED, '010082 22G1'), 'slot', '010082', 'of 6 characters'),
+    'not stowed': ('p.edi', baplie(PLACED, '9999999 22G1'), 'slot', 'TEST0000001', 'not stowed'),
+    'light': ('p.edi', baplie(PLACED, '0010084 22G1 MEA+WT++KGM:24.500'), 'mass', '0010084',
+              '24.500 KGM, less than any container'),
+    'on breakbulk': ('p.edi', baplie(PLACED, '0010084 22G1', '0010088 22G1').replace(
+        'EQD+CN+TEST0000001', 'EQD+BB+TEST0000001'), 'slot', '0010088', 'stands on what is left'),
     'slot of 8': ('p.edi', baplie(PLACED, '00010082 22G1'), 'slot', '00010082', 'of 8 characters'),
     'slot of signs': ('p.edi', baplie(PLACED, '00100$$ 22G1'), 'slot', '00100$$', '7 digits'),
     'no slot': ('p.edi', baplie(PLACED, '- 22G1'), 'slot', 'TEST0000001', 'without a slot'),
@@ -127,19 +136,31 @@ FAULTS = {
     'size': ('p.csv', sheet(FLAT, 'b,1,-1,1,0,0,1.5'), 'dimension', 'b', '(1, -1, 1) is not '
                                                                          'positive'),
     'size in words': ('p.csv', sheet(FLAT, 'b,1,one,1,0,0,1.5'), 'dimension', 'b', "width is 'one"),
-    'short row': ('p.csv', sheet(FLAT, 'b,1,1,1,0,0'), 'pose', 'b', 'z is missing'),
+    'short row': ('p.csv', sheet(FLAT, 'b,1,1,1,0,0'), 'cut', 'b', 'row 2 has 6 cells, and the '
+                                                                   'header 7: left out'),
+    'row without its end': ('p.csv', sheet(f'{FLAT},', 'b,1,1,1,0,0,1.5', more=',fixed'), 'cut',
+                            'b', 'row 2 has 7 cells, and the header 8'),
+    'long row': ('p.csv', sheet(FLAT, 'b,1,1,1,1,0,0,1.5,,'), 'cut', 'b', 'has 8 cells'),
+    'end of the file': ('p.csv', sheet(f'{FLAT},2', 'b,1,1,1,0,0,1', more=',mass').strip(), 'cut',
+                        'b', 'left out'),
+    'quote': ('p.csv', sheet('"a', 'b,1,1,1,0,0,9', '",1,1,1,0,0,.5'), 'cut',
+              'a\nb,1,1,1,0,0,9', 'goes on over 1 lines'),
+    'colour': ('p.csv', sheet(f'{FLAT},red', more=',Colour'), 'column', 'Colour', 'not read'),
+    'weight': ('p.csv', sheet(f'{FLAT},3', more=',weight'), 'column', 'weight', 'may mean masses'),
+    'no name of a column': ('p.csv', sheet(f'{FLAT},3,', more=',,fixed'), 'column', 'column 8',
+                            'not read'),
     'place': ('p.csv', sheet(FLAT, 'b,1,1,1,nan,0,1.5'), 'pose', 'b', "x is 'nan'"),
     'far away': ('p.csv', sheet(FLAT, 'b,1,1,1,1e300,0,1.5'), 'pose', 'b', 'exceeds'),
     'no turn': ('p.csv', sheet('a,1,1,1,0,0,.5,0,0,0,1', 'b,1,1,1,0,0,1.5,0,0,0,0',
                                more=',qx,qy,qz,qw'), 'pose', 'b', 'zero length'),
-    'half a turn': ('p.csv', sheet('a,1,1,1,0,0,.5,0,0,0,1', 'b,1,1,1,0,0,1.5,0,0,1',
+    'half a turn': ('p.csv', sheet('a,1,1,1,0,0,.5,0,0,0,1', 'b,1,1,1,0,0,1.5,0,0,1,',
                                    more=',qx,qy,qz,qw'), 'pose', 'b', 'qw is missing'),
     'mass': ('p.csv', sheet(f'{FLAT},2', 'b,1,1,1,0,0,1.5,-2', more=',mass'), 'mass', 'b',
              "mass is '-2'"),
-    'mass missing': ('p.csv', sheet(f'{FLAT},2', 'b,1,1,1,0,0,1.5', more=',mass'), 'mass', 'b',
+    'mass missing': ('p.csv', sheet(f'{FLAT},2', 'b,1,1,1,0,0,1.5,', more=',mass'), 'mass', 'b',
                      'no mass'),
     'limit': ('p.csv', sheet(f'{FLAT},x', more=',limit'), 'mass', 'a', "limit is 'x'"),
-    'fixed': ('p.csv', sheet(FLAT, 'b,1,1,1,0,0,1.5,perhaps', more=',fixed'), 'pose', 'b',
+    'fixed': ('p.csv', sheet(f'{FLAT},', 'b,1,1,1,0,0,1.5,perhaps', more=',fixed'), 'pose', 'b',
               "fixed is 'perhaps'"),
     'name twice': ('p.csv', sheet(FLAT, 'a,1,1,1,0,0,1.5'), 'twice', 'a', '2 boxes'),
     'no name': ('p.csv', sheet(FLAT, ',1,1,0,0,0,1.5'), 'dimension', 'row 2', '(1, 1, 0)'),
@@ -151,6 +172,15 @@ FAULTS = {
     'NaN': ('p.json', document(x=float('nan')), 'pose', 'b', 'x is nan'),
     'list': ('p.json', document(length=[1]), 'dimension', 'b', r'length is [1]'),
     'huge': ('p.json', document(length=10**400), 'dimension', 'b', 'length is 1000'),
+    'key': ('p.json', document(colour='red'), 'column', 'colour', 'not read'),
+    'limit by another key': ('p.json', document(maxLoad=3), 'column', 'maxLoad', 'may mean'),
+    'boxes in a key': ('p.json', document(parts=[{'name': 'c'}]), 'column', 'parts',
+                       'may have boxes'),
+    'key beside boxes': ('p.json', '{"by": "me", ' + document()[1:], 'column', 'by', 'not read'),
+    'order with a limit': ('p.json', json.dumps({'1': [{'item': {
+        'length/mm': 1, 'width/mm': 1, 'height/mm': 1, 'sequence': 1, 'weight/kg': 1,
+        'max_load/kg': 1}, 'flb_coordinates': [0, 0, 0], 'orientation': 0}]}), 'column',
+        'max_load/kg', 'may mean'),
     'no row': ('p.json', '{"boxes": [7, ' + document()[11:], 'dimension', 'row 1', 'missing'),
     # SDF
     'SDF size': ('p.sdf', world(A, model('b', collision(BOX.replace('1 1 1', '-1 1 1')))),
@@ -182,6 +212,8 @@ FAULTS = {
     'bits': ('p.sdf', world(A.replace('</geometry>', '</geometry><surface><contact><collide_bitmask'
                                       '>x</collide_bitmask></contact></surface>')), 'shape',
              'a::l::c', "collide_bitmask 'x'"),
+    'model beside a world': ('p.sdf', world(A).replace('</sdf>', f'{A}</sdf>'), 'shape', 'a',
+                             'beside the world'),
     'another world': ('p.sdf', world(A).replace('</sdf>', '<world name="v"/></sdf>'), 'shape', 'v',
                       'another world'),
     'joint to what is not read': ('p.sdf', world(A.replace(
@@ -223,13 +255,21 @@ def test_a_fault_is_a_row(case: str, tmp_path: Path) -> None:
 REFUSED = {
     'nothing': ('p.edi', baplie(), 'it has no container'),
     'other message': ('p.edi', baplie(PLACED, message='MOVINS:D:95B'), 'its message is MOVINS'),
-    'no slot is known': ('p.edi', baplie('010082 22G1'), 'no container can be placed; slot 010082'),
+    'no slot is known': ('p.edi', baplie('00010082 22G1'), 'no container can be placed; slot 0001'
+                         '0082'),
     'no size is known': ('p.edi', baplie('0010082 5EGB'), 'size type 0010082: of the type 5EGB'),
     'empty': ('p.csv', '\n', 'it is empty'),
     'column': ('p.csv', sheet().replace('height', 'hight'),
                r'line 1: the column height is missing \(did you mean hight\?\)'),
     'no rows': ('p.csv', sheet(), 'it has no box'),
     'no good row': ('p.csv', sheet('a,1,1,0,0,0,0'), r'no box can be placed: row 1: \(1, 1, 0\)'),
+    'open quote': ('p.csv', sheet(f'{FLAT},"19 inch', 'b,1,1,1,0,0,9,', more=',note'),
+                   'line 3: it is not CSV: unexpected end of data'),
+    'quote within a cell': ('p.csv', sheet(f'{FLAT},"a', 'b,1,1,1,0,0,9,"b"', more=',note'),
+                            'line 3: it is not CSV'),
+    'column twice': ('p.csv', sheet(f'{FLAT},7', more=',Z'), 'line 1: the column z comes twice'),
+    'key twice': ('p.json', document().replace('"z": 1.5', '"z": 7, "z": 1.5'),
+                  "the key 'z' comes twice"),
     'other columns': ('p.csv', 'a,b\n', 'the column name is missing; the columns are name, len'),
     'prose': ('p.txt', 'Dear all,\n', "line 1: 'dear all,' begins no format"),
     'JSON': ('p.json', '{"boxes": [\n{]', 'line 2: it is not JSON'),
@@ -287,7 +327,8 @@ def equipment_first(text: str) -> str:
     SHIP.replace('00', '0\n0'), '\ufeff' + SHIP, f"UNA:+.? '{SHIP}",
     'UNA|*,! ~' + SHIP.replace(':', '|').replace('+', '*').replace("'", '~'),
     SHIP.replace('BGM++1', "BGM+?'LOC?+147+1"), equipment_first(SHIP),
-    SHIP.replace('KGM:24000', 'TNE:24'), SHIP.replace('WT++KGM:24000', 'VGM++KGM:24000'),
+    SHIP.replace('KGM:24000', 'TNE:24'), SHIP.replace('KGM:24000', 'KG:24000'),
+    SHIP.replace('KGM:24000', 'T:24'), SHIP.replace('WT++KGM:24000', 'VGM++KGM:24000'),
     SHIP.replace('UNT+30', 'UNT+000030'), SHIP.replace('22G1+', '22G1:102:5+')])
 def test_the_same_ship(changed: str, tmp_path: Path) -> None:
     """However its lines are wrapped, and its segments separated and ordered."""
@@ -398,3 +439,61 @@ def test_the_schema(tmp_path: Path) -> None:
         faults = read_plan(written(tmp_path, 'a.json', text)).faults
         assert jsonschema.Draft202012Validator(schema).is_valid(json.loads(text)) == good
         assert good or faults or changed == {'z': '1'}
+
+
+@pytest.mark.parametrize(('key', 'means'), [
+    *((key, True) for key in (
+        'weight', 'gross_weight', 'kg', 'max_load', 'max_weight', 'load_limit', 'stack_limit',
+        'payload', 'Mass (kg)', 'maxLoad', 'netWeight', 'VGM', 'Gewicht', 'load_capacity')),
+    *((key, False) for key in ('colour', 'note', 'load_id', 'unload', 'carton', 'id', 'sku'))])
+def test_names_that_mean_a_mass_or_a_limit(key: str, means: bool) -> None:
+    assert means_amount(key) == means
+
+
+HIDE = '<x><![CDATA[<!--]]></x>', '<x><![CDATA[-->]]></x>'
+
+
+@pytest.mark.parametrize(('content', 'names'), [
+    (f'<!-- {A} -->', []), (f'<!-- a -- b {A} -->', []), (f'<!-- -- -->{A}<!---->', ['a']),
+    (A.join(HIDE), ['a']), (f'<!-- -- -->{A.join(HIDE)}', ['a']),
+    (f'<!-- -- --><?a <!--?>{A}<?b -->?>', ['a']), (f'<x><![CDATA[{A}]]></x>', [])])
+def test_comments(content: str, names: list[str], tmp_path: Path) -> None:
+    """Those with -- within are none for XML, but for Gazebo; what is in CDATA is no comment."""
+    plan = read_plan(written(tmp_path, 'a.sdf', world(model('z', collision()), content)))
+    assert [name[0] for name in plan.names[2:]] == names
+
+
+def test_comments_without_an_end_take_no_time(tmp_path: Path) -> None:
+    """They took 6.4 s: each was searched for its end to the end of the file."""
+    start = time.process_time()
+    for some in '<!--' * 100_000, '<![CDATA[' * 50_000, '<!-- -- -->' * 50_000:
+        with pytest.raises(ValueError, match='it is not XML'):
+            read_plan(written(tmp_path, 'a.sdf', f'<sdf><!-- -- -->{some}'))
+    assert time.process_time() - start < 1.0
+
+
+def test_slots_of_six_digits(tmp_path: Path) -> None:
+    """BBRRTT, where all have six; blanks around a slot are none of it."""
+    six = baplie('010082 22G1', '010084 22G1', '030082 22G1')
+    seven = baplie('0010082 22G1', '0010084 22G1', '0030082 22G1')
+    assert same(read_plan(written(tmp_path, 'a', six)), read_plan(written(tmp_path, 'b', seven)))
+    blank = seven.replace('+0010084:', '+ 0010084 :')
+    assert same(read_plan(written(tmp_path, 'a', blank)), read_plan(written(tmp_path, 'b', seven)))
+
+
+@pytest.mark.parametrize(('boxes', 'left_out', 'names'), [
+    (['0010082 22G1', '0010084 22G1'], [0], ['0010084']),
+    (['0010082 22G1', '0030082 22G1', '0020084 42G1'], [0], ['0020084']),
+    (['0010082 22G1', '0010084 22G1', '0010086 22G1'], [1], ['0010086']),
+    (['0010182 22G1', '0010082 22G1', '0010084 22G1'], [0], []),
+    (['0010082 22G1', '0030082 22G1', '0010084 22G1'], [1], [])])
+def test_what_stands_on_what_is_left_out_is_not_judged(boxes, left_out, names, tmp_path) -> None:
+    """Be it breakbulk, or of a size that is not known."""
+    for text in (
+            re.sub('|'.join(f'EQD.CN.TEST000000{n}' for n in left_out), 'EQD+BB+X', baplie(*boxes)),
+            baplie(*(f'{box.split()[0]} ZZZZ' if n in left_out else box
+                     for n, box in enumerate(boxes)))):
+        plan, bears = read_any(written(tmp_path, 'a.edi', text))
+        assert [fault.names for fault in plan.faults if 'stands on' in fault.text] == (
+            [tuple(names)] if names else [])
+        assert inspect_plan(plan, bears=bears).verdict == 'not all judged'

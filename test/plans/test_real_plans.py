@@ -41,9 +41,9 @@ def pallet(order):
 
 @pytest.mark.parametrize('order, falls, beside', [
     ('00100408', 1, 1), ('00100001', 33, 38), ('00100002', 26, 26), ('00100003', 13, 13),
-    ('00100004', 35, 29)])
+    ('00100004', 27, 29)])
 def test_what_falls_on_real_pallets(order, falls, beside):
-    """Without neighbours that hold it, as a linear programme finds; and with them."""
+    """Without neighbours that hold it, as linear programmes find; and with them."""
     plan = pallet(order)
     found = random_plans.compare(plan)
     assert found.groups > 1 and not found.faults and not found.on_rim
@@ -55,28 +55,37 @@ def test_what_falls_on_real_pallets(order, falls, beside):
 def test_what_falls_in_random_plans(number):
     """A sample of `python -m benchmarks.fuzz --plans 1000`."""
     found = random_plans.examine(1, number)
-    assert found.groups > 0 and not found.faults and not found.on_rim
+    assert found.groups > 0 and not found.faults
 
 
 def test_a_wrong_verdict_is_found_and_a_rim_is_told():
     """A cube that overhangs by half an edge has loads, on its rim; another millimetre, none."""
-    for overhang, wanted in ((0.499, (1, 0, 0)), (0.5, (1, 1, 1)), (0.501, (1, 1, 0))):
+    for overhang, wanted in ((0.4998, (1, 0, 0)), (0.49995, (1, 1, 1)), (0.5, (1, 1, 1)),
+                             (0.5001, (1, 1, 0))):
         plan = Plan((1, 1, 1), upright([(0, 0, 0), (overhang, 0, 1)]), [0, 10], ground=0)
         assert random_plans.compare(plan) == (*wanted, ())
 
 
-def test_planted_verdicts_are_found(monkeypatch, capsys):
-    """Where all boxes of all plans stand, each group that falls is a fault."""
-    falling = sum(random_plans.examine(1, number).falling for number in range(5))
-    monkeypatch.setattr(random_plans, 'inspect_plan', lambda plan: SimpleNamespace(
-        stands=np.ones(len(plan), bool)))
-    assert random_plans.fuzz(5) == falling > 0
-    assert capsys.readouterr().out.count('benchmarks.random_plans.examine(1, ') == falling
+@pytest.mark.parametrize('stand', [True, False])
+def test_planted_verdicts_are_found(stand, monkeypatch, capsys):
+    """Where all boxes of all plans stand, each group that falls is a fault; and the reverse."""
+    found = [random_plans.examine(1, number) for number in range(5)]
+    wrong = sum(each.falling if stand else each.groups - each.falling for each in found)
+    monkeypatch.setattr(random_plans, 'inspect_plan', lambda plan, friction: SimpleNamespace(
+        stands=np.full(len(plan), stand)))
+    assert random_plans.fuzz(5) == wrong > 0
+    printed = capsys.readouterr().out
+    assert printed.count('benchmarks.random_plans.examine(1, ') == wrong
+    assert ('robustly' in printed) != stand
 
 
-@pytest.mark.parametrize('order', PALLETS)
-def test_unique_loads_are_those_of_a_simulation(order):
-    """Of what stands, after a second of PatchForces; and loads are within their ranges."""
+@pytest.mark.parametrize('order, count', [
+    ('00100408', 25), ('00100001', 7), ('00100002', 6), ('00100003', 16), ('00100004', 21)])
+def test_unique_loads_are_those_of_a_simulation(order, count):
+    """Of what stands, after a second of PatchForces; and loads are within their ranges.
+
+    Of two pallets so much falls that no more than 7 and 6 loads are left, all unique.
+    """
     plan = pallet(order)
     while not (found := inspect_plan(plan)).sound:  # what falls may have held others down
         kept = np.flatnonzero(found.stands)
@@ -103,7 +112,7 @@ def test_unique_loads_are_those_of_a_simulation(order):
         if high - low < 0.01:
             unique += 1
             assert force / G == pytest.approx(loads[pair], abs=0.1)
-    assert unique >= 5
+    assert unique == count
 
 
 @pytest.fixture(scope='module')

@@ -236,9 +236,10 @@ def test_files_that_cannot_be_read(tmp_path):
 
 def test_more_topics_than_a_scene_may_have(scene_of, monkeypatch):
     monkeypatch.setattr(scene_file, 'MOST_STREAMS', 1)
-    with pytest.raises(SceneError, match='2 boxes and bodies have a topic of.*set poses: array'):
+    with pytest.raises(SceneError, match='2 boxes and bodies have a topic of.*set poses: named'):
         scene_of(GOOD)
-    assert scene_of('poses: array\n' + GOOD).pose_array
+    for poses in ('array', 'named'):
+        assert scene_of(f'poses: {poses}\n' + GOOD).poses == poses
 
 
 JSON = st.recursive(st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=8),
@@ -268,3 +269,44 @@ def test_shipped_scenes_are_good(path):
     scene = read_scene(f'config/scenes/{path.name}')
     SceneSolver(scene, model='exact')
     assert scene == read_scene(path)
+
+
+def test_a_path_may_begin_at_home(tmp_path, monkeypatch):
+    """As a parameter has it, in which no shell has replaced the `~`."""
+    monkeypatch.setenv('HOME', str(tmp_path))
+    (tmp_path / 'yard.yaml').write_text(GOOD)
+    assert read_scene('~/yard.yaml') == read_scene(tmp_path / 'yard.yaml')
+    with pytest.raises(SceneError, match='~nobody-of-this-name/yard.yaml'):
+        read_scene('~nobody-of-this-name/yard.yaml')
+
+
+def test_a_box_may_be_a_part_under_its_own_name(scene_of):
+    """As a yard is saved, in which a box was attached to a body."""
+    scene = scene_of("""
+poses: named
+boxes:
+  hook: {size: [1, 1, 1], body: crane}
+  c1: {size: [2, 2, 2], body: crane, pose: [0, 0, -1.5, 0, 0, 0, 1]}
+  ground: {size: [9, 9, 1], pose: [0, 0, 0, 0, 0, 0, 1]}
+bodies:
+  crane: {}
+pairs: all
+""")
+    assert scene.moving == ('crane',) and scene.names == ('hook', 'c1', 'ground')
+    assert scene.boxes['c1'].body == 'crane' and [pair.label for pair in scene.every_pair()] == [
+        'hook_ground', 'c1_ground']
+    with pytest.raises(SceneError, match="boxes.c1.body: 'crane' is none of the bodies"):
+        scene_of('boxes: {c1: {size: [1, 1, 1], body: crane}}\npairs: all')
+
+
+def test_names_may_be_those_of_containers(scene_of):
+    """No topic has such a name, and the node refuses to make one."""
+    scene = scene_of("""
+poses: named
+boxes: {MSKU-123: {size: [1, 1, 1]}, 20ft_1: {size: [1, 1, 1]}}
+pairs: all
+""")
+    assert [pair.label for pair in scene.every_pair()] == ['MSKU-123_20ft_1']
+    for name in ('a/b', 'a b', "''", 'ö', 'a~'):
+        with pytest.raises(SceneError):
+            scene_of(f'boxes: {{{name}: {{size: [1, 1, 1]}}, b: {{size: [1, 1, 1]}}}}\npairs: all')

@@ -8,7 +8,7 @@ import numpy as np
 import poses
 import pytest
 
-from box_contact_ros import Box, ContactSolver, Scene, SceneSolver, contacts_of, support
+from box_contact_ros import Box, ContactSolver, Scene, SceneSolver, contacts_of
 
 
 def heap(rng, n):
@@ -49,7 +49,7 @@ def test_a_scene_finds_the_same():
     rng = np.random.default_rng(2)
     size, pose = heap(rng, 50)
     scene = Scene({f'b{n}': Box(extents) for n, extents in enumerate(size)},
-                  patterns=(('*', '*'),), pose_array=True)
+                  patterns=(('*', '*'),), poses='array')
     answer = SceneSolver(scene)(pose)
     pairs, contacts = contacts_of(size, pose)
     assert np.array_equal(answer.pairs, pairs) and len(pairs) > 50
@@ -97,8 +97,6 @@ def test_a_tolerance_bridges_gaps_and_nothing_wider():
 def test_a_tolerance_is_at_most_half_of_the_thinnest_box(tolerance):
     with pytest.raises(ValueError, match='^tolerance must be '):
         contacts_of([(9, 9, 9), (1, 2, 3)], [(0,) * 6 + (1,)] * 2, tolerance=tolerance)
-    with pytest.raises(ValueError, match='^tolerance must be '):
-        support((1, 2, 3), [(0,) * 6 + (1,)], *contacts_of((1, 2, 3), []), tolerance=tolerance)
 
 
 # --- two sets -------------------------------------------------------------------------------------

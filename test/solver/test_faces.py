@@ -8,9 +8,10 @@ import numpy as np
 import poses
 import pytest
 
-from box_contact_ros import contacts_of
+from box_contact_ros import ContactSolver, contacts_of, face_patches
 from box_contact_ros.core import native
-from box_contact_ros.solver.faces import corner_shares, face_patches
+from box_contact_ros.solver.faces import corner_shares
+from box_contact_ros.solver.pose import rotation_matrix
 
 TOLERANCE = 1e-4
 AT = (0.0, 0.0, 0.0, 1.0)
@@ -19,8 +20,7 @@ AT = (0.0, 0.0, 0.0, 1.0)
 def patch(sizes, pose, tolerance=TOLERANCE):
     pairs, contacts = contacts_of(sizes, pose, tolerance=tolerance)
     assert len(pairs) == 1
-    sizes, pose = np.array(sizes, float), np.array(pose, float)
-    return face_patches(sizes, pose, pairs, contacts.normal, tolerance)
+    return face_patches(sizes, pose, pairs, contacts.normal, tolerance=tolerance)
 
 
 def clipped(size_a, size_b, offset, yaw):
@@ -47,6 +47,97 @@ def test_areas_of_turned_faces_are_those_of_strips():
         found = patch([(*size_a, 1), (*size_b, 1)],
                       [(0, 0, 0, *AT), (*offset, 1, 0, 0, np.sin(yaw / 2), np.cos(yaw / 2))])
         assert found.area[0] == pytest.approx(clipped(size_a, size_b, offset, yaw), abs=1e-5)
+
+
+def by_corners(size, pose, normal, tolerance):
+    """Return area and centroid of a patch by all points in which two of its nine lines meet.
+
+    And how far rounding may move the line at which the gap is the tolerance. 0 where edges meet.
+    """
+    if max(np.abs(normal @ rotation_matrix(q)).max() for q in pose[:, 3:]) < np.cos(0.1):
+        return 0.0, np.full(3, np.nan), 0.0
+    u = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    u /= np.linalg.norm(u)
+    plane = np.stack((u, np.cross(normal, u)))
+    lines, heights = [], []  # of each line: along its normal, and how far
+    for side in (0, 1):
+        axes, half = rotation_matrix(pose[side, 3:]), size[side] / 2
+        face = np.abs(normal @ axes).argmax()
+        outward = axes[:, face] * np.sign(normal @ axes[:, face]) * (1 - 2 * side)
+        centre = pose[side, :3] - pose[0, :3] + half[face] * outward
+        edges = [plane @ axes[:, k] * half[k] for k in range(3) if k != face]
+        for edge, other in (edges, edges[::-1]):
+            across = np.array((-other[1], other[0]))
+            for sign in (1, -1):
+                lines.append((*(sign * across), sign * across @ (plane @ centre)
+                              + abs(across @ edge)))
+        # The plane: outward · (x − centre) = 0 for x = uv + height · normal.
+        heights.append(np.append(-(plane @ outward), outward @ centre) / (outward @ normal))
+    gap = heights[1] - heights[0]
+    blur = 1e-14 * size.max() / max(np.linalg.norm(gap[:2]), 1e-14)
+    lines = np.array([*lines, (*gap[:2], tolerance - gap[2])])
+    lines /= np.maximum(np.linalg.norm(lines[:, :2], axis=1, keepdims=True), 1e-12)
+    points = [np.linalg.solve(pair[:, :2], pair[:, 2]) for n, first in enumerate(lines)
+              for pair in (np.array((first, second)) for second in lines[:n])
+              if abs(np.linalg.det(pair[:, :2])) > 1e-12]
+    points = [p for p in points if (lines[:, :2] @ p <= lines[:, 2] + 1e-10).all()]
+    if len(points) < 3:
+        return 0.0, np.full(3, np.nan), blur
+    middle = np.mean(points, axis=0)
+    points = sorted(points, key=lambda p: np.arctan2(*(p - middle)[::-1])) - middle
+    after = np.roll(points, -1, axis=0)
+    parts = (points[:, 0] * after[:, 1] - points[:, 1] * after[:, 0]) / 2
+    at = middle + parts @ (points + after) / 3 / parts.sum()
+    height = np.mean(heights, axis=0) @ (*at, 1.0)
+    return parts.sum(), pose[0, :3] + at @ plane + height * normal, blur
+
+
+@pytest.mark.parametrize('tolerance', [0.0, 1e-4, 0.05])
+def test_patches_are_those_of_all_corners(tolerance):
+    """Containers with tilts of up to 0.1 rad, and boxes that cut each other any way."""
+    rng = np.random.default_rng(7)
+    pairs = poses.joined(poses.near_parallel_pairs(rng, 300), poses.random_pairs(rng, 300))
+    solved = ContactSolver(margin=0.1).batch(*pairs[:2], size_a=pairs.size_a, size_b=pairs.size_b)
+    compared = 0
+    for row in np.flatnonzero(solved.separation <= tolerance):
+        size, pose = (np.stack(part) for part in zip(*(
+            (getattr(pairs, f'size_{k}')[row], getattr(pairs, f'pose_{k}')[row]) for k in 'ab')))
+        normal = solved.normal[row]
+        found = face_patches(size, pose, [(0, 1)], normal[None], tolerance=tolerance)
+        area, centre, blur = by_corners(size, pose, normal, tolerance)
+        scale = size.max()
+        assert found.area[0] == pytest.approx(area, abs=(1e-8 * scale + 2 * blur) * scale)
+        if area > 1e-4 * scale**2 and blur < 1e-8:
+            assert found.centre[0] == pytest.approx(centre, abs=1e-6 * scale)
+            compared += 1
+    assert compared > 100
+
+
+@pytest.mark.parametrize('moved, area', [
+    ((0, 0, 0), 12.192 * 2.438), ((3, -0.5, 0), 9.192 * 1.938), ((12.192, 0, 0), 0.0),
+    ((0, 0, 45), 2.438**2 * np.sqrt(2)), ((0, 0, 90), 2.438**2)])
+def test_a_container_on_another_has_the_area_that_they_share(moved, area):
+    """Shifted along and across; turned by 45°, it is a rhombus; and by 90° a square."""
+    size, (x, y, degrees) = poses.CONTAINER, moved
+    half = np.radians(degrees) / 2
+    found = face_patches(size, [(0, 0, 0, *AT), (x, y, size[2], 0, 0, np.sin(half), np.cos(half))],
+                         [(0, 1)], [(0, 0, 1)])
+    assert found.area[0] == pytest.approx(area, abs=1e-12)
+    if area:
+        assert found.centre[0] == pytest.approx((x / 2, y / 2, size[2] / 2), abs=1e-12)
+
+
+@pytest.mark.parametrize('tilt', [1e-6, 8e-6, 2e-5, 1e-4, 1e-2])
+def test_a_tilted_container_has_the_part_of_its_face_that_is_near(tilt):
+    """On its lower edge: up to the tolerance divided by the tilt from it."""
+    length, width, height = size = poses.CONTAINER
+    turn = (0, np.sin(tilt / 2), 0, np.cos(tilt / 2))
+    # The lower edge at +x is at the height of the face below.
+    z = height / 2 + (length * np.sin(tilt) + height * np.cos(tilt)) / 2
+    found = face_patches(size, [(0, 0, 0, *AT), (0, 0, z, *turn)], [(0, 1)], [(0, 0, 1)])
+    shared = length / 2 * (1 + np.cos(tilt)) - height / 2 * np.sin(tilt)
+    near = min(shared, TOLERANCE / np.tan(tilt))
+    assert found.area[0] == pytest.approx(width * near, rel=1e-9)
 
 
 @pytest.mark.parametrize('tilt', [0.0, 1e-8, 1e-6, 3e-6])
@@ -90,7 +181,7 @@ def test_an_edge_has_the_strip_that_the_tolerance_gives():
 
 def test_faces_apart_have_no_patch():
     found = face_patches(np.ones((2, 3)), np.array([(0, 0, 0, *AT), (0, 0, 1.1, *AT)]),
-                         np.array([(0, 1)]), np.array([(0.0, 0.0, 1.0)]), TOLERANCE)
+                         np.array([(0, 1)]), np.array([(0.0, 0.0, 1.0)]))
     assert found.corner_count[0] == found.area[0] == 0 and np.isnan(found.rectangle).all()
 
 

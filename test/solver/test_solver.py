@@ -7,14 +7,13 @@ test_bad_input.py has what is refused.
 """
 from __future__ import annotations
 
-import math
 import pickle
 
 import numpy as np
 import poses
 import pytest
 
-from box_contact_ros import Contact, Contacts, ContactSolver, patch_area
+from box_contact_ros import Contact, Contacts, ContactSolver
 
 SOLVER = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
 ABOVE = [0.5, 0.25, 1.875, 0, 0, 0, 1]
@@ -57,20 +56,6 @@ def test_contacts_go_to_other_processes_and_keep_their_fields():
     poses.assert_same_bits(many, pickle.loads(pickle.dumps(many)))
     with pytest.raises(AttributeError):
         many.point = many.normal
-
-
-def test_area_of_a_patch():
-    """Closed form: the rectangle that two faces share, turned and shifted; NaN without a patch."""
-    rng = np.random.default_rng(3)
-    pair = np.array([poses.IDENTITY, [1.2, -1.6, 0.995, 0, 0, 0, 1]])
-    wanted = (1.0 + 0.5 - 1.2) * (1.5 + 1.0 - 1.6)  # half extents less the distance, by axis
-    solver = ContactSolver((2, 3, 1), (1, 2, 1), model='exact')
-    for _ in range(20):
-        contact = solver(*poses.moved(pair, rng.uniform(-5, 5, 3),
-                                      poses.unit_quaternions(rng, 1)))
-        assert patch_area(contact) == pytest.approx(wanted, rel=1e-9)
-    nothing = Contact(True, -1.0, contact.normal, contact.point, 0.1, np.full((3, 3), np.nan))
-    assert math.isnan(patch_area(nothing))
 
 
 @pytest.mark.parametrize('gap, colliding', [

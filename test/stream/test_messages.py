@@ -21,6 +21,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from typed_messages import (
     TOLD,
     as_bytes,
+    joint_state,
     make_contacts,
     make_normal,
     make_point,
@@ -30,11 +31,20 @@ from typed_messages import (
 )
 
 from box_contact_msgs.msg import Contacts as ContactsMessage
-from box_contact_ros import ContactSolver
+from box_contact_ros import ContactSolver, face_patches
 from box_contact_ros.core import native
 from box_contact_ros.models.make_model import make_model
 from box_contact_ros.node.messages import KeptMessages, make_header
-from box_contact_ros.scene.scene import EVERY_PAIR, NOWHERE, Box, Frame, Pair, Scene, two_boxes
+from box_contact_ros.scene.scene import (
+    EVERY_PAIR,
+    NOWHERE,
+    POSES,
+    Box,
+    Frame,
+    Pair,
+    Scene,
+    two_boxes,
+)
 from box_contact_ros.scene.scene_solver import SceneSolver
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contacts_of import TooManyNear
@@ -42,7 +52,7 @@ from box_contact_ros.solver.nearest import Nearests
 from box_contact_ros.stream.cdr import MessageError
 from box_contact_ros.stream.pairing import StampedPose
 from box_contact_ros.stream.read_contacts import read_contacts
-from box_contact_ros.stream.read_poses import read_pose, read_poses
+from box_contact_ros.stream.read_poses import NamedPoses, read_pose, read_poses
 from box_contact_ros.stream.write_contacts import TickWriter
 from box_contact_ros.view.live.listener import read_answer
 
@@ -181,6 +191,84 @@ def test_bytes_that_are_no_pose_array_are_refused(data):
     assert refused.value.reason == 'not a PoseArray'
 
 
+def named_bytes(names, rows, *, order='<', frame=b'map\0', padding=b'\0', extra=(0, 0), tail=b''):
+    """Return a MultiDOFJointState; extra: how many twists and wrenches it has."""
+    body = b''
+
+    def add(size, data):
+        nonlocal body
+        body += padding * (-len(body) % size) + data
+
+    def count(number):
+        add(4, struct.pack(f'{order}I', number))
+
+    add(4, struct.pack(f'{order}iII', 5, 7, len(frame)) + frame)
+    count(len(names))
+    for name in names:
+        count(len(name.encode()) + 1)
+        add(1, name.encode() + b'\0')
+    for number, numbers in ((len(rows), rows), *((k, np.zeros((k, 6))) for k in extra)):
+        count(number)
+        if number:
+            add(8, struct.pack(f'{order}{np.size(numbers)}d', *np.ravel(numbers)))
+    return (b'\0\1' if order == '<' else b'\0\0') + b'\0\0' + body + tail
+
+
+MOVING = ('hook', 'c1', 'c22', 'lorry')
+
+
+@given(st.lists(st.tuples(st.permutations((*MOVING, 'c333', 'ö')), st.integers(0, 6), FRAMES),
+                min_size=1, max_size=6), st.sampled_from((b'\0', b'\xff')))
+def test_named_poses_are_read_by_name(messages, padding):
+    """Names may come and go and change places; of the same, only the bytes between them differ."""
+    read, typed = NamedPoses(MOVING), NamedPoses(MOVING)
+    for number, (names, count, (frame_id)) in enumerate(messages):
+        rows = {name: np.arange(7.0) + 10 * k + 100 * number
+                for k, name in enumerate(names[:count])}
+        bytes_of = {'<': named_bytes(list(rows), list(rows.values()), padding=padding),
+                    '>': named_bytes(list(rows), list(rows.values()), order='>')}
+        for order, data in bytes_of.items():
+            assert (native.NamedPoses(MOVING).read(data) is None) == (order == '>')
+            stamped = read(data)
+            assert (stamped.frame_id, stamped.stamp) == ('map', STAMP)
+            for row, name in zip(stamped.numbers, MOVING):
+                assert row.tolist() == rows[name].tolist() if name in rows else np.isnan(row).all()
+            assert read.unknown == tuple(name for name in rows if name not in MOVING)
+        message = joint_state(rows, frame_id, STAMP)
+        stamped = typed(bytes(serialize_message(message)))
+        assert stamped.frame_id == frame_id and typed.unknown == read.unknown
+        for row, name in zip(stamped.numbers, MOVING):
+            assert row.tolist() == rows[name].tolist() if name in rows else np.isnan(row).all()
+
+
+def test_twists_and_wrenches_are_passed_over():
+    for extra, tail in product(((1, 0), (0, 2), (1, 1)), (b'', b'\xff\xff\xff')):
+        for order in '<>':
+            data = named_bytes(MOVING[:1], [POSE], extra=extra, tail=tail, order=order)
+            assert NamedPoses(MOVING)(data).numbers[0].tolist() == list(POSE)
+
+
+@pytest.mark.parametrize('data, reason', [
+    (b'', 'not a MultiDOFJointState'), (GOOD, 'not a MultiDOFJointState'),
+    (named_bytes(['c1', 'hook'], [POSE]), 'not a MultiDOFJointState'),
+    (named_bytes(['c1'], [POSE])[:-1], 'not a MultiDOFJointState'),
+    (named_bytes(['c1'], [POSE], tail=b'\0' * 4), 'not a MultiDOFJointState'),
+    (named_bytes(['c1', 'c1'], [POSE, POSE]), 'doubled name'),
+    (named_bytes(['c1'], [POSE]).replace(b'c1', b'\xff1'), 'not a MultiDOFJointState'),
+    (named_bytes(['c1'], [POSE], frame=b'\xff\0'), 'bad header')], ids=range(8))
+def test_bytes_that_are_no_named_poses_are_refused(data, reason):
+    """Also after a good message with the same names. A name that is not UTF-8 is unknown."""
+    read = NamedPoses(MOVING)
+    read(named_bytes(['c1'], [POSE]))
+    if b'\xff1' in data:
+        assert np.isnan(read(data).numbers).all() and read.unknown == ('\\xff1',)
+        return
+    with pytest.raises(MessageError) as refused:
+        read(data)
+    assert refused.value.reason == reason
+    assert read(named_bytes(['c1'], [POSE])).numbers[1].tolist() == list(POSE)
+
+
 # --- contacts out ---------------------------------------------------------------------------------
 
 
@@ -195,21 +283,30 @@ def typed(scene, poses, *, model='exact', margin=0.0, topics=None):
     numbers = [pose and pose.numbers for pose in poses]
     known = [pose for pose in poses if pose]
     solver = SceneSolver(scene, model=model, margin=margin)
-    answer = solver(numbers[0] if scene.pose_array else numbers)
+    answer = solver(numbers[0] if scene.in_one_message else numbers)
     frame_id = known[0].frame_id
     message = make_contacts(make_header(max(pose.stamp for pose in known), frame_id),
                             answer.named(), [pair.label for pair in answer.named_stale()],
-                            answer.named_near())
+                            answer.named_near(), areas_of(solver, answer))
     of_pairs = []
     for pair, contact in answer.named():
         if (pair.a, pair.b) in (topics or {}):
-            movers = [] if scene.pose_array else [
+            movers = [] if scene.in_one_message else [
                 poses[solver.moving.index(mover)] for mover in map(scene.mover, (pair.a, pair.b))
                 if mover in solver.moving]
             header = make_header(max(pose.stamp for pose in movers or known), frame_id)
             of_pairs.append((topics[pair.a, pair.b], as_bytes(make_point(header, contact)),
                              as_bytes(make_normal(header, contact))))
     return as_bytes(message), of_pairs, answer.touching, list(map(tuple, answer.stale.tolist()))
+
+
+def areas_of(solver, answer):
+    """Return the areas (k,) by which faces meet, by the normals of `exact`; 0 of boxes apart."""
+    sizes, at = solver.scene.sizes, solver._at.poses
+    exact = ContactSolver().batch(at, sizes=sizes, pairs=answer.pairs)
+    areas, hit = np.zeros(len(exact)), exact.colliding
+    areas[hit] = face_patches(sizes, at, answer.pairs[hit], exact.normal[hit]).area
+    return areas.tolist()
 
 
 class Told:
@@ -266,7 +363,7 @@ def a_scene(rng):
         boxes[f'part{number}'] = Box(size or rng.uniform(0.5, 2.0, 3), a_place(rng), body='body')
     first, second, *_ = boxes
     pairs = [Pair(rng.choice(['', 'named', 'n']), second, first)] if rng.random() < 0.6 else []
-    return Scene(boxes, tuple(pairs), pose_array=bool(rng.random() < 0.3), bodies=bodies,
+    return Scene(boxes, tuple(pairs), poses=str(rng.choice(POSES)), bodies=bodies,
                  patterns=EVERY_PAIR if not pairs or rng.random() < 0.5 else (),
                  frame_id=str(rng.choice(['', 'yard']))), is_cubes
 
@@ -286,7 +383,7 @@ def test_ticks_are_written_as_rclpy_writes_answers(seed):
                  if rng.random() < 0.9 else None for _ in scene.moving]
         if not any(poses):
             continue
-        if scene.pose_array:
+        if scene.in_one_message:
             rows = np.array([pose.numbers if pose else NOWHERE for pose in poses])
             poses = [StampedPose(rows, frame_id, 5)]
         name = rng.choice(['exact', 'mlp', *['paper'] * is_cubes, 'object'])
@@ -387,24 +484,44 @@ def test_no_field_of_a_contact_is_left_out():
              StampedPose((0.3, 0.4, 1.2, 0.1, 0.2, 0.3, 0.9), 'map', STAMP)]
     data = written(two_boxes((2, 3, 1), (1, 2, 2)), poses)[0]
     message = deserialize_message(data, ContactsMessage)
-    kept, = KeptMessages(1).fill([('p', 'a', 'b')], Contacts.of([a_contact()]))
+    kept, = KeptMessages(1).fill([('p', 'a', 'b')], Contacts.of([a_contact()]), np.ones(1))
     assert unset(type(kept)()) and unset(message.contacts[0]) == unset(kept) == []
     read = read_contacts(data).contacts
     for name in TOLD:
         assert np.all(getattr(read, name)), name
 
 
+def area_of(a, b, model):
+    """Return `area` of a tick of two cubes, by the bytes and by rclpy."""
+    data = written(two_boxes((1, 1, 1), (1, 1, 1)), [StampedPose(pose, 'map', STAMP) for pose in (
+        a, b)], model=make_model(model))[0]
+    contact, = deserialize_message(data, ContactsMessage).contacts
+    return contact.area
+
+
+@pytest.mark.parametrize('model', ['exact', 'mlp', 'paper', 'soup-4'])
+def test_the_area_is_that_of_the_faces_that_meet(model):
+    """By any model: at rest, where the overlap is a wedge; and 0 where edges cross."""
+    area = area_of((0, 0, 0, 0, 0, 0, 1), (0.3, 0.2, 1 - 2e-6, 1e-6, 2e-6, 0, 1), model)
+    assert area == pytest.approx(0.7 * 0.8, rel=1e-4)
+    edge, eighth = np.sqrt(2) - 0.01, np.pi / 8
+    area = area_of((0, 0, 0, np.sin(eighth), 0, 0, np.cos(eighth)),
+                   (0, 0, edge, 0, np.sin(eighth), 0, np.cos(eighth)), model)
+    assert area == 0.0
+
+
 def test_contacts_in_the_other_order_of_bytes_are_read():
     """As a big-endian middleware sends them; what is no message of contacts is refused."""
     message = make_contacts(make_header(5 * 10**9 + 7, 'map'), [], ['stale'],
                             [(Pair('p', 'a', 'bcd'), NEAR[0])])
-    message.revision = 258
+    message.epoch, message.revision = 513, 258
     little = serialize_message(message)
     big = bytearray(little)
     big[1] = 0
-    for size, at in ((4, 4), (4, 8), (4, 12), (8, 20), (4, 28), (4, 32), (4, 36), (4, 44), (4, 52)):
+    for size, at in ((4, 4), (4, 8), (4, 12), (4, 20), (8, 28), (4, 36), (4, 40), (4, 44), (4, 52),
+                     (4, 60)):
         big[at:at + size] = little[at:at + size][::-1]
-    at = 60
+    at = 68
     assert little[at:at + 8] == np.array([0.5]).tobytes()
     for start in range(at, at + 80, 8):
         big[start:start + 8] = little[start:start + 8][::-1]
@@ -412,8 +529,8 @@ def test_contacts_in_the_other_order_of_bytes_are_read():
         big[start:start + 4] = little[start:start + 4][::-1]
     for one, other in zip(read_contacts(bytes(big)), read_contacts(little)):
         assert str(one) == str(other)
-    assert read_contacts(bytes(big)).revision == 258
-    for bad in (little[:-8], little + b'\0' * 8, GOOD, b'', little[:28] + b'\xff' * 4 + little[32:],
+    assert (read_contacts(bytes(big)).epoch, read_contacts(bytes(big)).revision) == (513, 258)
+    for bad in (little[:-8], little + b'\0' * 8, GOOD, b'', little[:36] + b'\xff' * 4 + little[40:],
                 little.replace(b'bcd', b'\xff\xff\xff')):
         with pytest.raises(MessageError):
             read_contacts(bad)

@@ -321,7 +321,7 @@ def test_a_pose_that_gives_way_to_a_nearer_one_is_counted():
 @pytest.mark.parametrize('policy', PAIRINGS.values())
 def test_an_array_has_all_poses_of_its_tick(policy):
     boxes = {name: Box((1.0, 1.0, 1.0)) for name in 'ab'}
-    pairing = policy(Scene(boxes, (Pair('', 'a', 'b'),), pose_array=True))
+    pairing = policy(Scene(boxes, (Pair('', 'a', 'b'),), poses='array'))
     assert [stamps(pairing.add(ALL_BOXES, pose(stamp))) for stamp in (1, 2)] == [[1], [2]]
 
 

@@ -4,8 +4,8 @@
 """Motion, frame by frame: one contact per approach, no chatter, and a point that does not jump.
 
 What a simulator feels is not the error of a point but its steps. The series are runs of the crane
-at 1 kHz and family I of the hard cases: approaches at 100 Hz. Tests print what they measured:
-`python -m pytest test/stream/test_series.py -rP`.
+at 200 Hz and 1 kHz, and family I of the hard cases: approaches at 100 Hz. Tests print what they
+measured: `python -m pytest test/stream/test_series.py -rP`.
 """
 from __future__ import annotations
 
@@ -97,18 +97,17 @@ def frames(count: int, motions: int) -> tuple[np.ndarray, np.ndarray]:
 
 # --- the series -----------------------------------------------------------------------------------
 
-CRANE_RATE = 1000.0
-LANDED = {'landed, case 17': 17}
-"""Landings of the crane by number of `landing_ways.grid`: the hardest, about to lift off."""
+LANDED = 17
+"""Number in `landing_ways.grid`: of the crane's landings the hardest, about to lift off."""
 
 
-def crane_series(name: str) -> Series:
-    """Return the poses of one run of the crane."""
+def crane_series(rate: float) -> Series:
+    """Return the poses of one run of the crane, `rate` of them a second."""
     pytest.importorskip('mujoco')
     from benchmarks.landing_ways import aimed, grid, land, solvers
 
-    scenario = aimed(grid()[LANDED[name]]).scenario
-    load = land(scenario, solvers(scenario, 'mlp'), rate_hz=CRANE_RATE, latency=0.002).poses
+    scenario = aimed(grid()[LANDED]).scenario
+    load = land(scenario, solvers(scenario, 'mlp'), rate_hz=rate, latency=0.002).poses
     n = len(load)
     return Series(Pairs(np.tile(scenario.stack_pose, (n, 1)), np.array(load), np.tile(
         scenario.stack_size, (n, 1)), np.tile(scenario.size, (n, 1))), 1, {})
@@ -150,13 +149,15 @@ def approaches(name: str, turning: bool) -> Series:
     return Series(Pairs(repeated(met.pose_a), b, repeated(met.size_a), repeated(met.size_b)), n, {})
 
 
-CRANES = {name: (crane_series, name) for name in LANDED}
+CRANES = {f'landed, {rate} Hz': (crane_series, float(rate)) for rate in (200, 1000)}
 SERIES = CRANES | {f'{name}, {"turning" if turning else "fixed"}': (approaches, name, turning)
                    for name in SETS for turning in (False, True)}
 
 
 @pytest.fixture(scope='module', params=[
-    pytest.param(name, marks=[pytest.mark.slow] if name in CRANES else []) for name in SERIES])
+    pytest.param(name, marks={'landed, 200 Hz': [pytest.mark.slow],
+                              'landed, 1000 Hz': [pytest.mark.reports]}.get(name, []))
+    for name in SERIES])
 def series(request: pytest.FixtureRequest) -> tuple[str, Series]:
     """Name and frames: all tests of a series run one after the other, and share its answers."""
     make, *arguments = SERIES[request.param]
@@ -171,7 +172,7 @@ def test_one_contact_interval_per_approach(series):
 
     So do boxes on two lines that have a point of contact in common. While they turn, `mlp` begins
     as many contacts as `exact` does, in the same frames. A load that a crane lets down stays, but
-    for two milliseconds while it rocks.
+    for two frames while it rocks.
     """
     name, motion = series
     pairs, motions, _ = motion

@@ -76,8 +76,8 @@ def test_shipped_weights_are_what_their_card_says(name: str) -> None:
                 assert patterns.inputs[:, k].max() <= entry['max'] + 1e-9
 
 
-def test_shipped_errors_meet_their_bounds() -> None:
-    """External validation, on the paper's number of patterns."""
+def test_the_errors_on_the_card_of_paper_meet_their_bounds() -> None:
+    """External validation, on the paper's number of patterns; the test above makes them anew."""
     card = load_weights(weights_path('paper')).card
     assert list(card['data']['counts'].values()) == [8000, 5000, 75000]
     jumps = card['metrics']['contact']['external']['all']

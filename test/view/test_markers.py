@@ -13,11 +13,13 @@ import numpy as np
 import poses
 import pytest
 import yaml
-from geometry_msgs.msg import PoseArray
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from patience import PATIENCE
 from rclpy.qos import QoSProfile
 from ros_client import CUBES, Client, serving
-from typed_messages import a_box, changed, contacts_at, pose_array, read
+from sensor_msgs.msg import MultiDOFJointState
+from typed_messages import a_box, changed, contacts_at, joint_state, read
 from visualization_msgs.msg import Marker, MarkerArray
 
 from box_contact_msgs.srv import SetBoxes
@@ -29,11 +31,12 @@ from box_contact_ros.scene.scene import Box, Pair, Scene
 from box_contact_ros.solver.contact import Contact
 from box_contact_ros.solver.nearest import Nearest
 from box_contact_ros.view.live.listener import DrawnTick, SceneRows, read_sorted
-from box_contact_ros.view.live.markers import LABELLED, MarkersNode, scene_markers
+from box_contact_ros.view.live.markers import LABELLED, PERIOD, MarkersNode, scene_markers
 
 NAMESPACES = ('boxes', 'points', 'normals', 'patches', 'depths', 'near', 'distances')
 SLAB, CUBE = (2.0, 4.0, 1.0), (2.0, 2.0, 2.0)
 STAMP = 1_500_000_000
+CHANGES = 60  # before a listener starts; 500 were tried
 HEADER = make_header(STAMP, 'yard')
 YARD = Scene({'slab': Box(SLAB, pose_topic='slab/pose'),
               's1': Box(CUBE, (1.0, 2.0, 3.0, 0.0, 0.0, 1.2, 1.6)),
@@ -253,14 +256,14 @@ def test_program(program):
 
 
 def test_boxes_that_come_and_go_are_drawn(tmp_path):
-    """Also by a listener that is started after the change; what has gone is taken away."""
-    scene = {'poses': 'array', 'pairs': 'all', 'boxes': {
+    """Also by a listener that starts after many changes, or misses some."""
+    scene = {'poses': 'named', 'pairs': 'all', 'boxes': {
         'ground': {'size': [20, 20, 1], 'pose': [0, 0, -0.5, 0, 0, 0, 1]},
         'hook': {'size': CUBE}}}
     path = tmp_path / 'yard.yaml'
     path.write_text(yaml.safe_dump(scene))
     shown: dict[int, float] = {}  # heights of boxes by id
-    rows_sent = [1]
+    poses = {'hook': (0, 0, 9, 0, 0, 0, 1)}
 
     def hear(message):
         for marker in message.markers:
@@ -270,24 +273,38 @@ def test_boxes_that_come_and_go_are_drawn(tmp_path):
                     shown[marker.id] = marker.pose.position.z
 
     def is_shown(*heights):
+        sent = 0.0
+
         def send():
-            rows = [(0, 0, 9, 0, 0, 0, 1), (0, 0, 7, 0, 0, 0, 1)][:rows_sent[0]]
-            array.publish(pose_array(rows, 'map', client.next_stamp()))
+            nonlocal sent
+            if time.monotonic() - sent > PERIOD:
+                sent = time.monotonic()
+                named.publish(joint_state(poses, 'map', client.next_stamp()))
         return client.spin(lambda: sorted(shown.values()) == sorted(heights) or send())
 
     def change(**fields):
         assert client.call(SetBoxes, 'contact_node/set_boxes', SetBoxes.Request(**fields)).success
 
-    with closing(Client()) as client, serving(ContactNode, scene=str(path), pair_topics=False):
-        array = client.node.create_publisher(PoseArray, 'poses', 10)
+    with closing(Client()) as client, serving(ContactNode, scene=str(path),
+                                              pair_topics=False):
+        named = client.node.create_publisher(MultiDOFJointState, 'poses', 10)
         client.node.create_subscription(MarkerArray, 'markers', hear, 10)
-        change(fixed=[a_box('c1', (0, 0, 1, 0, 0, 0, 1), CUBE)])
-        with serving(MarkersNode, scene=str(path)):
-            assert is_shown(-0.5, 9.0, 1.0)
+        for number in range(1, CHANGES + 1):
+            change(fixed=[a_box('c1', (0, 0, number, 0, 0, 0, 1), CUBE)])
+        with serving(MarkersNode, scene=str(path)) as markers:
+            assert is_shown(-0.5, 9.0, CHANGES)
             change(fixed=[a_box('c1', (0, 0, 3, 0, 0, 0, 1), CUBE)])
             assert is_shown(-0.5, 9.0, 3.0)
             change(moving=[a_box('c1', (0, 0, 0, 0, 0, 0, 1))])
-            rows_sent[0] = 2
+            poses['c1'] = (0, 0, 7, 0, 0, 0, 1)
             assert is_shown(-0.5, 9.0, 7.0)
+            markers._revision -= 1  # as if it had missed a change
             change(absent=['c1'])
+            assert is_shown(-0.5, 9.0)
+            change(fixed=[a_box(f'p{k}', (0, 0, 20 + k, 0, 0, 0, 1), CUBE) for k in range(600)])
+            assert is_shown(-0.5, 9.0, *range(20, 620))
+            for step in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP,
+                         Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+                request = ChangeState.Request(transition=Transition(id=step))
+                assert client.call(ChangeState, 'contact_node/change_state', request).success
             assert is_shown(-0.5, 9.0)

@@ -22,7 +22,7 @@ from browser import chromium, open_page
 
 from box_contact_ros import inspect_plan, read_plan
 from box_contact_ros.solver.pose import rotation_matrix
-from box_contact_ros.view.plan_page import CLICK_HINT, PlanPage, hit_by, lines_of
+from box_contact_ros.view.plan_page import CLICK_HINT, PlanPage, hit_by, lines_of, table
 
 SHIP = Path(__file__).resolve().parents[2] / 'docs' / 'examples' / 'files' / 'ship.edi'
 
@@ -37,6 +37,12 @@ def test_what_is_known_of_a_box(found):
     assert lines_of(found, found.plan.names.index('0100304'))[0].startswith('unsupported')
     lines = lines_of(found, found.plan.names.index('0090102'))
     assert lines[:2] == ['0090102: sound', '21,000 kg'] and lines[-1] == '6.058 × 2.438 × 2.591 m'
+
+
+def test_a_page_bears_any_name_of_a_file(found):
+    """It was no UTF-8 for viser, which ended."""
+    title = os.fsdecode(b'sch\xf6n <b>.edi')
+    assert 'sch?n &lt;b&gt;.edi' in table(title, found).encode('utf-8').decode()
 
 
 def test_a_ray_hits_the_first_box():

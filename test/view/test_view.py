@@ -92,10 +92,10 @@ def make_node():
 
 def send(node, stamp, *poses_of_boxes):
     """Hand poses to a node, as their topics do; None for a box that sends nothing."""
-    for topic, track, pose in zip(node.topics, node._tracks, poses_of_boxes, strict=True):
+    assert len(node.topics) == len(poses_of_boxes)
+    for number, pose in enumerate(poses_of_boxes):
         if pose is not None:
-            node._on_poses(topic, track,
-                           serialize_message(pose_stamped(pose, 'yard', stamp)))
+            node._on_poses(number, serialize_message(pose_stamped(pose, 'yard', stamp)))
 
 
 def test_sizes_beside_a_scene_are_refused(make_node):
@@ -163,8 +163,7 @@ def test_boxes_that_an_array_lacks_stay_where_they_were(make_node, tmp_path):
     node = make_node(Parameter('scene', value=str(tmp_path / 'scene.yaml')))
     for stamp, rows in ((START, [ORIGIN] * 4),
                         (START + MS, [ORIGIN, TOUCHING, [math.nan] * 7, [0.0] * 7])):
-        node._on_poses(node.topics[0], node._tracks[0], serialize_message(
-            pose_array(rows, 'yard', stamp)))
+        node._on_poses(0, serialize_message(pose_array(rows, 'yard', stamp)))
     assert np.array_equal(node.tick().poses, [ORIGIN, TOUCHING, ORIGIN, ORIGIN])
 
 
@@ -617,12 +616,13 @@ def test_boxes_that_come_and_go_in_a_browser():
     """The page draws the boxes of the newest scene, as ~/set_boxes makes it, and no others."""
     stack = Box(CUBE, ORIGIN)
     both = Scene({'crane': Box(CUBE), 'stack': stack}, patterns=(('crane', 'stack*'),),
-                 pose_array=True)
-    crane_alone = both.changed({'stack': None})
+                 poses='array')
+    crane_alone, _ = both.changed({'stack': None}, {})
     with (closing(Page('127.0.0.1', 8450, SceneRows(crane_alone))) as page,
           open_page(page.url, 640, 360) as tab):
         tab.wait_for('document.querySelector("canvas") != null')
-        for scene in (crane_alone, both, crane_alone, crane_alone.changed({'stack2': stack})):
+        again, _ = crane_alone.changed({'stack2': stack}, {})
+        for scene in (crane_alone, both, crane_alone, again):
             rows, deadline = SceneRows(scene), time.monotonic() + PATIENCE
             placed = np.where(np.isnan(rows.poses), (0, 0, 3, 0, 0, 0, 1), rows.poses)
             shares = [0.0, 0.0]  # of crane and stack

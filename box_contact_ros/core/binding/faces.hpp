@@ -6,11 +6,22 @@
 
 #include <vector>
 
-#include "../src/force/faces.hpp"
-#include "../src/force/hull.hpp"
+#include "../src/faces/beds.hpp"
+#include "../src/faces/face_patch.hpp"
+#include "../src/faces/hull.hpp"
 #include "pair_arrays.hpp"
 
 namespace box_contact::binding {
+
+inline void check_normals(const Array<double>& normal) {
+  for (npy_intp k = 0; k < normal.length(0); ++k) {
+    if (is_unit(vector_at(normal.numbers + 3 * k))) continue;
+    Owned row(made(PySequence_GetItem(normal.object.get(), k)));
+    Owned numbers(made(PyObject_CallMethod(row.get(), "tolist", nullptr)));
+    PyErr_Format(PyExc_ValueError, "normal[%zd] must be of length 1, not %R", k, numbers.get());
+    throw PythonError{};
+  }
+}
 
 // The rows of `polygon` (count, corners_max, 3): the corners, and the first one again in what is left.
 // Where faces are apart there are none, and places are NaN.
@@ -23,9 +34,9 @@ inline PyObject* face_patches(PyObject*, PyObject* const* args, Py_ssize_t count
   npy_intp n = pairs.length(0);
   auto normal = read<double>(args[3], "normal", {n, 3});
   double tolerance = number_of(args[4], "tolerance");
-  if (bad_place(pairs.numbers, n, sizes.length(0)) >= 0)
-    fail(PyExc_ValueError, "pairs has a place that no pose has");
-  constexpr npy_intp corners = force::Polygon::corners_max;
+  check_pairs(pairs, sizes.length(0));
+  check_normals(normal);
+  constexpr npy_intp corners = faces::Polygon::corners_max;
   auto polygon = make<double>({n, corners, 3}), area = make<double>({n});
   auto corner_count = make<int64_t>({n});
   auto centre = make<double>({n, 3}), rectangle = make<double>({n, 4, 3});
@@ -33,15 +44,14 @@ inline PyObject* face_patches(PyObject*, PyObject* const* args, Py_ssize_t count
   auto* size = reinterpret_cast<const bc_size*>(sizes.numbers);
   for (npy_intp k = 0; k < n; ++k) {
     int64_t a = pairs.numbers[2 * k], b = pairs.numbers[2 * k + 1];
-    force::FacePatch patch = force::patch_of_faces(
-        pose[a], size[a], pose[b], size[b], force::vector_at(normal.numbers + 3 * k), tolerance);
-    area.numbers[k] = patch.area;
-    corner_count.numbers[k] = patch.polygon.count;
-    if (patch.polygon.count == 0) patch.height = std::numeric_limits<double>::quiet_NaN();
-    write(patch.in_common_frame(patch.centroid), centre.numbers + 3 * k);
-    for (int c = 0; c < corners; ++c)
-      write(patch.in_common_frame(patch.polygon[c < patch.polygon.count ? c : 0]),
-            polygon.numbers + 3 * (corners * k + c));
+    faces::FacePatch patch = faces::patch_of_faces(
+        pose[a], size[a], pose[b], size[b], vector_at(normal.numbers + 3 * k), tolerance);
+    bc_polygon found = faces::in_common_frame(patch);
+    area.numbers[k] = found.area;
+    corner_count.numbers[k] = found.count;
+    std::copy_n(found.centre, 3, centre.numbers + 3 * k);
+    std::copy_n(found.corners[0], 3 * corners, polygon.numbers + 3 * corners * k);
+    if (found.count == 0) patch.height = not_a_number;
     auto around = patch.rectangle();
     for (size_t c = 0; c < 4; ++c)
       write(patch.level(around[c]), rectangle.numbers + 3 * (4 * k + npy_intp(c)));
@@ -52,20 +62,20 @@ inline PyObject* face_patches(PyObject*, PyObject* const* args, Py_ssize_t count
 // The greatest pressures of unit loads at points, on beds that do not pull.
 inline PyObject* bed_pressures(PyObject*, PyObject* const* args, Py_ssize_t count) {
   if (count != 3) fail(PyExc_TypeError, "bed_pressures(polygon, corner_count, at)");
-  constexpr npy_intp corners = force::Polygon::corners_max;
+  constexpr npy_intp corners = faces::Polygon::corners_max;
   auto polygon = read<double>(args[0], "polygon", {any_length, corners, 2});
   npy_intp n = polygon.length(0);
   auto corner_count = read<int64_t>(args[1], "corner_count", {n});
   auto at = read<double>(args[2], "at", {n, 2});
   auto pressure = make<double>({n});
   for (npy_intp k = 0; k < n; ++k) {
-    force::Polygon one;
+    faces::Polygon one;
     for (npy_intp c = 0; c < std::min<npy_intp>(corner_count.numbers[k], corners); ++c) {
       const double* corner = polygon.numbers + 2 * (corners * k + c);
       one.add({corner[0], corner[1]});
     }
     pressure.numbers[k] =
-        force::greatest_pressure(one, {at.numbers[2 * k], at.numbers[2 * k + 1]});
+        faces::greatest_pressure(one, {at.numbers[2 * k], at.numbers[2 * k + 1]});
   }
   return pressure.object.release();
 }
@@ -78,7 +88,7 @@ inline PyObject* hull_depths(PyObject*, PyObject* const* args, Py_ssize_t count)
   npy_intp n = at.length(0);
   auto first = read<int64_t>(args[1], "first", {n + 1});
   auto depth = make<double>({n});
-  std::vector<force::Point> own, hull;
+  std::vector<faces::Point> own, hull;
   for (npy_intp k = 0; k < n; ++k) {
     int64_t begin = first.numbers[k], end = first.numbers[k + 1];
     if (begin < 0 || end < begin || end > points.length(0))
@@ -86,8 +96,8 @@ inline PyObject* hull_depths(PyObject*, PyObject* const* args, Py_ssize_t count)
     own.clear();
     for (int64_t p = begin; p < end; ++p)
       own.push_back({points.numbers[2 * p], points.numbers[2 * p + 1]});
-    force::make_hull(own, hull);
-    depth.numbers[k] = force::depth_inside(hull, {at.numbers[2 * k], at.numbers[2 * k + 1]});
+    faces::make_hull(own, hull);
+    depth.numbers[k] = faces::depth_inside(hull, {at.numbers[2 * k], at.numbers[2 * k + 1]});
   }
   return depth.object.release();
 }

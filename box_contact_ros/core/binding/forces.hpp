@@ -39,10 +39,9 @@ inline std::vector<bc_body> read_bodies(PyObject* masses, PyObject* inertias, Py
 inline PyObject* forces_new(PyTypeObject* type, PyObject* args, PyObject*) {
   PyObject *masses, *inertias, *centres;
   bc_force_options options = BC_DEFAULT_FORCE_OPTIONS;
-  if (!PyArg_ParseTuple(args, "OOOiiiidddp:PatchForces", &masses, &inertias, &centres,
-                        &options.substeps, &options.iterations, &options.relaxations,
-                        &options.threads, &options.friction, &options.most_depth,
-                        &options.rest_speed, &options.rest))
+  if (!PyArg_ParseTuple(args, "OOOiiddp:PatchForces", &masses, &inertias, &centres,
+                        &options.substeps, &options.threads, &options.friction,
+                        &options.most_depth, &options.rest))
     return nullptr;
   std::vector<bc_body> bodies = read_bodies(masses, inertias, centres);
   bc_patch_forces* forces;
@@ -247,9 +246,8 @@ inline PyMethodDef forces_methods[] = {
      "copy()\n--\n\nReturn forces with the same bodies, patches and impulses."},
     {nullptr, nullptr, 0, nullptr}};
 inline PyType_Slot forces_slots[] = {
-    {Py_tp_doc, const_cast<char*>("PatchForces(mass, inertia, centre, substeps, iterations, "
-                                  "relaxations, threads, friction, most_depth, rest_speed, "
-                                  "rest)\n--\n\nPatches as velocity constraints. See force.h.")},
+    {Py_tp_doc, const_cast<char*>("PatchForces(mass, inertia, centre, substeps, threads, "
+                                  "friction, most_depth, rest)\n--\n\nPatches as velocity constraints. See force.h.")},
     {Py_tp_new, slot<forces_new>()},
     {Py_tp_dealloc, reinterpret_cast<void*>(Holder<Forces>::dealloc)},
     {Py_tp_methods, forces_methods},

@@ -2,14 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The library as a Python extension: its functions and types.
-#include "../src/force/patch_forces.hpp"
+#include "../src/force/rectangle.hpp"
+#include "../src/library/force_limits.hpp"
 #include "../src/minimum_depth.hpp"
 #include "broad_phase.hpp"
 #include "faces.hpp"
 #include "forces.hpp"
+#include "message_numbers.hpp"
+#include "named_poses.hpp"
 #include "motion.hpp"
 #include "pair_solver.hpp"
-#include "patch_area.hpp"
 #include "pose_faults.hpp"
 #include "read_pose.hpp"
 #include "write_contacts.hpp"
@@ -65,11 +67,11 @@ PyMethodDef module_methods[] = {
      "bodies (n,): the row of each box's body, or -1. local (n, 7): poses in the bodies' frames.\n"
      "Return the row of a body with a bad pose, or -1. Of one with seven NaN, boxes get NaN."},
     {"message_numbers", method<message_numbers>(), METH_FASTCALL,
-     "message_numbers(point, normal, separation, volume, covariance)\n--\n\n"
+     "message_numbers(point, normal, separation, volume, covariance, area)\n--\n\n"
      "Return rows (n, 15) of contacts: point, normal, depth, volume, area, upper covariance."},
-    {"patch_areas", method<patch_areas>(), METH_FASTCALL,
-     "patch_areas(normal, covariance)\n--\n\n"
-     "Return areas (n,) of normals (n, 3), covariances (n, 3, 3)."},
+    {"face_areas", method<face_areas>(), METH_FASTCALL,
+     "face_areas(sizes, poses, pairs)\n--\n\n"
+     "Return the areas (n,) by which faces meet as messages have them; 0 where edges do."},
     {"face_patches", method<face_patches>(), METH_FASTCALL,
      "face_patches(sizes, poses, pairs, normal, tolerance)\n--\n\n"
      "Return polygon (k, 9, 3), corner_count (k,), area (k,), centre (k, 3), rectangle (k, 4, 3)."},
@@ -121,6 +123,7 @@ PyObject* make_module() {
   broad_phase_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&broad_phase_spec)));
   add("PairSolver", Py_NewRef(solver_type));
   add("BroadPhase", Py_NewRef(broad_phase_type));
+  add("NamedPoses", PyType_FromSpec(&named_poses_spec));
   add("TickWriter", PyType_FromSpec(&tick_writer_spec));
   add("PatchForces", PyType_FromSpec(&forces_spec));
   using Whole = std::pair<const char*, long>;
@@ -129,16 +132,16 @@ PyObject* make_module() {
                              {"OUTPUTS", detail::network_outputs},
                              {"UNITS_MAX", detail::network_units_max},
                              {"THREADS_MAX", detail::threads_max},
-                             {"ITERATIONS_MAX", force::iterations_max}})
+                             {"SUBSTEPS_MAX", detail::substeps_max}})
     add(name, PyLong_FromLong(value));
   using Real = std::pair<const char*, double>;
   for (auto [name, value] : {Real{"LENGTH_MIN", length_min},
                              {"LENGTH_MAX", length_max},
                              {"QUATERNION_MIN", quaternion_min},
                              {"QUATERNION_MAX", quaternion_max},
-                             {"MASS_MIN", force::mass_min},
-                             {"MASS_MAX", force::mass_max},
-                             {"INERTIA_SLACK", force::inertia_slack},
+                             {"MASS_MIN", detail::mass_min},
+                             {"MASS_MAX", detail::mass_max},
+                             {"INERTIA_SLACK", detail::inertia_slack},
                              {"SQUARE_SLACK", force::square_slack},
                              {"CONTACT_ULPS", contact_ulps},
                              {"DEPTH_FLOOR", depth_floor}})

@@ -77,6 +77,13 @@ inline npy_intp bad_place(const int64_t* pairs, npy_intp count, npy_intp poses) 
   return -1;
 }
 
+inline void check_pairs(const Array<int64_t>& pairs, npy_intp poses) {
+  npy_intp bad = bad_place(pairs.numbers, pairs.length(0), poses);
+  if (bad < 0) return;
+  PyErr_Format(PyExc_ValueError, "pairs[%zd] has a place that no pose has", bad);
+  throw PythonError{};
+}
+
 // Write a list of poses (7,), None for a box that is not there, to rows of an array. Returns False
 // at the first that is not plain, so that Python converts them all or says what is wrong.
 inline PyObject* write_poses(PyObject*, PyObject* const* args, Py_ssize_t count) {
@@ -154,7 +161,9 @@ struct PairArrays {
         count(poses_a.length(0)) {
     rows = {poses_a.numbers, poses_b.numbers, sizes_a.numbers, sizes_b.numbers,
             step(sizes_a),   step(sizes_b),   places.numbers,  long(count)};
-    if (places.object) check_places();
+    if (!places.object) return;
+    count = places.length(0);
+    check_pairs(places, poses_a.length(0));
   }
 
  private:
@@ -162,14 +171,6 @@ struct PairArrays {
     if (sizes.length(0) == 1) return 0;
     if (sizes.length(0) != count) fail(PyExc_ValueError, "sizes must be as many as poses, or one");
     return 3;
-  }
-  void check_places() {
-    npy_intp poses = count;
-    count = places.length(0);
-    npy_intp bad = bad_place(places.numbers, count, poses);
-    if (bad < 0) return;
-    PyErr_Format(PyExc_ValueError, "pairs[%zd] has a place that no pose has", bad);
-    throw PythonError{};
   }
 };
 

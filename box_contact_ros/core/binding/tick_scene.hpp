@@ -47,6 +47,7 @@ struct TickScene {
     int64_t movers[2] = {};      // places in a tick of what moves its boxes; −1: fixed
   };
   std::unordered_map<uint64_t, Pair> pairs;  // of those that have a label or topics
+  unsigned int epoch;
   unsigned long long revision;
 
   npy_intp count() const { return npy_intp(sizes.size() / 3); }
@@ -77,11 +78,11 @@ inline TickScene read_scene(PyObject* args) {
   PyObject *broad_phase, *solver, *sizes_given, *poses_given, *moving_given, *bodies_given;
   PyObject *local_given, *names, *listed_given, *labels, *watched_given, *topics, *frame_id;
   TickScene scene;
-  if (!PyArg_ParseTuple(args, "O!O!dnOOOOOOOOOOUK:TickWriter", broad_phase_type, &broad_phase,
+  if (!PyArg_ParseTuple(args, "O!O!dnOOOOOOOOOOUIK:TickWriter", broad_phase_type, &broad_phase,
                         solver_type, &solver, &scene.margin, &scene.most_near, &sizes_given,
                         &poses_given, &moving_given, &bodies_given, &local_given, &names,
                         &listed_given, &labels, &watched_given, &topics, &frame_id,
-                        &scene.revision))
+                        &scene.epoch, &scene.revision))
     throw PythonError{};
   npy_intp count = Holder<BroadPhase>::of(broad_phase).count;
   auto sizes = read<double>(sizes_given, "sizes", {count, 3});

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "cdr.hpp"
-#include "patch_area.hpp"
+#include "message_numbers.hpp"
 #include "tick_scene.hpp"
 
 namespace box_contact::binding {
@@ -151,7 +151,7 @@ class TickWriter {
     if (detail::solve_rows(setup->model->solver(), rows, long(count), results, 1) >= 0)
       Py_RETURN_NONE;
     return write(
-        rows, count, results.colliding,
+        rows, count, results.colliding, setup->model->kind != Model::paper,
         {results.point, results.normal, results.separation, results.volume, results.covariance});
   }
   PyObject* solve_in_python(Rows& rows, npy_intp count) {
@@ -167,16 +167,18 @@ class TickWriter {
     ContactsOfPython found{Owned(made(PyObject_Call(batch.get(), args.get(), keywords.get()))),
                            count};
     rows.pairs = pairs.numbers;
-    return write(rows, count, found.colliding.numbers,
+    return write(rows, count, found.colliding.numbers, false,
                  {found.point.numbers, found.normal.numbers, found.separation.numbers,
                   found.volume.numbers, found.covariance.numbers});
   }
 
+  // is_of_axis: normals are those of the separating axes.
   template <class Flag>
-  PyObject* write(const Rows& rows, npy_intp count, const Flag* colliding,
+  PyObject* write(const Rows& rows, npy_intp count, const Flag* colliding, bool is_of_axis,
                   const ContactRows& contacts) {
     Owned heads(made(PyList_New(0)));
     message_.begin(newest_, frame_id_);
+    message_.number(uint32_t(scene_.epoch));
     message_.number(uint64_t(scene_.revision));
     auto touching = std::count_if(colliding, colliding + count, [](Flag flag) { return flag; });
     message_.number(uint32_t(touching));
@@ -191,7 +193,8 @@ class TickWriter {
       const TickScene::Pair* known = scene_.find(pair);
       write_names(pair, known);
       double numbers[message_numbers_count];
-      contacts.write(row, numbers);
+      const double* normal = is_of_axis ? contacts.normal + 3 * row : nullptr;
+      contacts.write(row, face_area(rows, row, normal), numbers);
       message_.numbers(numbers, message_numbers_count);
       if (known && known->topics) append_heads(heads.get(), *known, numbers);
     }
@@ -285,7 +288,8 @@ inline PyObject* tick_writer_call(PyObject* self, PyObject* args, PyObject* keyw
 inline PyType_Slot tick_writer_slots[] = {
     {Py_tp_doc,
      const_cast<char*>("TickWriter(broad_phase, solver, margin, most_near, sizes, poses, moving, "
-                       "bodies, local, names, listed, labels, watched, topics, frame_id, revision)"
+                       "bodies, local, names, listed, labels, watched, topics, frame_id, epoch, "
+                       "revision)"
                        "\n--\n\n"
                        "Answer ticks of a scene as the bytes of messages; see write_contacts.hpp.")},
     {Py_tp_new, slot<tick_writer_new>()},

@@ -68,18 +68,23 @@ class BoundsTree {
   // costs less. The order of boxes that moved far tells little.
   bool is_worn() const { return visits_ > 4 * size_t(levels_) * order_.size(); }
 
+  // Where memory ends, the tree stays as it was.
   void build(const std::vector<int32_t>& boxes, const std::vector<Bounds>& bounds) {
-    order_ = boxes;
-    halve(order_.data(), order_.data() + order_.size(), bounds);
-    levels_ = 0;
-    size_t blocks = 0;
-    for (size_t count = order_.size(); count > size_t(levels_ > 0); ++levels_) {
-      starts_[levels_] = blocks;
+    size_t starts[levels_max], blocks = 0;
+    int levels = 0;
+    for (size_t count = boxes.size(); count > size_t(levels > 0); ++levels) {
+      starts[levels] = blocks;
       count = (count + width - 1) / width;
       blocks += count;
     }
+    order_.reserve(boxes.size());
+    blocks_.reserve(blocks);
+    order_ = boxes;
     blocks_.assign(blocks, Block());
+    std::copy_n(starts, levels, starts_);
+    levels_ = levels;
     visits_ = 0;
+    halve(order_.data(), order_.data() + order_.size(), bounds);
     refit(bounds);
   }
 
@@ -113,6 +118,7 @@ class BoundsTree {
  private:
   static constexpr size_t width = 16;
   static constexpr int width_bits = 4;
+  static constexpr int levels_max = 8;  // 16⁸ exceeds the number of boxes
 
   struct Block {
     double ends[6][width];
@@ -184,7 +190,7 @@ class BoundsTree {
 
   std::vector<int32_t> order_;
   std::vector<Block> blocks_;  // those of boxes, then level by level up to the root
-  size_t starts_[8] = {};      // of each level; 16⁸ exceeds the number of boxes
+  size_t starts_[levels_max] = {};
   int levels_ = 0;
   size_t visits_ = 0;
 };

@@ -193,6 +193,7 @@ class BroadPhase {
   }
 
   void build_fixed() {
+    is_partial_ = true;  // also where memory ends
     for (int32_t box : fixed_tree_.order())
       if (box >= 0) is_changed_[size_t(box)] = 1;
     std::vector<int32_t> all, later;
@@ -210,7 +211,6 @@ class BroadPhase {
     later_tree_.build(later, bounds_);
     auto is_read = [&](int32_t box) { return fixed_[size_t(box)] && is_known(box); };
     to_read_.erase(std::remove_if(to_read_.begin(), to_read_.end(), is_read), to_read_.end());
-    is_partial_ = true;
   }
 
   void append_listed() {

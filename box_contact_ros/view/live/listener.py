@@ -17,30 +17,33 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from geometry_msgs.msg import PoseArray, PoseStamped
 from rclpy.context import Context
 from rclpy.qos import QoSProfile
 
+from box_contact_msgs.msg import Boxes
 from box_contact_msgs.msg import Contacts as ContactsMessage
-from box_contact_msgs.srv import SetBoxes
+from box_contact_msgs.srv import GetBoxes
 
 from ...node.contact_node import PARAMETERS as CONTACT_PARAMETERS
 from ...node.contact_node import scene_of
+from ...node.get_boxes import scene_of_answers
+from ...node.paced_service import REQUESTS
 from ...node.parameters import Setting, declare, warn_of_unknown
 from ...node.runtime import GuardedNode
-from ...node.set_boxes import changed
-from ...node.topics import CHANGES, pose_qos
-from ...scene.scene import ALONE, NOWHERE, Scene
-from ...scene.scene_solver import Answer, SceneSolver
+from ...node.set_boxes import changes_of
+from ...node.topics import LATCHED, pose_qos, pose_type
+from ...scene.changes import checked_changes
+from ...scene.scene import ALONE, Scene
+from ...scene.scene_solver import Answer, finished
 from ...solver.checks import are_poses, short_repr
 from ...stream.cdr import MessageError
 from ...stream.pairing import StampedPose
 from ...stream.read_contacts import ReadContacts, read_contacts
-from ...stream.read_poses import read_pose, read_poses
+from ...stream.read_poses import NamedPoses, read_pose, read_poses
 from ...stream.streams import ALL_BOXES, topics_of
 
 KEPT = 1000  # poses kept per topic: a second at 1 kHz
-NO_ROW = -1  # of a box that moves no more
+ASK_AGAIN = 1.0  # time [s] after which ~/get_boxes is asked again
 UNANSWERED = 0.5
 """Time [s] that poses may come without contacts; then nobody answers, and none are drawn."""
 QUIET = 1.0  # time [s] without a pose, after which nobody moves the boxes any more
@@ -94,7 +97,9 @@ def read_answer(read: ReadContacts, scene: Scene) -> Answer:
         rows = {name: (number, ALONE) for name, number in index.items()} | rows
     listed = [*read.names, *read.near_names]
     pairs = [(index.get(a, ALONE), index.get(b, ALONE)) for _, a, b in listed]
-    for name, is_known in (*((names[0], min(pair) >= 0 and scene.has_pair(*pair))
+    # A box that came back has a place that is known to the node alone.
+    for name, is_known in (*((names[0], min(pair) >= 0 and (scene.has_pair(*pair)
+                                                            or scene.has_pair(*pair[::-1])))
                              for names, pair in zip(listed, pairs)),
                            *((name, name in rows) for name in read.stale)):
         if not is_known:
@@ -112,27 +117,28 @@ class PoseTopic(NamedTuple):
     name: str
     kind: type  # of its messages
     qos: QoSProfile
-    names: Sequence[str]  # of boxes or bodies
-    read: Callable[[bytes], StampedPose]
-    """Return the poses (n, 7) of these names, NaN for one that is not there.
+    source: str  # a box or body, or ALL_BOXES
 
-    Raises MessageError.
-    """
+    def names(self, scene: Scene) -> Sequence[str]:
+        """Return the boxes or bodies whose poses come here."""
+        return scene.moving if self.source == ALL_BOXES else (self.source,)
+
+    def reader(self, scene: Scene) -> Callable[[bytes], StampedPose]:
+        """Return what reads the poses (n, 7) of these names, NaN for one that is not there.
+
+        It raises MessageError.
+        """
+        if self.source != ALL_BOXES:
+            return _read_one
+        if scene.poses == 'named':
+            return partial(_read_all, NamedPoses(scene.moving))
+        return partial(_read_all, read_poses, count=len(scene.moving))
 
 
 def pose_topics(scene: Scene) -> list[PoseTopic]:
-    """Return how the poses of all that moves come, in the scene's order.
-
-    Arrays may become longer: who sends them follows the changes of the scene.
-    """
-    topics = []
-    for source, topic in topics_of(scene).items():
-        is_array = source == ALL_BOXES
-        names, read = ((scene.moving, partial(_read_array, len(scene.moving))) if is_array else
-                       ((source,), _read_one))
-        topics.append(PoseTopic(topic, PoseArray if is_array else PoseStamped, pose_qos(source),
-                                names, read))
-    return topics
+    """Return how the poses of all that moves come, in the scene's order."""
+    return [PoseTopic(topic, pose_type(scene), pose_qos(source), source)
+            for source, topic in topics_of(scene).items()]
 
 
 def _read_one(data: bytes) -> StampedPose:
@@ -140,10 +146,11 @@ def _read_one(data: bytes) -> StampedPose:
     return pose._replace(numbers=np.array([pose.numbers]))
 
 
-def _read_array(count: int, data: bytes) -> StampedPose:
-    """Return so many poses, or more. A bad pose becomes NaN: the contact node reports it."""
-    poses = read_poses(data)
-    if len(poses.numbers) < count:
+def _read_all(read: Callable[[bytes], StampedPose], data: bytes, count: int | None = None,
+              ) -> StampedPose:
+    """Return all poses. A bad pose becomes NaN: the contact node reports it."""
+    poses = read(data)
+    if count not in (None, len(poses.numbers)):
         raise MessageError('wrong number of poses',
                            f'{len(poses.numbers)} poses, but {count} boxes and bodies of the scene '
                            'move')
@@ -155,14 +162,25 @@ class Track:
     """The last poses of one topic, by stamp."""
 
     def __init__(self) -> None:
-        self.rows: list[int] = []  # those that the topic gives of SceneRows.poses
+        self.names: Sequence[str] = ()  # whose poses they are
+        self.rows: list[int] = []  # those of SceneRows.poses
         self.kept: deque[tuple[int, np.ndarray]] = deque(maxlen=KEPT)
+
+    def follow(self, names: Sequence[str], rows: Mapping[str, int]) -> None:
+        """Take poses of other names from now on; of those before, keep the last ones."""
+        if tuple(names) != tuple(self.names) and self.kept:
+            stamp, last = self.kept[-1]
+            known = dict(zip(self.names, last))
+            nowhere = np.full(7, np.nan)
+            self.kept.clear()
+            self.kept.append((stamp, np.array([known.get(name, nowhere) for name in names])
+                              .reshape(-1, 7)))
+        self.names, self.rows = names, [rows[name] for name in names]
 
     def append(self, stamp: int, poses: np.ndarray) -> None:
         """Take poses (m, 7); what has none, NaN, stays where it was."""
-        last = self.kept[-1][1] if self.kept else poses
-        both = min(len(last), len(poses))  # boxes may have come that move
-        poses[:both] = np.where(np.isnan(poses[:both, :1]), last[:both], poses[:both])
+        if self.kept:
+            poses = np.where(np.isnan(poses[:, :1]), self.kept[-1][1], poses)
         self.kept.append((stamp, poses))
 
     def at(self, stamp: int) -> np.ndarray:
@@ -174,6 +192,8 @@ class Track:
 class Listener(GuardedNode):
     """Keeps the last poses and contacts that it hears of a scene.
 
+    It follows the changes that ~/boxes tells. What it missed it asks for: it may start at any time.
+
     values: its parameters; rows: the scene.
     """
 
@@ -184,19 +204,22 @@ class Listener(GuardedNode):
         self.values = values = declare(self, settings)
         warn_of_unknown(self, settings)
         scene = scene_of(values)
-        self._asked: dict[tuple[bytes, int], SetBoxes.Request] = {}
-        """Requests of ~/set_boxes without a response so far, by client and number."""
         self._frame_id = ''
         self._answer: tuple[int, Answer, float] | None = None  # stamp, what touches, latency
         self._heard = -math.inf  # when a pose last came, by the steady clock [s]
         self._unanswered = math.inf  # since when poses come without contacts [s]
         self.topics = pose_topics(scene)
         self._tracks = [Track() for _ in self.topics]
-        self._take(SceneSolver(scene))
-        self.create_subscription(SetBoxes.Event, 'contact_node/set_boxes/_service_event',
-                                 self._on_change, CHANGES)
-        for topic, track in zip(self.topics, self._tracks):
-            self.create_subscription(topic.kind, topic.name, partial(self._on_poses, topic, track),
+        self._readers: list[Callable[[bytes], StampedPose]] = []
+        self._take(scene, 0, 0)
+        self._changes: deque[Boxes] = deque(maxlen=KEPT)  # that came while the scene is asked for
+        self._pages: list[GetBoxes.Response] = []
+        self._asked = -math.inf  # when a page was asked for, by the steady clock [s]
+        self._boxes = self.create_client(GetBoxes, 'contact_node/get_boxes', qos_profile=REQUESTS)
+        self.create_subscription(Boxes, 'contact_node/boxes', self._on_boxes, LATCHED)
+        self.create_timer(ASK_AGAIN, self._ask_again)
+        for number, topic in enumerate(self.topics):
+            self.create_subscription(topic.kind, topic.name, partial(self._on_poses, number),
                                      topic.qos, raw=True)
         self.create_subscription(ContactsMessage, 'contacts', self._on_contacts, contacts_qos,
                                  raw=True)
@@ -206,40 +229,69 @@ class Listener(GuardedNode):
         """Whether no pose has come for QUIET seconds."""
         return time.monotonic() - self._heard > QUIET
 
-    def _take(self, solver: SceneSolver) -> None:
-        """Draw the scene of a solver from now on."""
-        self._solver, self.rows = solver, SceneRows(solver.scene)
+    def _take(self, scene: Scene, epoch: int, revision: int) -> None:
+        """Draw a scene from now on."""
+        self.rows, self._epoch, self._revision = SceneRows(scene), epoch, revision
         self._answer = None
         for topic, track in zip(self.topics, self._tracks):
-            names = solver.moving if solver.scene.pose_array else topic.names
-            is_moving = set(solver.scene.moving)
-            track.rows = [solver.scene.row_of[name] if name in is_moving else NO_ROW
-                          for name in names]
+            track.follow(topic.names(scene), scene.row_of)
+        self._readers = [topic.reader(scene) for topic in self.topics]
 
-    def _on_change(self, event: SetBoxes.Event) -> None:
-        """Follow a request that the contact node has taken."""
-        key = bytes(event.info.client_gid), event.info.sequence_number
-        for request in event.request:
-            self._asked[key] = request
-        for response in event.response:
-            asked = self._asked.pop(key, None)
-            if not response.success or asked is None:
-                continue
-            if response.revision != self._solver.revision + 1:
-                raise ValueError(f'scene {response.revision} comes after scene '
-                                 f'{self._solver.revision}: changes were missed; start this '
-                                 'node before boxes change')
-            self._take(changed(self._solver, asked))
+    def _on_boxes(self, boxes: Boxes) -> None:
+        """Follow a change of the scene, or ask for the whole scene where some were missed."""
+        if self._changes:
+            self._changes.append(boxes)
+        elif (boxes.epoch, boxes.revision) == (self._epoch, self._revision + 1):
+            self._follow(boxes)
+        elif (boxes.epoch, boxes.revision) != (self._epoch, self._revision):
+            self._changes.append(boxes)
+            self._ask([])
 
-    def _on_poses(self, topic: PoseTopic, track: Track, data: bytes) -> None:
-        poses = topic.read(data)
-        track.append(poses.stamp, poses.numbers)
+    def _follow(self, boxes: Boxes) -> None:
+        scene = self.rows.scene
+        _, changes = finished(changes_of(scene, boxes))
+        self._take(scene.changed(*checked_changes(scene, **changes))[0], boxes.epoch,
+                   boxes.revision)
+
+    def _ask(self, pages: list[GetBoxes.Response]) -> None:
+        """Ask for the boxes behind those of some answers."""
+        self._pages, self._asked = pages, time.monotonic()
+        first = sum(len(page.boxes) for page in pages)
+        self._boxes.call_async(GetBoxes.Request(first=first)).add_done_callback(
+            self.guarded(partial(self._on_page, pages), 'contact_node/get_boxes'))
+
+    def _ask_again(self) -> None:
+        """Begin anew where no answer came: it is lost if the node starts, or ends, meanwhile."""
+        if self._changes and time.monotonic() - self._asked > ASK_AGAIN:
+            self._ask([])
+
+    def _on_page(self, pages: list[GetBoxes.Response], future: Any) -> None:
+        page = future.result()
+        if pages is not self._pages or not page.success:
+            return
+        if pages and (page.epoch, page.revision) != (pages[0].epoch, pages[0].revision):
+            self._ask([])
+            return
+        pages.append(page)
+        if page.boxes and sum(len(page.boxes) for page in pages) < page.count:
+            self._ask(pages)
+            return
+        changes, self._pages = list(self._changes), []
+        self._changes.clear()
+        self._take(scene_of_answers(self.rows.scene, pages), page.epoch, page.revision)
+        for boxes in changes:
+            if boxes.epoch == page.epoch and boxes.revision > self._revision:
+                self._on_boxes(boxes)
+
+    def _on_poses(self, number: int, data: bytes) -> None:
+        poses = self._readers[number](data)
+        self._tracks[number].append(poses.stamp, poses.numbers)
         self._frame_id, self._heard = poses.frame_id, time.monotonic()
         self._unanswered = min(self._unanswered, self._heard)
 
     def _on_contacts(self, data: bytes) -> None:
         read = read_contacts(data)
-        if read.revision != self._solver.revision:  # a change is on its way
+        if (read.epoch, read.revision) != (self._epoch, self._revision):  # a change is on its way
             return
         latency = 1e-9 * (self.get_clock().now().nanoseconds - read.stamp)
         self._answer = read.stamp, read_sorted(read, self.rows.scene), latency
@@ -256,10 +308,9 @@ class Listener(GuardedNode):
         stamp, answer, latency = max(track.kept[-1][0] for track in tracks), None, math.nan
         if self._answer is not None and time.monotonic() - self._unanswered <= UNANSWERED:
             stamp, answer, latency = self._answer
-        poses = np.concatenate((self.rows.poses, [NOWHERE]))  # the last is NO_ROW
+        poses = self.rows.poses.copy()
         for track in tracks:
-            known = track.at(stamp)[:len(track.rows)]
-            poses[track.rows[:len(known)]] = known
-        self.rows.scene.place_boxes(poses[:-1])
+            poses[track.rows] = track.at(stamp)
+        self.rows.scene.place_boxes(poses)
         return DrawnTick(self.rows, stamp, self._frame_id, poses[:len(self.rows.sizes)], answer,
                          latency)

@@ -12,6 +12,7 @@ shows them, Foxglove with config/contact.foxglove.json. A patch is the rectangle
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -21,7 +22,7 @@ from rclpy.context import Context
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ...arguments import parse_command_line
+from ...arguments import parse_command_line, program_main
 from ...node.messages import make_header, set_pose
 from ...node.runtime import run_node
 from ...node.topics import contact_qos
@@ -31,6 +32,8 @@ from .. import style
 from .listener import SCENE_PARAMETERS, DrawnTick, Listener
 
 PERIOD = 1 / 30  # time [s] between marker arrays
+DELETED = 5.0
+"""Time [s] for which arrays delete what is gone: a viewer that is behind loses some of them."""
 LABELLED = 10
 """Contacts whose depth is written beside them, the deepest; and pairs near, the nearest."""
 TEXT_HEIGHT = 0.04  # of the longest edge
@@ -136,6 +139,7 @@ class MarkersNode(Listener):
     def __init__(self, context: Context, **options: Any) -> None:
         super().__init__('markers', context, SCENE_PARAMETERS, contact_qos(), **options)
         self._drawn: set[tuple[str, int]] = set()
+        self._gone: dict[tuple[str, int], float] = {}  # since when, by the steady clock [s]
         self._markers = self.create_publisher(MarkerArray, 'markers', contact_qos())
         self.create_timer(PERIOD, self._publish)
         self.get_logger().info('ready')
@@ -145,14 +149,18 @@ class MarkersNode(Listener):
         if tick is None:
             return
         markers = scene_markers(tick)
-        drawn = {(marker.ns, marker.id) for marker in markers}
-        header = make_header(tick.stamp, tick.frame_id)
-        gone = [Marker(header=header, ns=name, id=key, action=Marker.DELETE)
-                for name, key in sorted(self._drawn - drawn)]
+        now, drawn = time.monotonic(), {(marker.ns, marker.id) for marker in markers}
+        self._gone = {key: since for key, since in self._gone.items()
+                      if key not in drawn and now - since <= DELETED}
+        self._gone |= dict.fromkeys(self._drawn - drawn, now)
         self._drawn = drawn
+        header = make_header(tick.stamp, tick.frame_id)
+        gone = [Marker(header=header, ns=name, id=number, action=Marker.DELETE)
+                for name, number in sorted(self._gone)]
         self._markers.publish(MarkerArray(markers=markers + gone))
 
 
+@program_main
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM."""
     parse_command_line('markers', __doc__, SCENE_PARAMETERS, args)

@@ -22,7 +22,7 @@ from rclpy.context import Context
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from visualization_msgs.msg import Marker
 
-from ...arguments import parse_command_line
+from ...arguments import parse_command_line, program_main
 from ...demo import CRANE_ROPES, CRANE_WRENCH
 from ...extras import require
 from ...node.messages import stamp_of
@@ -99,6 +99,7 @@ class ViewNode(Listener):
         self._force = stamp_of(message.header), message.wrench.force.z
 
 
+@program_main
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM."""
     parse_command_line('view', __doc__, PARAMETERS, args)

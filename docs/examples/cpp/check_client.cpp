@@ -16,7 +16,8 @@ using box_contact_msgs::srv::Check;
 int main(int argc, char** argv) {
   rclcpp::init(argc, argv);
   const auto node = rclcpp::Node::make_shared("check_client");
-  const auto client = node->create_client<Check>("contact_node/check");
+  const auto client = node->create_client<Check>("contact_node/check",
+                                                 rclcpp::ServicesQoS().keep_last(128));
   RCLCPP_INFO(node->get_logger(), "waits for a contact node");
   if (!client->wait_for_service()) return 1;  // Ctrl-C
 

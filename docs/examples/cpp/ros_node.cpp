@@ -86,7 +86,8 @@ class BoxContactNode : public rclcpp::Node {
     Contacts contacts;
     contacts.header = header;
     if (contact.colliding) {
-      const auto told = box_contact::to_message(contact, "box_a_box_b", "box_a", "box_b");
+      const auto told = box_contact::to_message(contact, boxes_[0], boxes_[1], "box_a_box_b",
+                                                "box_a", "box_b");
       PointStamped point;
       point.header = header, point.point = told.point;
       point_->publish(point);

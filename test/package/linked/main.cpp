@@ -13,7 +13,7 @@ int main() {
   const box_contact::Box load{{{0.5, 0.25, 2.581}, {0, 0, 0, 1}}, container};
   const box_contact::Box stack{{{0, 0, 0}, {0, 0, 0, 1}}, container};
   box_contact::Contact contact = box_contact::collide(load, stack);
-  const auto message = box_contact::to_message(contact, "landing", "load", "stack");
+  const auto message = box_contact::to_message(contact, load, stack, "landing", "load", "stack");
   const box_contact::Contact again = box_contact::from_message(message);
   contact.axis = again.axis;  // which a message has not
   const bool same = again.colliding == contact.colliding &&

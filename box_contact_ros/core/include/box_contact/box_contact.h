@@ -1,8 +1,9 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-/* The C interface of libbox_contact: whether two boxes touch, where, and along which direction; how
- * far they are apart, and between which points; and when they come near each other on their ways.
+/* The C interface of libbox_contact: whether two boxes touch, where, and along which direction;
+ * how far they are apart, and between which points; where two of their faces meet; or when they come
+ * near each other on their ways.
  *
  *   bc_box a = {{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}}, {{1.0, 1.0, 1.0}}};
  *   bc_box b = {{{0.0, 0.0, 0.99}, {0.0, 0.0, 0.0, 1.0}}, {{1.0, 1.0, 1.0}}};
@@ -34,7 +35,7 @@ extern "C" {
 #endif
 
 /* Raised by a change that a compiled program cannot follow. `bc_abi` is that of the library. */
-#define BC_ABI 3
+#define BC_ABI 4
 
 typedef enum bc_status {
   BC_OK = 0,
@@ -240,10 +241,28 @@ BC_API bc_status bc_least_distance_rows(const bc_sweep_rows* rows, double tolera
                                         const bc_approach_results* results, int threads,
                                         int64_t* refused);
 
-/* The area [m²] of the patch of a contact with this normal (3) and covariance (3, 3): 12·√(e₁·e₂) by
- * the eigenvalues of the covariance across the normal; NaN where the covariance is. It is that of a
- * rectangle of the same moments: exact where the overlap is a cuboid along the normal. */
-BC_API double bc_patch_area(const double* normal, const double* covariance);
+/* Most corners of the patch of two faces. */
+#define BC_CORNERS_MAX 9
+
+/* The patch of two faces: where they are within a tolerance of each other. A convex polygon midway between
+ * both, in the common frame. */
+typedef struct bc_polygon {
+  size_t size;   /* sizeof(bc_polygon) */
+  int32_t count; /* of corners: 3 to 9; 0: the faces are apart, or edges meet */
+  double corners[BC_CORNERS_MAX][3]; /* counter-clockwise about the normal [m]; then the first one again;
+                                        NaN where there are none */
+  double area;                       /* across the normal [m²] */
+  double centre[3];                  /* centroid [m]; NaN where there are no corners */
+} bc_polygon;
+
+/* Find the patch of two boxes that meet along a unit vector `normal` (3) from A to B, as that of their contact.
+ *
+ * Of each box it is the face most parallel to the normal. Both are projected along the normal and
+ * intersected; what is left is cut where the gap of their planes exceeds `tolerance` [m]. Neither a depth nor
+ * a tilt of microns changes it, while the overlap is a wedge. Where edges meet, at more than 0.1 rad from both
+ * faces, there is none. On failure *patch is as it was. */
+BC_API bc_status bc_face_patch(const bc_box* a, const bc_box* b, const double* normal,
+                               double tolerance, bc_polygon* patch);
 
 #ifdef __cplusplus
 }

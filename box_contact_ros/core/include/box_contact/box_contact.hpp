@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The C++17 interface of libbox_contact: whether two boxes touch, where, and along which direction;
-// how far they are apart, and between which points; and when they come near each other on their ways.
+// how far they are apart, and between which points; where two of their faces meet; or when they come
+// near each other on their ways.
 //
 //   box_contact::Box a{{{0.0, 0.0, 1.49}, {0.0, 0.0, 0.0, 1.0}}, {1.0, 1.0, 1.0}};
 //   box_contact::Box b{{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}}, {2.0, 2.0, 2.0}};
@@ -62,6 +63,7 @@ using Contact = bc_contact;  // see above
 using Nearest = bc_nearest;  // see box_contact.h
 using Sweep = bc_sweep;      // poses at s = 0 and s = 1, size, and centre of turning; see box_contact.h
 using Approach = bc_approach;
+using Polygon = bc_polygon;  // see box_contact.h
 
 enum class Model { exact = BC_EXACT, mlp = BC_MLP };
 enum class Patch { none = BC_NO_PATCH, volume = BC_VOLUME, covariance = BC_COVARIANCE };
@@ -296,9 +298,14 @@ inline std::int64_t least_distance(const SweepRows& rows, const ApproachResults&
   });
 }
 
-// The area [m²] of a contact's patch; NaN without a covariance. See bc_patch_area.
-inline double patch_area(const Contact& contact) {
-  return bc_patch_area(contact.normal, contact.covariance[0]);
+// The patch of the faces by which two boxes meet, within a tolerance [m]; see bc_face_patch. `normal`: that
+// of their contact. Throws as `collide`, and for a normal whose length is not 1.
+inline Polygon face_patch(const Box& a, const Box& b, const double (&normal)[3],
+                          double tolerance = 1e-4) {
+  Polygon patch{};
+  patch.size = sizeof(Polygon);
+  detail::check(bc_face_patch(&a, &b, normal, tolerance, &patch));
+  return patch;
 }
 
 // The instruction set of this process: "baseline", "avx2" or "avx512".

@@ -81,22 +81,16 @@ typedef struct bc_force_options {
   size_t size;     /* sizeof(bc_force_options) */
   int substeps;    /* equal parts of the longest step lately, more if 5 ms are exceeded; 1 to
                       1,000 */
-  int iterations;  /* of sequential impulses in a sub-step, at most; 1 to 1,000 */
-  int relaxations; /* iterations more, at most, which remove the speed of pushing out; 0 to 1,000.
-                      Unless answers are late, there are three times as many of both where
-                      masses that touch differ tenfold or stacks sway, and up to twelve times
-                      the longer they sway */
-  int threads;     /* 1 to 1,024, and no more than cores; many boxes that touch are moved in parts */
+  int threads;     /* 1 to 1,024, and no more than cores; boxes that touch are moved by one */
   double friction; /* Coulomb's μ [1] */
   double most_depth; /* how deep what rests may be at most [m], where a load is large for the lighter
                         body: with contacts of one's own, its island makes up to 64 times as many
                         sub-steps. bc_load tells where that is not enough */
-  double rest_speed; /* [m/s], by the energy of a body: bodies that patches join are laid down once
-                        all were slower for half a second, held by friction */
-  int rest;          /* 0: nothing is laid down */
+  int rest; /* 0: nothing is laid down. Else bodies that patches join are, once all were slower than
+               0.1 mm/s, by their energy, for half a second, and friction holds them */
 } bc_force_options;
 
-#define BC_DEFAULT_FORCE_OPTIONS {sizeof(bc_force_options), 4, 4, 2, 1, 0.5, 1e-3, 1e-4, 1}
+#define BC_DEFAULT_FORCE_OPTIONS {sizeof(bc_force_options), 4, 1, 0.5, 1e-3, 1}
 
 /* What an advance leads to: arrays of a row for each body; NULL: not wanted. The poses and velocities
  * may be those that are given. */
@@ -153,7 +147,8 @@ BC_API bc_status bc_patch_forces_forget(bc_patch_forces* forces, const int64_t* 
 BC_API void bc_patch_forces_reset(bc_patch_forces* forces);
 
 /* Take an answer, asked for at `poses` (one for each body; not read for contacts of one's own, which
- * need set_boxes). Pairs that are left out are forgotten.
+ * need set_boxes). Pairs that are left out are forgotten. Contacts of boxes that are of one body by now
+ * are passed over.
  * BC_BAD_ARGUMENT, and nothing changes, for numbers beyond the limits above, a contact without a patch
  * and a pair that comes twice. */
 BC_API bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches* answer,

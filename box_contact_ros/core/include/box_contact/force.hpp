@@ -60,20 +60,16 @@ class PatchForces {
  public:
   struct Options {
     int substeps = 4;       // equal parts of the longest step lately, more if 5 ms are exceeded
-    int iterations = 4;     // of sequential impulses in a sub-step, at most
-    int relaxations = 2;    // iterations more, at most, which remove the speed of pushing out
     int threads = 1;        // at most
     double friction = 0.5;  // Coulomb's μ
     double most_depth = 1e-3;  // of what rests [m], where a load is large for the lighter body
-    double rest_speed = 1e-4;  // what is slower for half a second is laid down [m/s]
-    bool rest = true;          // whether anything is
+    bool rest = true;          // whether what rests is laid down
   };
 
   explicit PatchForces(Span<const Body> bodies) : PatchForces(bodies, Options()) {}
   PatchForces(Span<const Body> bodies, const Options& options) {
-    bc_force_options plain{sizeof(bc_force_options), options.substeps, options.iterations,
-                           options.relaxations,      options.threads,  options.friction,   options.most_depth,
-                           options.rest_speed,       options.rest};
+    bc_force_options plain{sizeof(bc_force_options), options.substeps,   options.threads,
+                           options.friction,         options.most_depth, options.rest};
     bc_patch_forces* made;
     detail::check(bc_patch_forces_create(plain_of(bodies), std::int64_t(bodies.size()), &plain, &made));
     forces_.reset(made);

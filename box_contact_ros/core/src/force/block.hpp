@@ -34,7 +34,7 @@ namespace box_contact::BOX_CONTACT_SET::force {
 template <class T>
 struct Speeds {
   Vec<T> linear;
-  T changed;  // the last iteration that changed them
+  T last_change;  // the last iteration that changed them
   Vec<T> angular;
   T inverse_mass;
 };
@@ -48,16 +48,33 @@ struct Sums {
   Vec<T> impulse, angular_impulse;  // of contacts, since the advance began [N s], [N m s]
 };
 
+// How much finer the sub-steps of a body's island were, as a patch may be lost for a step: see fineness.hpp.
+struct Fineness {
+  double factor = 1.0;
+  double calm = 0.0;    // for how long less was needed [s]
+  double swayed = 0.0;  // for how long it has swayed [s]
+
+  // What rests has not swayed, still bears its load, and is to stay where it is.
+  Fineness asleep() const { return {factor}; }
+};
+
+// For how long a body's island was slow [s], and the least square of its speed since then [m²/s²].
+struct SlowTime {
+  double time = 0.0, least = 0.0;
+};
+
 // A body in a step, on lines of a cache of its own: other threads may move its neighbours.
 struct alignas(64) Moving : Speeds<double>, Where<double>, Sums<double> {
   int32_t body;
   int32_t side;          // the first group side by side that may have its next block
   double quaternion[4];  // of length 1
+  Fineness fineness;
+  SlowTime slow;
   Motion pushed;         // its velocities before relaxation, at the end of the advance
   double load;           // weights that it bears and its own [N]
   int carriers;          // how many patches bear it
   double speed_squared;  // twice its energy by its mass, at the end of an advance [m²/s²]
-  bool is_held;          // whether friction holds it
+  bool is_supported;     // whether friction holds it
 };
 
 // The bodies of blocks side by side.
@@ -82,12 +99,6 @@ struct Asked {
   Vec<T> local_a, local_b;  // its point in the frames of its bodies
   Vec<T> closing;           // velocities along N, τ1 and τ2 that close the faces: see closing.hpp
   T over_relaxation;        // of pressing and rocking: see iterations.hpp [1]
-};
-// The impulses that it gave in the last window, and that window: see Patch.
-template <class T>
-struct Kept {
-  T window, normal_impulse, torsion_impulse;
-  Vec<T> friction_impulse, rocking_impulse, impulse_arm;
 };
 template <class T>
 struct Arms {
@@ -121,9 +132,6 @@ struct Block : Rows<double> {
       load;  // of its point; of its normal, upward; of the weights above [m], [1], [N]
 };
 
-// Where no rim is faster than this, a block is solved, and not over-relaxed [m/s]: what rests stays solved.
-constexpr double least_over_relaxed = 1e-6;
-
 // Rocking whose centre of pressure is within the span.
 template <class T>
 BC_INLINE T bounded(const SpanOf<T>& per_pressing, T normal, T rocking) {
@@ -136,8 +144,8 @@ BC_INLINE void bound(Vec<T>& impulses, T limit) {
   if (any(is_beyond)) impulses = select(is_beyond, (limit / sqrt(squared)) * impulses, impulses);
 }
 
-// Take what an answer, and the last window, say of a patch.
-inline void take(const Patch& patch, double over_relaxation, Block& block) {
+// Read what an answer, and the last window, say of a patch.
+inline void read_patch(const Patch& patch, double over_relaxation, Block& block) {
   auto local = [&](const Placed& asked) {
     return transposed_times(asked.axes, patch.point - asked.position);
   };
@@ -147,30 +155,20 @@ inline void take(const Patch& patch, double over_relaxation, Block& block) {
       patch.friction, patch.depth,          patch.stiffness,      patch.late,
       patch.age,      local(patch.asked_a), local(patch.asked_b), Vec<double>{0.0, 0.0, 0.0},
       over_relaxation};
-  static_cast<Kept<double>&>(block) = {patch.window,          patch.normal_impulse,
-                                       patch.torsion_impulse, patch.friction_impulse,
-                                       patch.rocking_impulse, patch.impulse_arm};
-}
-inline void give_back(const Kept<double>& kept, Patch& patch) {
-  patch.window = kept.window;
-  patch.normal_impulse = kept.normal_impulse;
-  patch.torsion_impulse = kept.torsion_impulse;
-  patch.friction_impulse = kept.friction_impulse;
-  patch.rocking_impulse = kept.rocking_impulse;
-  patch.impulse_arm = kept.impulse_arm;
+  static_cast<Kept<double>&>(block) = patch.kept;
 }
 
 // Give B an impulse at the point and an angular impulse, and A the opposite.
 template <class T, class Body>
-BC_INLINE void apply(const Rows<T>& block, const Vec<T>& impulse, const Vec<T>& turn, Body& a,
+BC_INLINE void apply(const Rows<T>& block, const Vec<T>& impulse, const Vec<T>& angular, Body& a,
                      Body& b) {
   if (any(a.inverse_mass > 0.0)) {
     a.linear = a.linear - a.inverse_mass * impulse;
-    a.angular = a.angular - a.inverse_inertia * (cross(block.arm_a, impulse) + turn);
+    a.angular = a.angular - a.inverse_inertia * (cross(block.arm_a, impulse) + angular);
   }
   if (any(b.inverse_mass > 0.0)) {
     b.linear = b.linear + b.inverse_mass * impulse;
-    b.angular = b.angular + b.inverse_inertia * (cross(block.arm_b, impulse) + turn);
+    b.angular = b.angular + b.inverse_inertia * (cross(block.arm_b, impulse) + angular);
   }
 }
 template <class T, class Body>
@@ -193,12 +191,12 @@ BC_INLINE void count(Rows<T>& block, Sums<T>& a, Sums<T>& b) {
   block.friction_counted = block.friction_impulses;
   Vec<T> impulse =
       normal[0] * block.normal + (friction[0] * shape.axis_1 + friction[1] * shape.axis_2);
-  Vec<T> turn = (normal[1] * shape.axis_1 + normal[2] * shape.axis_2) +
-                (shape.radius * friction[2]) * block.normal;
+  Vec<T> angular = (normal[1] * shape.axis_1 + normal[2] * shape.axis_2) +
+                   (shape.radius * friction[2]) * block.normal;
   a.impulse = a.impulse - impulse;
-  a.angular_impulse = a.angular_impulse - (cross(block.arm_a, impulse) + turn);
+  a.angular_impulse = a.angular_impulse - (cross(block.arm_a, impulse) + angular);
   b.impulse += impulse;
-  b.angular_impulse += cross(block.arm_b, impulse) + turn;
+  b.angular_impulse += cross(block.arm_b, impulse) + angular;
 }
 
 // The impulses of the last window, about the point of this step.
@@ -288,9 +286,9 @@ BC_INLINE T closing_speed(const Rows<T>& block, const Body& a, const Body& b) {
 template <class T, class Body>
 BC_INLINE Vec<T> pressing_speeds(const Rows<T>& block, const NormalRows<T>& rows, const Body& a,
                                  const Body& b) {
-  Vec<T> turns = b.angular - a.angular;
-  return Vec<T>{dot(speed(block, a, b), block.normal), dot(turns, block.shape.axis_1),
-                dot(turns, block.shape.axis_2)} +
+  Vec<T> spin = b.angular - a.angular;
+  return Vec<T>{dot(speed(block, a, b), block.normal), dot(spin, block.shape.axis_1),
+                dot(spin, block.shape.axis_2)} +
          rows.bias;
 }
 

@@ -9,18 +9,26 @@
 #include <cstdint>
 #include <vector>
 
-#include "advance_inputs.hpp"
 #include "block.hpp"
 #include "carriers.hpp"
 #include "clock.hpp"
-#include "turning.hpp"
+#include "rotation.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// The velocities with which a body ended the last advance: before relaxation, and after it. Of a body
-// that no force moves: in the last advance but one, and in the last.
+// How a body ended the last advance: its velocities before relaxation, and after it. Of a body that no force
+// moves: those in the last advance but one, and in the last.
 struct Ended {
   Motion pushed, relaxed;
+  Fineness fineness;
+  SlowTime slow;
+};
+
+// What an advance is given of each body.
+struct Given {
+  const bc_pose* poses;
+  const bc_velocity* velocities;
+  const bc_wrench* outside;  // none: no wrenches
 };
 
 class BodyStep {
@@ -42,11 +50,13 @@ class BodyStep {
     double scale = 1.0 / std::sqrt(squared_norm(given_.poses[k].quaternion));
     for (int i = 0; i < 4; ++i) moving.quaternion[i] = scale * given_.poses[k].quaternion[i];
     moving.impulse = moving.angular_impulse = {};
+    moving.fineness = ended_[k].fineness;
+    moving.slow = ended_[k].slow;
     if (!bodies_[k].is_free()) return;
     moving.inverse_inertia = inverse_inertia_of(bodies_[k].inverse_inertia, moving.placed.axes);
     // A caller who moves by the wrenches comes back with the speed of pushing out.
     if (!came_by_wrenches_) return;
-    const auto& [pushed, relaxed] = ended_[k];
+    const auto& [pushed, relaxed, fineness, slow] = ended_[k];
     Vec<double> slower = relaxed.linear - pushed.linear, calmer = relaxed.angular - pushed.angular;
     moving.linear += slower;
     moving.angular += calmer;
@@ -55,7 +65,7 @@ class BodyStep {
                                                    bodies_[k].inverse_inertia);
   }
   // Advance a body without contacts.
-  void advance(Moving& moving) const {
+  void fly(Moving& moving) const {
     for (int number = 1; number <= steps_.count; ++number) {
       drive(moving, number, steps_);
       move(bodies_[size_t(moving.body)], steps_.length, moving);
@@ -87,7 +97,7 @@ class BodyStep {
     auto k = size_t(moving.body);
     if (!bodies_[k].is_free()) return;
     double rate = 1.0 / steps_.dt;
-    ended_[k] = {moving.pushed, {moving.linear, moving.angular}};
+    ended_[k] = {moving.pushed, {moving.linear, moving.angular}, moving.fineness, moving.slow};
     write_pose(moving);
     if (motion_.wrenches)
       write(rate * moving.impulse, rate * moving.angular_impulse, motion_.wrenches[k].force,
@@ -102,7 +112,7 @@ class BodyStep {
   // A body that no force moves goes on by its velocity. One that rests keeps its pose to the bit.
   void move_alone(size_t k) const {
     const bc_velocity velocity = given_.velocities[k];
-    ended_[k] = {ended_[k].relaxed, {vector(velocity.linear), vector(velocity.angular)}};
+    ended_[k] = {ended_[k].relaxed, {vector(velocity.linear), vector(velocity.angular)}, {}, {}};
     if (motion_.velocities) motion_.velocities[k] = velocity;
     if (motion_.wrenches) motion_.wrenches[k] = {};
     if (!motion_.poses) return;
@@ -121,7 +131,7 @@ class BodyStep {
   // A body that no force moves. `part`: of the step, from its middle [1].
   void carry(Moving& moving, double part) const {
     auto k = size_t(moving.body);
-    const auto& [before, last] = ended_[k];
+    const auto& [before, last, fineness, slow] = ended_[k];
     const bc_velocity& given = given_.velocities[k];
     moving.linear = carried_at(part, before.linear, last.linear, vector(given.linear));
     moving.angular = carried_at(part, before.angular, last.angular, vector(given.angular));

@@ -10,7 +10,7 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// The smaller of two changes in turn, where they have one sign (minmod): a jump is none.
+// The smaller of two changes after each other, where they have one sign (minmod): a jump is none.
 inline Vec<double> least_change_of(const Vec<double>& x, const Vec<double>& y,
                                    const Vec<double>& z) {
   Vec<double> change{0.0, 0.0, 0.0};

@@ -14,37 +14,12 @@
 #include <cmath>
 
 #include "../lanes/lanes.hpp"
+#include "tuning.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// Steps accepted [s]: at least this long, so that a speed divided by one is a number; and shorter than
-// that, as nothing that touches stays within its patch for so long.
-constexpr double step_min = 1e-50, step_limit = 1.0;
-// Sub-steps are no longer [s], unless answers are late: a step of 0.1 s in four would sink a stack of
-// eight by 42 mm.
-constexpr double sub_step_limit = 0.005;
 // A step of so many sub-steps and this share of one has no sub-step more [1]: the share is rounding.
 constexpr double sub_step_slack = 1e-9;
-// Steps are remembered for at least this time [s], and at least so many of them. Frames of several steps
-// repeat within it.
-constexpr double steps_time = 0.5;
-constexpr int steps_count = 32;
-// The longest step lately is forgotten where those since are shorter by more than this factor [1], as a
-// step that is measured varies. It then shrinks by it a step: at once, a tower of ten jumps 1 mm up.
-constexpr double step_shrinkage = 1.25;
-// A step begins with at most this many times the impulses of a window [1]. What iterations leave is as
-// large in a step of 1 ns as in one of 5 ms: divided by the step it would be any force.
-constexpr double most_again = 2.0;
-// Angular frequency of a soft constraint times the window [1]: a quarter turn. A box that rests on a
-// whole face is 0.4·g·window² deep.
-constexpr double soft_frequency = 1.57;
-// The same times half a period and the latency of an answer [1]. With 2 a container at 50 Hz and 5 ms
-// tilts by 0.06°; from 4 on late loads vibrate.
-constexpr double late_frequency = 2.5;
-// An answer that is older than so many periods [1] pushes nothing out.
-constexpr double overdue_periods = 3.0;
-// A period that is not told is the least of so many intervals between answers: some get lost.
-constexpr int intervals_kept = 8;
 
 // The frequency of a patch whose answers are late [1/s].
 template <class T>
@@ -58,9 +33,10 @@ struct SubSteps {
   int count, rounds;  // how many, and how many times all iterations are in each
   bool is_late;       // whether answers are late
   double window;      // the time in which the impulses that patches keep are given [s]
-  double share;       // of the window in the longest step [1]: answers are late compared with that
-  double period;      // from one answer to the next [s]
-  double overdue;     // age of an answer that is overdue [s]
+  double
+      window_share;  // of the window in the longest step [1]: answers are late compared with that
+  double period;     // from one answer to the next [s]
+  double overdue;    // age of an answer that is overdue [s]
 
   static int count_of(double dt, double window) {
     return std::max(1, int(std::ceil(dt / window - sub_step_slack)));
@@ -69,7 +45,7 @@ struct SubSteps {
   SubSteps finer(double factor) const {
     SubSteps steps = *this;
     steps.window = window / factor;
-    steps.share = share / factor;
+    steps.window_share = window_share / factor;
     steps.count = count_of(dt, steps.window);
     steps.length = dt / steps.count;
     return steps;
@@ -137,6 +113,7 @@ class Clock {
     bool is_late = frequency_of(late_, period_) < soft_frequency / longest;
     double window = is_late ? longest : std::min(longest / substeps, sub_step_limit);
     int count = SubSteps::count_of(dt, window);
+    window_ = window;
     return {dt,
             dt / count,
             count,
@@ -147,6 +124,8 @@ class Clock {
             period_,
             overdue_periods * std::max(period_, dt)};
   }
+  // That of the last step [s].
+  double window() const { return window_; }
   // Whether contacts are those of answers.
   bool is_told() const { return since_ >= 0.0; }
   // Since the last answer [s]; 0 with contacts of each step.
@@ -163,6 +142,7 @@ class Clock {
     return least;
   }
   LongestStep longest_;
+  double window_ = 0.0;
   double since_ = -1.0;                    // the last answer [s]; below 0: there was none
   double period_ = 0.0;                    // between answers [s]
   double late_ = 0.0;                      // age of the last answer when it came [s]

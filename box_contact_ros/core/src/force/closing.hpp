@@ -24,7 +24,7 @@ inline void close_faces(const Patch& patch, const Moving& a, const Moving& b, do
   if (!is_narrow_1 && !is_narrow_2) return;
   auto [arms, depth] = place<double>(a, b, a, b, 0.0, block);
   static_cast<Arms<double>&>(block) = arms;
-  Vec<double> turned = turned_since(patch, a, b), spin = b.angular - a.angular;
+  Vec<double> rotated = rotation_since(patch, a, b), spin = b.angular - a.angular;
   double gap = faces.gap - (depth - block.asked_depth);
   if (gap > 0.0) return;  // they touch elsewhere
   double falls = time * (closing_speed<double>(block, a, b) + gap_share * time * pull);
@@ -35,15 +35,15 @@ inline void close_faces(const Patch& patch, const Moving& a, const Moving& b, do
     double apart = gap + far * slope;
     if (!(apart > 0.0) || apart + time * far * rate > falls) return 0.0;
     (rises ? span.high : span.low) = far;
-    double turn = apart / (time * (far - rim));
-    block.closing[0] -= rim * turn;
-    return turn;
+    double rate_of_turn = apart / (time * (far - rim));
+    block.closing[0] -= rim * rate_of_turn;
+    return rate_of_turn;
   };
   if (is_narrow_1)
-    block.closing[2] = -close(faces.span_1, faces.slope.x - dot(turned, shape.axis_2),
+    block.closing[2] = -close(faces.span_1, faces.slope.x - dot(rotated, shape.axis_2),
                               -dot(spin, shape.axis_2), shape.span_1);
   if (is_narrow_2)
-    block.closing[1] = close(faces.span_2, faces.slope.y + dot(turned, shape.axis_1),
+    block.closing[1] = close(faces.span_2, faces.slope.y + dot(rotated, shape.axis_1),
                              dot(spin, shape.axis_1), shape.span_2);
 }
 

@@ -19,78 +19,45 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// A patch is judged if its load would move its bodies apart by more than this [m/s²]: some 60 g. Towers of
-// up to 30 boxes alike are not. Among bodies alike the factor grows in proportion to the load beyond it, so that a
-// pile does not pay five times as much for one patch. Where masses are uneven it jumps: else of landed pallets of
-// 0.2 to 100 kg three times as many still move after 6 s.
-constexpr double least_push = 600.0;
-// Which part of the depth that is wanted is aimed at [1]: what moves presses more than what rests, and the
-// depths of a stack add up.
-constexpr double aimed_depth = 0.36;
-// A factor that grows is larger than needed by this share [1], and grows only where less than needed by as
-// much: each change moves what rests.
-constexpr double growth = 1.25;
-// Sub-steps are shorter by this factor at most.
-constexpr int finest = 64;
-// A factor that is this many times what is needed for this time [s] shrinks, by e in the same time: patches then
-// sink softly. Where it was halved at once, a pile of 500 at rest slid by 6 cm.
-constexpr int spare_factor = 4;
-constexpr double calm_time = 1.0;
-// What lasts of a force grows by e in this time [s]. An impact is over before.
-constexpr double lasting_time = 0.5;
-// Contacts are solved anew after so many sub-steps.
-constexpr int parts_of_a_contact = 4;
-
-// Of a body: its island's, as a patch may be lost for a step.
-struct Fineness {
-  double factor = 1.0;
-  double calm = 0.0;    // for how long less was needed [s]
-  double swayed = 0.0;  // for how long it has swayed [s]
-
-  // What rests has not swayed, still bears its load, and is to stay where it is.
-  Fineness at_rest() const { return {factor}; }
-};
-
 // Chooses the factor of an island, and tells for how long it has swayed. Both are kept with its bodies.
 class FinenessOf {
  public:
-  FinenessOf(const std::vector<Body>& bodies, const bc_wrench* outside, double most_depth,
-             std::vector<Patch>& patches, Islands& islands)
-      : bodies_(bodies),
-        outside_(outside),
+  FinenessOf(const bc_wrench* outside, double most_depth, std::vector<Patch>& patches,
+             Islands& islands)
+      : outside_(outside),
         most_depth_(most_depth),
         patches_(patches),
         moving_(islands.moving),
         blocks_(islands.blocks),
         by_height_(islands.by_height) {}
 
-  double operator()(const Island& island, const SubSteps& steps, std::vector<Fineness>& all) const {
-    double needed = needed_by(island, steps), held = 1.0, calm = calm_time;
-    each_free(island, [&](size_t body) {
-      held = std::max(held, all[body].factor);
-      calm = std::min(calm, all[body].calm);
+  double operator()(const Island& island, const SubSteps& steps) const {
+    double needed = needed_by(island, steps), last = 1.0, calm = calm_time;
+    each_free(island, [&](const Moving& moving) {
+      last = std::max(last, moving.fineness.factor);
+      calm = std::min(calm, moving.fineness.calm);
     });
-    if (held == 1.0 && needed <= 1.0) return 1.0;
-    bool is_spare = spare_factor * needed <= held;
-    bool is_short = needed > (held == 1.0 ? 1.0 : growth * held);
-    double factor = held;
+    if (last == 1.0 && needed <= 1.0) return 1.0;
+    bool is_spare = spare_factor * needed <= last;
+    bool is_short = needed > (last == 1.0 ? 1.0 : growth * last);
+    double factor = last;
     if (is_short)
       factor = std::ceil(std::min(growth * needed, double(finest)));
     else if (is_spare && calm >= calm_time)
-      factor = std::max(1.0, held * (1.0 - steps.dt / calm_time));
-    each_free(island, [&](size_t body) {
-      Fineness& fineness = all[body];
-      fineness.factor = factor;
-      fineness.calm = is_spare ? fineness.calm + steps.dt : 0.0;
+      factor = std::max(1.0, last * (1.0 - steps.dt / calm_time));
+    each_free(island, [&](Moving& moving) {
+      moving.fineness.factor = factor;
+      moving.fineness.calm = is_spare ? moving.fineness.calm + steps.dt : 0.0;
     });
     return factor;
   }
   // For how long an island has swayed at the end of a step [s]. Its bodies pass each other at `speed` [m/s].
-  double swayed(const Island& island, double speed, double dt, std::vector<Fineness>& all) const {
+  double swayed(const Island& island, double speed, double dt) const {
     double swayed = 0.0;
-    each_free(island, [&](size_t body) { swayed = std::max(swayed, all[body].swayed); });
+    each_free(island,
+              [&](const Moving& moving) { swayed = std::max(swayed, moving.fineness.swayed); });
     swayed = is_sway(speed, swayed > 0.0) ? swayed + dt : 0.0;
-    each_free(island, [&](size_t body) { all[body].swayed = swayed; });
+    each_free(island, [&](Moving& moving) { moving.fineness.swayed = swayed; });
     return swayed;
   }
 
@@ -98,36 +65,39 @@ class FinenessOf {
   template <class Visit>
   void each_free(const Island& island, const Visit& visit) const {
     for (size_t k = island.body; k < island.body_end; ++k)
-      if (moving_[k].inverse_mass > 0.0) visit(size_t(moving_[k].body));
+      if (moving_[k].inverse_mass > 0.0) visit(moving_[k]);
   }
 
   // The factor that is needed [1]. Below 1, the load could grow by its inverse without one.
   double needed_by(const Island& island, const SubSteps& steps) const {
     Vec<double> total{0.0, 0.0, 0.0};
     double lightest = 0.0;
-    each_free(island, [&](size_t body) {
-      if (outside_) total += vector(outside_[body].force);
-      lightest = std::max(lightest, bodies_[body].inverse_mass);
+    each_free(island, [&](const Moving& moving) {
+      if (outside_) total += vector(outside_[moving.body].force);
+      lightest = std::max(lightest, moving.inverse_mass);
     });
     double weight = length(total), push = 0.0;
+    bool is_uneven = false;
     bool may_be_heavy = weight * 2.0 * lightest > least_push;
-    if (may_be_heavy) add_loads(island, (-1.0 / weight) * total);
+    if (may_be_heavy) hand_down_weights(island, (-1.0 / weight) * total);
     for (size_t k = island.block; k < island.block_end; ++k) {
       Patch& patch = patches_[size_t(blocks_[k].patch)];
       double above = may_be_heavy ? blocks_[k].load : 0.0;
       patch.lasting =
           std::min(patch.force, std::max(patch.lasting, above) * (1.0 + steps.dt / lasting_time));
-      double closing =
-          moving_[size_t(blocks_[k].a)].inverse_mass + moving_[size_t(blocks_[k].b)].inverse_mass;
-      push = std::max(push, std::max(patch.lasting, above) * closing);
+      double of_a = moving_[size_t(blocks_[k].a)].inverse_mass,
+             of_b = moving_[size_t(blocks_[k].b)].inverse_mass;
+      double least = min(of_a, of_b), most = max(of_a, of_b);
+      is_uneven = is_uneven || (least > 0.0 && most >= uneven_masses * least);
+      push = std::max(push, std::max(patch.lasting, above) * (of_a + of_b));
     }
     double ratio = steps.window * std::sqrt(push / (aimed_depth * most_depth_)) / soft_frequency;
     double beyond = push / least_push;
-    return island.is_uneven && beyond > 1.0 ? std::ceil(ratio) : std::min(ratio, beyond);
+    return is_uneven && beyond > 1.0 ? std::ceil(ratio) : std::min(ratio, beyond);
   }
 
   // Weights from the top: each body hands what it bears to its patches below, in equal parts.
-  void add_loads(const Island& island, const Vec<double>& up) const {
+  void hand_down_weights(const Island& island, const Vec<double>& up) const {
     for (size_t k = island.body; k < island.body_end; ++k) {
       Moving& moving = moving_[k];
       moving.carriers = 0;
@@ -162,7 +132,6 @@ class FinenessOf {
   static int32_t upper(const Block& block) { return block.rises > 0.0 ? block.b : block.a; }
   static int32_t lower(const Block& block) { return block.rises > 0.0 ? block.a : block.b; }
 
-  const std::vector<Body>& bodies_;
   const bc_wrench* outside_;
   double most_depth_;
   std::vector<Patch>& patches_;

@@ -13,13 +13,6 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// A pair apart is a constraint of a step within so many times g·dt² [1]: what it falls in the first step,
-// and as much again in the next.
-constexpr double gap_share = 2.0;
-// A patch that pressed stays while its pair is apart by no more than this [m]: flush sides of goods come
-// and go by nanometres, and with them the friction that bore weight.
-constexpr double pressed_gap = 1e-5;
-
 // How fast an outside wrench speeds a body up along a normal [m/s²].
 inline double pull_along(const Vec<double>& normal, const bc_wrench& outside, double inverse_mass) {
   return std::fabs(dot(vector(outside.force), normal)) * inverse_mass;
@@ -28,16 +21,16 @@ inline double pull_along(const Vec<double>& normal, const bc_wrench& outside, do
 // The gaps of a step `dt`.
 class Gaps {
  public:
-  Gaps(const std::vector<Body>& bodies, const std::vector<bc_body_box>& boxes,
-       const std::vector<Patch>& patches, double dt, const bc_wrench* outside)
-      : bodies_(bodies), boxes_(boxes), patches_(patches), dt_(dt), outside_(outside) {}
+  Gaps(const std::vector<Body>& bodies, const std::vector<bc_body_box>& boxes, double dt,
+       const bc_wrench* outside)
+      : bodies_(bodies), boxes_(boxes), dt_(dt), outside_(outside) {}
 
   // No pair of a box that is farther apart is one for the sake of this box [m].
   double around(int32_t box) const {
     auto body = size_t(boxes_[size_t(box)].body);
     double pull =
         outside_ ? length(vector(outside_[body].force)) * bodies_[body].inverse_mass : 0.0;
-    return std::max(gap_share * dt_ * dt_ * pull, pressed_gap);
+    return gap_share * dt_ * dt_ * pull;
   }
   // Whether the boxes of a pair are a constraint in the step, though apart at its start: by no more than
   // what the outside wrenches would fall. A gap would else cost each box of a stack a step of free fall.
@@ -46,19 +39,12 @@ class Gaps {
       auto body = size_t(boxes_[size_t(box)].body);
       return outside_ ? pull_along(normal, outside_[body], bodies_[body].inverse_mass) : 0.0;
     };
-    return apart <= gap_share * dt_ * dt_ * std::max(pull(box_a), pull(box_b)) ||
-           (apart <= pressed_gap && has_pressed(box_a, box_b));
+    return apart <= gap_share * dt_ * dt_ * std::max(pull(box_a), pull(box_b));
   }
 
  private:
-  bool has_pressed(int32_t box_a, int32_t box_b) const {
-    const Patch* found = find(patches_, std::minmax(box_a, box_b));
-    return found && found->normal_impulse > 0.0;
-  }
-
   const std::vector<Body>& bodies_;
   const std::vector<bc_body_box>& boxes_;
-  const std::vector<Patch>& patches_;
   double dt_;
   const bc_wrench* outside_;
 };

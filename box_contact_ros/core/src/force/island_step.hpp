@@ -19,20 +19,14 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// Most sub-steps, iterations or relaxations: their product is a number of 32 bits.
-constexpr int iterations_max = 1000;
-
-// The ends of so many bodies and blocks are written at a time: some 20 µs of work for a thread.
-constexpr size_t ends_per_chunk = 256;
-
 struct Options {
-  int substeps, iterations, relaxations, threads;
+  int substeps, threads;
   double friction, most_depth;
-  double rest_speed;  // below which an island comes to rest [m/s]; 0: none does
+  bool rest;  // whether islands come to rest
 };
 
 // What an advance begins with, and where its end goes.
-struct Advance {
+struct StepInputs {
   SubSteps steps;
   Given given;
   const bc_motion& motion;
@@ -42,9 +36,9 @@ struct Advance {
 
 class IslandStep {
  public:
-  IslandStep(const Options& options, const std::vector<Body>& bodies, const Advance& step,
-             const BodyStep& body_step, std::vector<Fineness>& fineness,
-             std::vector<Patch>& patches, std::vector<Load>& loads, Islands& islands)
+  IslandStep(const Options& options, const std::vector<Body>& bodies, const StepInputs& step,
+             const BodyStep& body_step, std::vector<Patch>& patches, std::vector<Load>& loads,
+             Islands& islands)
       : options_(options),
         bodies_(bodies),
         step_(step),
@@ -54,23 +48,15 @@ class IslandStep {
         islands_(islands),
         moving_(islands.moving),
         blocks_(islands.blocks),
-        fineness_(fineness),
-        fineness_of_(bodies, step.given.outside, options.most_depth, patches, islands) {}
+        fineness_of_(step.given.outside, options.most_depth, patches, islands) {}
 
   // Advance all islands. Returns the first body whose numbers are not finite at the end, or −1. No bit depends
   // on the number of threads.
   template <class InThreads>
-  int64_t advance(InThreads& in_threads, TeamsPay& teams_pay) const {
+  int64_t solve_all(InThreads& in_threads) const {
     std::vector<Chunk>& chunks = islands_.chunks;
-    for (Chunk& chunk : chunks) {
-      if (chunk.parts() == 0) continue;
-      Team team(int(chunk.parts()));
-      in_threads.together(team.parts(), [&](long part) { advance(chunk, int(part), team); });
-      teams_pay.end(team);
-    }
-    in_threads(options_.threads, long(chunks.size()), [&](long, long k) {
-      if (chunks[size_t(k)].parts() == 0) advance(chunks[size_t(k)]);
-    });
+    in_threads(options_.threads, long(chunks.size()),
+               [&](long, long k) { solve(chunks[size_t(k)]); });
     for (const Chunk& chunk : chunks)
       if (chunk.lost >= 0) return chunk.lost;
     return -1;
@@ -79,9 +65,9 @@ class IslandStep {
   template <class InThreads>
   void write_ends(InThreads& in_threads) const {
     size_t count = std::max(moving_.size(), blocks_.size());
-    in_threads(options_.threads, long((count + ends_per_chunk - 1) / ends_per_chunk),
+    in_threads(options_.threads, long((count + rows_per_chunk - 1) / rows_per_chunk),
                [&](long, long chunk) {
-                 size_t first = size_t(chunk) * ends_per_chunk, last = first + ends_per_chunk;
+                 size_t first = size_t(chunk) * rows_per_chunk, last = first + rows_per_chunk;
                  for (size_t k = first; k < std::min(last, moving_.size()); ++k)
                    body_step_.write_end(moving_[k]);
                  for (size_t k = first; k < std::min(last, blocks_.size()); ++k) end(blocks_[k]);
@@ -89,42 +75,13 @@ class IslandStep {
   }
 
  private:
-  void advance(Chunk& chunk) const {
+  void solve(Chunk& chunk) const {
     for (Island& island : islands_.of(chunk)) begin(island);
     // Those with as many iterations, in sub-steps as fine, are advanced together.
     for (const Island& island : islands_.of(chunk))
-      if (island.factor > 0.0) advance(chunk, island.factor, island.rounds);
+      if (island.factor > 0.0) solve_alike(chunk, island.factor, island.rounds);
     chunk.lost = first_lost(chunk);
   }
-  // The same of a large island, by threads that have a part of it each.
-  void advance(Chunk& chunk, int part, Team& team) const {
-    Island &whole = *islands_.of(chunk).first, *parts = islands_.parts_of(chunk);
-    Island& mine = parts[part];
-    begin_bodies(mine);
-    team.meet(part);
-    begin_blocks(mine, whole.block_end - whole.block);
-    team.meet(part);
-    if (part == 0) {
-      join(parts, team.parts(), whole);
-      choose(whole);
-    }
-    team.meet(part);
-    mine.is_new = whole.is_new;
-    mine.is_uneven = whole.is_uneven;
-    mine.is_shared = true;
-    SubSteps steps = steps_of(whole.factor, whole.rounds);
-    Work work =
-        work_of({&mine, &mine + 1}, steps, islands_.groups_of(chunk), mine.group, mine.group_end);
-    work.team = &team;
-    work.part = part;
-    work.parts = parts;
-    work.whole = &whole;
-    work.turns = islands_.turns_of(chunk);
-    advance_by(*islands_.side(), whole.factor, work);
-    team.meet(part);
-    if (part == 0) chunk.lost = first_lost(chunk);
-  }
-
   // The first body of a chunk whose numbers are not finite at the end, or −1.
   int64_t first_lost(const Chunk& chunk) const {
     for (const Island& island : islands_.of(chunk))
@@ -134,67 +91,52 @@ class IslandStep {
   }
   // Begin an island. One without contacts ends the advance, too.
   void begin(Island& island) const {
-    begin_bodies(island);
+    for (size_t k = island.body; k < island.body_end; ++k) body_step_.begin(moving_[k]);
     island.factor = 0.0;
     if (island.block == island.block_end) {
-      for (size_t k = island.body; k < island.body_end; ++k) body_step_.advance(moving_[k]);
+      for (size_t k = island.body; k < island.body_end; ++k) body_step_.fly(moving_[k]);
       return;
     }
-    begin_blocks(island, island.block_end - island.block);
+    begin_blocks(island);
     choose(island);
   }
-  void begin_bodies(const Island& island) const {
-    each_body(island, [&](size_t k) { body_step_.begin(moving_[k]); });
-  }
-  // Begin the blocks of an island, or of a part of one that has so many.
-  void begin_blocks(Island& island, size_t count) const {
+  void begin_blocks(Island& island) const {
     island.is_new = true;
-    island.is_uneven = false;
     island.fastest = 0.0;
-    island.over_relaxation = step_.steps.is_late ? 1.0 : over_relaxation(count);
+    island.over_relaxation =
+        step_.steps.is_late ? 1.0 : over_relaxation(island.block_end - island.block);
     each(island, [&](Block& block, const Patch& patch, Moving& a, Moving& b) {
-      take(patch, island.over_relaxation, block);
+      read_patch(patch, island.over_relaxation, block);
       island.fastest = std::max(island.fastest, passing_speed(patch, a, b));
       block.normal_sum = block.friction_sum = {};
-      island.is_new = island.is_new && patch.window == 0.0;
-      island.is_uneven = island.is_uneven || is_uneven(a.inverse_mass, b.inverse_mass);
+      island.is_new = island.is_new && patch.kept.window == 0.0;
     });
-  }
-  static void join(const Island* parts, int count, Island& whole) {
-    whole.is_new = true;
-    whole.is_uneven = false;
-    whole.fastest = 0.0;
-    for (const Island* part = parts; part < parts + count; ++part) {
-      whole.is_new = whole.is_new && part->is_new;
-      whole.is_uneven = whole.is_uneven || part->is_uneven;
-      whole.fastest = std::max(whole.fastest, part->fastest);
-    }
   }
   // Choose how fine its sub-steps are, and how many iterations they take.
   void choose(Island& island) const {
-    double swayed = fineness_of_.swayed(island, island.fastest, step_.steps.dt, fineness_);
-    island.rounds = step_.steps.is_late ? 1 : rounds_of(swayed, island.is_uneven);
-    island.factor = step_.own ? fineness_of_(island, step_.steps, fineness_) : 1.0;
+    double swayed = fineness_of_.swayed(island, island.fastest, step_.steps.dt);
+    island.rounds = step_.steps.is_late ? 1 : rounds_of(swayed);
+    island.factor = step_.own ? fineness_of_(island, step_.steps) : 1.0;
   }
   // Advance the islands whose sub-steps are finer by a factor, and that take so many times the iterations.
-  void advance(const Chunk& chunk, double factor, int rounds) const {
+  void solve_alike(const Chunk& chunk, double factor, int rounds) const {
     SubSteps steps = steps_of(factor, rounds);
-    auto advance = [&](Islands::Range range, const detail::ForceKernel& kernel, void* groups,
-                       size_t count) {
-      Work work = work_of(range, steps, groups, 0, count);
-      advance_by(kernel, factor, work);
+    auto solve_range = [&](Islands::Range range, const detail::ForceKernel& kernel, void* groups,
+                           size_t count) {
+      Work work = work_of(range, steps, groups, count);
+      take_sub_steps(kernel, factor, work);
     };
     for (Island& island : islands_.of(chunk))
-      island.is_shared = island.factor == factor && island.rounds == rounds;
-    size_t groups = islands_.share(chunk);
+      island.is_due = island.factor == factor && island.rounds == rounds;
+    size_t groups = islands_.group_blocks(chunk);
     if (groups > 0)
-      advance(islands_.of(chunk), *islands_.side(), islands_.groups_of(chunk), groups);
+      solve_range(islands_.of(chunk), *islands_.side(), islands_.groups_of(chunk), groups);
     for (Island& island : islands_.of(chunk)) {
-      if (!island.is_shared) continue;
+      if (!island.is_due) continue;
       island.factor = 0.0;
       if (groups == 0)
-        advance({&island, &island + 1}, Stages<Block>::kernel, &blocks_[island.block],
-                island.block_end - island.block);
+        solve_range({&island, &island + 1}, Stages<Block>::kernel, &blocks_[island.block],
+                    island.block_end - island.block);
     }
   }
   SubSteps steps_of(double factor, int rounds) const {
@@ -202,67 +144,54 @@ class IslandStep {
     steps.rounds *= rounds;
     return steps;
   }
-  Work work_of(Islands::Range range, const SubSteps& steps, void* groups, size_t group,
-               size_t group_end) const {
+  Work work_of(Islands::Range range, const SubSteps& steps, void* groups, size_t count) const {
     bool counts = step_.motion.wrenches;
-    return {range.first,
-            range.last,
-            bodies_.data(),
-            moving_.data(),
-            blocks_.data(),
-            patches_.data(),
-            groups,
-            group,
-            group_end,
-            steps,
-            options_.iterations,
-            options_.relaxations,
-            counts};
+    return {range.first,     range.last, bodies_.data(), moving_.data(), blocks_.data(),
+            patches_.data(), groups,     count,          steps,          counts};
   }
   template <class Visit>
   void each(const Island& island, const Visit& visit) const {
-    each_block(island, [&](size_t k) {
+    for (size_t k = island.block; k < island.block_end; ++k) {
       Block& block = blocks_[k];
       visit(block, patches_[size_t(block.patch)], moving_[size_t(block.a)],
             moving_[size_t(block.b)]);
-    });
+    }
   }
 
-  void advance_by(const detail::ForceKernel& kernel, double factor, Work& work) const {
+  void take_sub_steps(const detail::ForceKernel& kernel, double factor, Work& work) const {
     auto each_island = [&](const auto& visit) {
       for (const Island* island = work.first; island < work.last; ++island)
-        if (island->is_shared) visit(*island);
+        if (island->is_due) visit(*island);
     };
     auto each_moving = [&](const auto& visit) {
-      each_island(
-          [&](const Island& island) { each_body(island, [&](size_t k) { visit(moving_[k]); }); });
+      each_island([&](const Island& island) {
+        for (size_t k = island.body; k < island.body_end; ++k) visit(moving_[k]);
+      });
     };
     auto end = [&] {
       kernel.end(&work);
       each_island([&](const Island& island) {
         each(island,
-             [](const Block& block, Patch& patch, Moving&, Moving&) { give_back(block, patch); });
+             [](const Block& block, Patch& patch, Moving&, Moving&) { patch.kept = block; });
       });
     };
     // Bodies move side by side where their blocks are solved alone, too.
     const detail::ForceKernel& moves = islands_.side() ? *islands_.side() : Stages<Block>::kernel;
     const SubSteps& steps = work.steps;
     // From one answer to the next.
-    double time = factor > 1.0 ? std::min(parts_of_a_contact * steps.length, steps.dt) : steps.dt;
+    double time =
+        factor > 1.0 ? std::min(sub_steps_per_contact * steps.length, steps.dt) : steps.dt;
     each_island([&](const Island& island) {
       each(island, [&](Block& block, const Patch& patch, Moving& a, Moving& b) {
         close(patch, a, b, time, block);
         if (steps.is_late) block.closing = {};  // rocking is soft
       });
     });
-    work.meet();
     kernel.load(&work);
     for (int number = 1; number <= steps.count; ++number) {
-      if (factor > 1.0 && number > 1 && number % parts_of_a_contact == 1) {
+      if (factor > 1.0 && number > 1 && number % sub_steps_per_contact == 1) {
         end();
-        work.meet();
         each_island([&](const Island& island) { ask_again(island, time); });
-        work.meet();
         kernel.load(&work);
       }
       work.is_last = number == steps.count;
@@ -279,7 +208,7 @@ class IslandStep {
     each(island, [&](Block& block, Patch& patch, Moving& a, Moving& b) {
       step_.own->solve_again(step_.solve_pair, body_step_.pose_of(a), body_step_.pose_of(b),
                              a.placed, b.placed, is_lighter_b(bodies_, patch), patch);
-      take(patch, island.over_relaxation, block);
+      read_patch(patch, island.over_relaxation, block);
       close(patch, a, b, time, block);
     });
   }
@@ -307,14 +236,13 @@ class IslandStep {
   }
   const Options& options_;
   const std::vector<Body>& bodies_;
-  const Advance& step_;
+  const StepInputs& step_;
   const BodyStep& body_step_;
   std::vector<Patch>& patches_;
   std::vector<Load>& loads_;
   Islands& islands_;
   std::vector<Moving>& moving_;
   std::vector<Block>& blocks_;
-  std::vector<Fineness>& fineness_;  // of the bodies
   FinenessOf fineness_of_;
 };
 

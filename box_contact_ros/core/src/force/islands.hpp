@@ -7,51 +7,25 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "../kernel.hpp"
-#include "counting_sort.hpp"
-#include "parts.hpp"
+#include "iterations.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// Blocks that are solved side by side, about: so many fill the lanes of islands of one block each, and a
-// core's second cache has room for them. A thread takes as many at a time: some 100 µs of work.
-constexpr size_t blocks_per_chunk = 128;
-
-// Islands in turn.
+// Islands in order.
 struct Chunk {
   size_t island, island_end;
   size_t block, block_end;
-  size_t part, part_end;  // of a large island, which is alone; else none
   int64_t lost;  // the first body whose numbers are not finite at the end of an advance, or −1
-
-  size_t parts() const { return part_end - part; }
 };
 
-// Memory for a time. A copy has none of it.
-class Scratch {
- public:
-  Scratch() = default;
-  Scratch(const Scratch&) {}
-  Scratch(Scratch&&) = default;
-  Scratch& operator=(const Scratch&) { return *this; }
-
-  void make_room(size_t bytes) {
-    if (bytes <= lines_ * sizeof(Line)) return;
-    size_t lines = bytes / sizeof(Line) + 1;
-    memory_.reset(new Line[lines]);
-    lines_ = lines;
-  }
-  char* at(size_t byte) { return reinterpret_cast<char*>(memory_.get()) + byte; }
-
- private:
-  struct alignas(64) Line {
-    char bytes[64];
-  };
-  std::unique_ptr<Line[]> memory_;
-  size_t lines_ = 0;
+template <class T>
+struct RangeOf {
+  T *first, *last;
+  T* begin() const { return first; }
+  T* end() const { return last; }
 };
 
 class Islands {
@@ -75,13 +49,13 @@ class Islands {
     by_height.reserve(patches);
     chunks.reserve(bodies);
     rooms_.reserve(patches + bodies);
-    parts_.make_room(bodies, patches);
-    if (side_) groups_.make_room(2 * patches / size_t(side_->lanes) * side_->group_size);
+    if (side_)
+      groups_.resize(2 * patches / size_t(side_->lanes) * side_->group_size / sizeof(Line) + 1);
   }
 
-  // awake: the bodies in islands, in turn. Large islands are cut into parts, for up to so many threads.
+  // awake: the bodies in islands, in order.
   void group(const std::vector<Body>& bodies, const std::vector<int32_t>& awake,
-             const std::vector<Patch>& patches, const bc_pose* poses, size_t threads) {
+             const std::vector<Patch>& patches) {
     by_height.resize(patches.size());
     number(bodies, awake, patches);
     bodies_.sort(awake.size(), all.size(), [&](size_t k) { return island_[size_t(awake[k])]; });
@@ -107,45 +81,36 @@ class Islands {
       here.body_end = moving.size();
       here.block_end = count;
     }
-    threads_ = threads;
-    cut(poses);
+    cut();
     rooms_.resize(blocks.size() + chunks.size());
   }
 
   // The islands of a chunk.
-  struct Range {
-    Island *first, *last;
-    Island* begin() const { return first; }
-    Island* end() const { return last; }
-  };
+  using Range = RangeOf<Island>;
   Range of(const Chunk& chunk) {
     return {all.data() + chunk.island, all.data() + chunk.island_end};
   }
 
-  size_t threads() const { return threads_; }
   const detail::ForceKernel* side() const { return side_; }
   // Memory for groups of a chunk.
   void* groups_of(const Chunk& chunk) {
-    return groups_.at(first_group(chunk.block) * side_->group_size);
+    return groups_[0].bytes + first_group(chunk.block) * side_->group_size;
   }
-  // The parts of the island of a chunk, and the turns of its groups.
-  Island* parts_of(const Chunk& chunk) { return &parts_.all[chunk.part]; }
-  const GroupTurn* turns_of(const Chunk& chunk) { return &parts_.turns[first_group(chunk.block)]; }
 
-  // Put the blocks of the islands of a chunk that are shared into groups, whose lanes are solved side by
-  // side. In turn, each goes into the first group with room behind those of its bodies. So bodies see
+  // Put the blocks of the islands of a chunk that are due into groups, whose lanes are solved side by
+  // side. In order, each goes into the first group with room behind those of its bodies. So bodies see
   // their blocks in the order of pairs, and no group has a body twice. Returns the number of groups; 0:
   // about half of the lanes would be empty, and each island is better solved alone.
-  size_t share(const Chunk& chunk) {
+  size_t group_blocks(const Chunk& chunk) {
     if (!side_) return 0;
     Room* rooms = rooms_.data() + chunk.block + size_t(&chunk - chunks.data());
-    int32_t lanes = side_->lanes, count = 0, blocks_shared = 0;
+    int32_t lanes = side_->lanes, count = 0, blocks_due = 0;
     for (int32_t k = 0; k <= int32_t(chunk.block_end - chunk.block); ++k) rooms[k] = {k, 0};
     for (size_t island = chunk.island; island < chunk.island_end; ++island) {
       const Island& here = all[island];
-      if (!here.is_shared) continue;
+      if (!here.is_due) continue;
       for (size_t k = here.body; k < here.body_end; ++k) moving[k].side = 0;
-      blocks_shared += int32_t(here.block_end - here.block);
+      blocks_due += int32_t(here.block_end - here.block);
       for (size_t k = here.block; k < here.block_end; ++k) {
         Moving &a = moving[size_t(blocks[k].a)], &b = moving[size_t(blocks[k].b)];
         int32_t group = first_room(rooms, std::max(a.side, b.side));
@@ -157,7 +122,7 @@ class Islands {
         count = std::max(count, group + 1);
       }
     }
-    return 2 * blocks_shared >= count * (lanes + 1) ? size_t(count) : 0;
+    return 2 * blocks_due >= count * (lanes + 1) ? size_t(count) : 0;
   }
 
  private:
@@ -165,37 +130,25 @@ class Islands {
   struct Room {
     int32_t next, filled;
   };
+  static int32_t first_room(Room* rooms, int32_t group) {
+    while (rooms[group].next != group) group = rooms[group].next = rooms[rooms[group].next].next;
+    return group;
+  }
 
-  void cut(const bc_pose* poses) {
+  void cut() {
     chunks.clear();
-    parts_.begin(moving.size(), blocks.size());
     for (size_t island = 0; island < all.size();) {
       size_t first = island;
-      if (is_large(all[island])) {
-        size_t part = parts_.all.size();
-        if (parts_.cut(all[island], threads_, poses, side_->lanes, first_group(all[island].block),
-                       moving, blocks)) {
-          chunks.push_back({island, island + 1, all[island].block, all[island].block_end, part,
-                            parts_.all.size(), -1});
-          ++island;
-          continue;
-        }
-      }
       // A body alone is some work, too.
       auto size = [&] { return all[island].block_end - all[first].block + (island - first); };
       do ++island;
-      while (island < all.size() && size() <= blocks_per_chunk && !is_large(all[island]));
-      chunks.push_back({first, island, all[first].block, all[island - 1].block_end, 0, 0, -1});
+      while (island < all.size() && size() <= blocks_per_chunk);
+      chunks.push_back({first, island, all[first].block, all[island - 1].block_end, -1});
     }
   }
 
   // Groups of blocks from this one on begin here.
   size_t first_group(size_t block) const { return 2 * block / size_t(side_->lanes); }
-  bool is_large(const Island& island) const {
-    size_t count = island.block_end - island.block;
-    return side_ && threads_ > 1 && count >= 2 * blocks_per_part &&
-           count * threads_ > blocks.size();
-  }
 
   int32_t root_of(int32_t body) {
     while (root_[size_t(body)] != body)
@@ -236,14 +189,9 @@ class Islands {
     return place_[size_t(body)];
   }
 
-  // Things in the order of their islands.
+  // Places of things in the order of their islands; those of an island stay in order (counting sort).
   class Sorted {
    public:
-    struct Range {
-      const int32_t *first, *last;
-      const int32_t* begin() const { return first; }
-      const int32_t* end() const { return last; }
-    };
     void make_room(size_t islands, size_t count) {
       starts_.reserve(islands + 1);
       order_.reserve(count);
@@ -251,9 +199,13 @@ class Islands {
     template <class IslandOf>
     void sort(size_t count, size_t islands, IslandOf island_of) {
       order_.resize(count);
-      counting_sort(count, islands, island_of, starts_, order_.data());
+      starts_.assign(islands + 1, 0);
+      for (size_t k = 0; k < count; ++k) ++starts_[size_t(island_of(k))];
+      int32_t sum = 0;
+      for (int32_t& start : starts_) start = sum += start;
+      for (size_t k = count; k-- > 0;) order_[size_t(--starts_[size_t(island_of(k))])] = int32_t(k);
     }
-    Range of(size_t island) const {
+    RangeOf<const int32_t> of(size_t island) const {
       return {order_.data() + starts_[island], order_.data() + starts_[island + 1]};
     }
 
@@ -266,9 +218,10 @@ class Islands {
   Sorted bodies_, patches_;
   const detail::ForceKernel* side_;
   std::vector<Room> rooms_;  // of the groups of each chunk, and one behind them
-  Scratch groups_;
-  size_t threads_ = 1;  // for parts of islands
-  Parts parts_;
+  struct alignas(64) Line {
+    char bytes[64];
+  };
+  std::vector<Line> groups_;  // memory for them
 };
 
 }  // namespace box_contact::BOX_CONTACT_SET::force

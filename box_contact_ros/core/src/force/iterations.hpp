@@ -1,7 +1,7 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// Iterations: the blocks of islands are solved in turn, and what presses in an impact is scaled.
+// Iterations: the blocks of islands are solved in order, and what presses in an impact is scaled.
 #pragma once
 
 #include <algorithm>
@@ -11,71 +11,22 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// A smaller change of a patch's speeds [m/s] does not make its neighbours be solved again. A jittered tower of
-// 20 sways for 3 s at 4 ms; with 1e-6 it sways for 8 s.
-constexpr double least_change = 1e-8;
-
-// An impact goes on being solved while an iteration changes a closing speed by more than this [m/s], and by
-// more than this share of its island's largest [1]. It ends after so many iterations. What is left of a
-// closing speed comes back as an overlap that is pushed out.
-constexpr double impact_change = 0.01;
-constexpr double impact_share = 0.2;
-constexpr int impact_iterations = 40;
-constexpr int uneven_impact_iterations = 100;  // with 40, 24 t on four timbers rest a sixth deeper
-// In an island that had patches before, the change must also exceed this acceleration times the sub-step
-// [m/s²]. In 1/240 s, the loads of what rolls in a pile change by 0.01 m/s all the time, and are no impact. A
-// pile of 1,000 at 1/60 s takes a third of the time that it takes with 0, and timbers below 24 t rest earlier.
-constexpr double impact_acceleration = 40.0;
 // With late answers no change of a closing speed is an impact [m/s]. Their patches are soft, and slow what
-// closes over several steps. If it were solved at once, 100 on 1 would never rest.
+// closes over several steps.
 constexpr double no_impact = std::numeric_limits<double>::infinity();
-// After every so many of them, all that presses in the island is scaled. A factor between the inverse of the
-// least one and the least one is too near to 1.
-constexpr int scaled_every = 8;
-constexpr double least_factor = 2.0;
-// Parts of an island agree after so many iterations whether they go on: else they wait for each other less.
-constexpr int agreed_every = 4;
-static_assert(scaled_every % agreed_every == 0);
 
-// Pressing and rocking are over-relaxed: their impulses change by more than what solves a block alone, by up
-// to this factor (successive over-relaxation, Young, 1954) [1]. The sway of stacks dies away in half of the
-// steps. With 1.4 a real pallet, whose flush sides come and go by nanometres, sways for ever. Late patches are
-// soft, and not over-relaxed.
-constexpr double most_over_relaxation = 1.3;
-
-// The factor in an island of so many blocks: one alone is solved at once [1].
+// The factor of over-relaxation in an island of so many blocks: one alone is solved at once [1].
 inline double over_relaxation(size_t blocks) {
   return 1.0 + (most_over_relaxation - 1.0) * (1.0 - 1.0 / double(blocks));
 }
 
-// In some islands impulses take more iterations to agree. They have so many times as many, but not with late
-// answers, whose patches are soft:
-constexpr int more_rounds = 3;
-// - Where bodies touch whose masses differ by this factor or more [1]. At 1/60 s, 24 t that fall on four
-//   timbers press 55 mm into them; without it, 64 mm.
-constexpr double uneven_masses = 10.0;
-inline bool is_uneven(double inverse_mass_a, double inverse_mass_b) {
-  double least = min(inverse_mass_a, inverse_mass_b), most = max(inverse_mass_a, inverse_mass_b);
-  return least > 0.0 && most >= uneven_masses * least;
-}
-// - Where stacks sway: the fastest of the bodies that touch pass each other at a speed in this range [m/s].
-//   Slower, they rest; faster, they fall or slide. Of 60 landings of real pallets of like masses, at 1/60 s and
-//   at 4 ms, all rest within 6 s; without it, 18 still move. What does not sway yet begins at a higher speed.
-//   Fewer iterations end at impulses that differ a little: where sway ends at 1e-5 m/s, 15 still move.
-//   A flush wall that begins is pushed out, which these iterations do not speed up: they are a third of its
-//   first second's work. But by a rule that spares it, 42 of 162 scenes and timings rest later.
-constexpr double least_sway = 1e-7, begun_sway = 1e-4, most_sway = 0.1;
+// Where stacks sway, impulses take more iterations to agree. Slower, they rest; faster, they fall or slide.
 inline bool is_sway(double speed, bool has_swayed) {
   return speed > (has_swayed ? least_sway : begun_sway) && speed < most_sway;
 }
-// A stack takes `more_rounds` times as many at first, and as many more after each such time of sway [s], up to
-// `most_rounds` times. With no more than at first, six of six landings of a real order of 19 boxes sway for
-// ever at 1/60 s.
-constexpr double sway_time = 0.5;
-constexpr int most_rounds = 12;
 // How many times as many iterations an island takes that has swayed for a time [s]; 0: it does not sway.
-inline int rounds_of(double swayed, bool is_uneven) {
-  if (swayed == 0.0) return is_uneven ? more_rounds : 1;
+inline int rounds_of(double swayed) {
+  if (swayed == 0.0) return 1;
   constexpr int most_times = most_rounds / more_rounds;
   return more_rounds * int(min(1.0 + swayed / sway_time, double(most_times)));
 }
@@ -88,38 +39,22 @@ inline double passing_speed(const Patch& patch, const Moving& a, const Moving& b
   return length(speed(b) - speed(a) + patch.surface) + reach * length(b.angular - a.angular);
 }
 
-// An island, or a part of one.
 struct Island {
   size_t body, body_end;  // among those that move
   size_t block, block_end;
-  const int32_t *bodies, *blocks;  // of a part: their places, of which these are some; else null
-  size_t group, group_end;         // of a part: those of its blocks
-  double over_relaxation;          // see above
-  double fastest;  // as which its bodies pass each other at the start of an advance [m/s]
-  bool is_new;     // whether it had no patch before this advance
-  bool is_uneven;  // whether bodies touch whose masses are
-  int rounds;      // how many times as many iterations it takes
-  double factor;   // by which its sub-steps are finer; 0: its advance is over
-  bool is_shared;  // whether it is advanced with others
-  double impact;   // a larger change of a closing speed is an impact [m/s]
-  bool is_struck;  // whether the last iteration changed a closing speed as in an impact
+  double over_relaxation;  // see above
+  double fastest;          // as which its bodies pass each other at the start of an advance [m/s]
+  bool is_new;             // whether it had no patch before this advance
+  int rounds;              // how many times as many iterations it takes
+  double factor;           // by which its sub-steps are finer; 0: its advance is over
+  bool is_due;             // whether it is among those that are solved now
+  double impact;           // a larger change of a closing speed is an impact [m/s]
+  bool is_struck;          // whether the last iteration changed a closing speed as in an impact
 };
-
-// Visit the places of its bodies, or of its blocks.
-template <class Visit>
-void each_body(const Island& island, const Visit& visit) {
-  for (size_t k = island.body; k < island.body_end; ++k)
-    visit(island.bodies ? size_t(island.bodies[k]) : k);
-}
-template <class Visit>
-void each_block(const Island& island, const Visit& visit) {
-  for (size_t k = island.block; k < island.block_end; ++k)
-    visit(island.blocks ? size_t(island.blocks[k]) : k);
-}
 
 // Before iterations begin, no speed has changed.
 inline void forget_changes(const Island& island, Moving* moving) {
-  each_body(island, [&](size_t k) { moving[k].changed = 0; });
+  for (size_t k = island.body; k < island.body_end; ++k) moving[k].last_change = 0;
 }
 
 // A larger change of a closing speed is an impact in a sub-step of this length [m/s].
@@ -158,25 +93,24 @@ inline void scale(const Island& island, bool is_pushing, int iteration, Moving* 
     block.normal_impulses = factor * block.normal_impulses;
     apply_normal(block, block.normal_impulses, a, b);
     if (factor == 1.0) return;
-    if (a.inverse_mass > 0.0) a.changed = iteration;
-    if (b.inverse_mass > 0.0) b.changed = iteration;
+    if (a.inverse_mass > 0.0) a.last_change = iteration;
+    if (b.inverse_mass > 0.0) b.last_change = iteration;
   });
 }
 
-// Solve the blocks of islands in turn, so many times, each island as if alone. Beyond them only impacts
-// go on. Changes were forgotten. `solve(iteration, is_beyond)`: a turn of all; returns whether a speed
+// Solve the blocks of islands in order, `count` times, each island as if alone. Beyond them only impacts
+// go on. Changes were forgotten. `solve(iteration, is_beyond)`: all of them; returns whether a speed
 // changed, and beyond, whether one did as in an impact. `scale(island, iteration)`: see above.
 template <class Solve, class Scale>
-void iterate(Island* first, Island* last, int iterations, Moving* moving, const Solve& solve,
+void iterate(Island* first, Island* last, int count, Moving* moving, const Solve& solve,
              const Scale& scale) {
   for (int iteration = 1;; ++iteration) {
     for (Island* island = first; island < last; ++island) island->is_struck = false;
-    if (!solve(iteration, iteration > 1 && iteration >= iterations)) return;
-    bool goes_on = iteration < iterations;
+    if (!solve(iteration, iteration > 1 && iteration >= count)) return;
+    bool goes_on = iteration < count;
     for (Island* island = first; island < last; ++island) {
-      int most = island->is_uneven ? uneven_impact_iterations : impact_iterations;
-      if (!island->is_struck || iteration >= most) {
-        if (iteration >= iterations) forget_changes(*island, moving);  // it is not solved again
+      if (!island->is_struck || iteration >= impact_iterations) {
+        if (iteration >= count) forget_changes(*island, moving);  // it is not solved again
         continue;
       }
       if (iteration % scaled_every == 0) scale(*island, iteration);

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "pads.hpp"
+#include "../faces/pads.hpp"
 #include "patch.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {

@@ -6,8 +6,7 @@
 
 #include "iterations.hpp"
 #include "preparing.hpp"
-#include "team.hpp"
-#include "turning.hpp"
+#include "rotation.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
@@ -20,39 +19,28 @@ struct Work {
   Block* blocks;
   const Patch* patches;
   void* groups;
-  size_t group, group_end;
+  size_t group_count;
   const SubSteps& steps;
-  int iterations, relaxations;
   bool counts;           // whether impulses are added up
   bool is_last = false;  // whether it is the last sub-step
-  // Of a part of an island, which is `first`; else null.
-  Team* team = nullptr;
-  int part = 0;
-  const Island *parts = nullptr, *whole = nullptr;
-  const GroupTurn* turns = nullptr;
-
-  // Wait until all parts are here. Returns all bits that they bring.
-  unsigned meet(unsigned bits = 0) const { return team ? team->meet(part, bits) : bits; }
 };
 
-// By how much B has turned more than A since the answer.
-inline Vec<double> turned_since(const Patch& patch, const Moving& a, const Moving& b) {
-  return turn(patch.asked_b, b.placed) - turn(patch.asked_a, a.placed);
+// By how much B has rotated more than A since the answer.
+inline Vec<double> rotation_since(const Patch& patch, const Moving& a, const Moving& b) {
+  return rotation(patch.asked_b, b.placed) - rotation(patch.asked_a, a.placed);
 }
 
-// A turn of all blocks.
-struct Turn {
+// An iteration over all blocks.
+struct Iteration {
   bool is_pushing;
-  int iteration;
+  int number;
   bool is_beyond;  // whether only impacts go on
 };
 
 inline void prepare(const Work& work, Block& block) {
   Moving &a = work.moving[block.a], &b = work.moving[block.b];
-  auto turned = [&] { return turned_since(work.patches[block.patch], a, b); };
-  prepare<double>(work.steps, a, b, a, b, turned, block);
-  Island& island = *work.first;
-  island.impact = max(island.impact, impact_share * closing_speed<double>(block, a, b));
+  auto rotated = [&] { return rotation_since(work.patches[block.patch], a, b); };
+  prepare<double>(work.steps, a, b, a, b, rotated, block);
 }
 inline void warm_start(const Work& work, Block& block) {
   warm_start<double>(work.steps, block, work.moving[block.a], work.moving[block.b]);
@@ -61,17 +49,17 @@ inline void follow(const Work& work, Block& block) {
   const Moving &a = work.moving[block.a], &b = work.moving[block.b];
   follow<double>(a, b, a, b, work.steps.length, block);
 }
-// Solve it if its bodies have changed since its last turn. Returns whether a speed changed.
-inline bool solve(const Work& work, const Turn& turn, Block& block) {
+// Solve it if its bodies have changed since it was solved last. Returns whether a speed changed.
+inline bool solve(const Work& work, const Iteration& at, Block& block) {
   Moving &a = work.moving[block.a], &b = work.moving[block.b];
   Island& island = *work.first;
-  if (max(a.changed, b.changed) < turn.iteration - 1) return false;
-  double closing = solve_normal<double>(block, rows_of(block, turn.is_pushing), true, a, b);
+  if (max(a.last_change, b.last_change) < at.number - 1) return false;
+  double closing = solve_normal<double>(block, rows_of(block, at.is_pushing), true, a, b);
   double slipping = solve_friction<double>(block, true, a, b);  // bounded by what presses now
   if (closing > island.impact) island.is_struck = true;
-  if (max(closing, slipping) <= (turn.is_beyond ? island.impact : least_change)) return false;
-  if (a.inverse_mass > 0.0) a.changed = turn.iteration;
-  if (b.inverse_mass > 0.0) b.changed = turn.iteration;
+  if (max(closing, slipping) <= (at.is_beyond ? island.impact : least_change)) return false;
+  if (a.inverse_mass > 0.0) a.last_change = at.number;
+  if (b.inverse_mass > 0.0) b.last_change = at.number;
   return true;
 }
 inline void move(const Work& work, Moving& moving) {

@@ -32,7 +32,6 @@ class OwnContacts {
   }
   void forget() {
     keys_.clear();
-    is_new_.clear();
     is_any_new_ = false;
     resize(0);
   }
@@ -42,40 +41,39 @@ class OwnContacts {
     live_.reserve(count());
     rows_.reserve(count());
     placed_.reserve(2 * count());
-    near_.reserve(count());
   }
 
   // Whether these pairs are those of the last question, with the same columns.
-  bool is_asked(const bc_patches& pairs) const {
-    auto is_same = [](const double* column, bool is_given, const std::vector<double>& held) {
-      return column ? is_given && std::equal(held.begin(), held.end(), column) : !is_given;
+  bool is_asked(const bc_patches& pairs, double friction) const {
+    auto is_same = [](const double* column, const std::vector<double>& last, double otherwise) {
+      return column ? std::equal(last.begin(), last.end(), column)
+                    : std::count(last.begin(), last.end(), otherwise) == long(last.size());
     };
     return pairs.count > 0 && size_t(pairs.count) == count() && pairs.pairs &&
            std::equal(asked_.pairs.begin(), asked_.pairs.end(), pairs.pairs) &&
-           is_same(pairs.friction, is_given_.friction, asked_.friction) &&
-           is_same(pairs.surface, is_given_.surface, asked_.surface) &&
-           is_same(pairs.stiffness, is_given_.stiffness, asked_.stiffness);
+           is_same(pairs.friction, asked_.friction, friction) &&
+           is_same(pairs.surface, asked_.surface, 0.0) &&
+           is_same(pairs.stiffness, asked_.stiffness, 0.0);
   }
-  // Take the pairs of a question. Where bodies rest, a pair is new until it was solved once, unless
-  // `is_known(pair)` says that its patch rests. Returns false, and takes none, if a pair comes twice.
+  // Take the pairs of a question. Where bodies sleep, a pair is new until it was solved once, unless
+  // `is_known(pair)` says that its patch sleeps. Returns false, and takes none, if a pair comes twice.
   template <class IsKnown>
-  bool ask(const bc_patches& asked, double friction, bool is_any_at_rest, const IsKnown& is_known) {
+  bool ask(const bc_patches& asked, double friction, bool is_any_asleep, const IsKnown& is_known) {
     auto n = size_t(asked.count);
     next_keys_.clear();
     for (size_t k = 0; k < n; ++k) {
       auto a = int32_t(asked.pairs[2 * k]), b = int32_t(asked.pairs[2 * k + 1]);
-      next_keys_.push_back({std::minmax(a, b), k});
+      next_keys_.push_back({std::minmax(a, b), k, false});
     }
     if (!std::is_sorted(next_keys_.begin(), next_keys_.end()))
       std::sort(next_keys_.begin(), next_keys_.end());
     auto same = [](const Key& p, const Key& q) { return p.pair == q.pair; };
     if (std::adjacent_find(next_keys_.begin(), next_keys_.end(), same) != next_keys_.end())
       return false;
-    note_new(is_any_at_rest, is_known);
+    note_new(is_any_asleep, is_known);
     resize(n);
     keys_.swap(next_keys_);
     std::copy_n(asked.pairs, 2 * n, asked_.pairs.begin());
-    is_given_ = {asked.friction != nullptr, asked.surface != nullptr, asked.stiffness != nullptr};
     auto copy = [](const double* from, std::vector<double>& to, double otherwise) {
       if (from)
         std::copy_n(from, to.size(), to.begin());
@@ -89,7 +87,7 @@ class OwnContacts {
   }
   // Whether the pair of a patch is asked for, with the numbers of the patch.
   bool is_asked(const Patch& patch) const {
-    auto key = std::lower_bound(keys_.begin(), keys_.end(), Key{patch.pair(), 0});
+    auto key = std::lower_bound(keys_.begin(), keys_.end(), Key{patch.pair(), 0, false});
     if (key == keys_.end() || key->pair != patch.pair()) return false;
     size_t k = key->row;
     double sign = asked_.pairs[2 * k] < asked_.pairs[2 * k + 1] ? 1.0 : -1.0;
@@ -98,10 +96,13 @@ class OwnContacts {
            dot(other, other) == 0.0;
   }
 
-  // Choose which pairs are solved: all but those of which `is_quiet(box)` says that both boxes stay.
+  // Choose which pairs are solved: all but those of which `is_quiet(box)` says that both boxes stay. The
+  // revision of what sleeps tells whether they are chosen already.
   template <class IsQuiet>
-  void choose(bool is_any_at_rest, const IsQuiet& is_quiet) {
-    is_all_ = !is_any_at_rest;
+  void choose(int64_t revision, bool is_any_asleep, const IsQuiet& is_quiet) {
+    if (chosen_for_ == revision) return;
+    chosen_for_ = revision;
+    is_all_ = !is_any_asleep;
     if (is_all_) return;
     rows_.clear();
     placed_.clear();
@@ -110,7 +111,7 @@ class OwnContacts {
     for (const Key& key : keys_) {
       size_t k = key.row;
       auto a = size_t(asked_.pairs[2 * k]), b = size_t(asked_.pairs[2 * k + 1]);
-      if (!is_new_[k] && is_quiet(a) && is_quiet(b)) continue;
+      if (!key.is_new && is_quiet(a) && is_quiet(b)) continue;
       rows_.push_back(k);
       live_.add(asked_, k);
       for (size_t box : {a, b}) {
@@ -119,19 +120,19 @@ class OwnContacts {
       }
     }
   }
-  // All pairs were solved once. Returns whether some were new.
-  bool settle() {
-    if (!is_any_new_) return false;
-    std::fill(is_new_.begin(), is_new_.end(), uint8_t(0));
+  // All pairs were solved once.
+  void settle() {
+    if (!is_any_new_) return;
+    for (Key& key : keys_) key.is_new = false;
     is_any_new_ = false;
-    return true;
+    chosen_for_ = none_chosen;
   }
 
   // Solve the chosen pairs with the bodies at `poses`. `solve(rows, count, results)` answers rows, and returns
   // the first that is refused, or −1; so does this. A pair that is apart, but near by `gaps`,
   // gets the patch that it has once it touches, and keeps its separation above zero.
   template <class Solve>
-  long solve(const bc_pose* poses, const Gaps& gaps, const Solve& solve) {
+  long solve(const bc_pose* poses, const Gaps& gaps, const Solve& solve, SolvePair solve_pair) {
     auto place = [&](size_t box) {
       poses_[box] = in_common_frame(poses[boxes_[box].body], boxes_[box].box.pose);
     };
@@ -145,7 +146,7 @@ class OwnContacts {
     auto* sizes = reinterpret_cast<const double*>(sizes_.data());
     detail::Rows rows{numbers, numbers, sizes, sizes, 3, 3, live.pairs.data(), long(boxes_.size())};
     long refused = solve(rows, long(live.count()), found_.results(farthest(gaps)));
-    if (refused < 0) refused = solve_near(gaps, solve);
+    if (refused < 0) refused = solve_near(gaps, solve_pair);
     return refused < 0 || is_all_ ? refused : long(rows_[size_t(refused)]);
   }
   // Solve the pair of a patch anew, with its bodies at other places. A pair that is apart now keeps its
@@ -167,8 +168,8 @@ class OwnContacts {
     if (placed.has_area()) patch = placed;
   }
 
-  // The row of an answer that comes in turn by pair.
-  size_t row(size_t turn) const { return is_all_ ? keys_[turn].row : turn; }
+  // The row of an answer at a place by pair.
+  size_t row(size_t place) const { return is_all_ ? keys_[place].row : place; }
   // What was solved last.
   bc_patches answer() const {
     const Pairs& live = chosen();
@@ -192,6 +193,7 @@ class OwnContacts {
   struct Key {
     BoxPair pair;
     size_t row;
+    bool is_new;  // not solved yet, where something slept when it was asked for
     bool operator<(const Key& other) const { return pair < other.pair; }
   };
   struct Pairs {
@@ -230,46 +232,18 @@ class OwnContacts {
       return {nullptr,       separation.data(), normal.data(), point.data(),
               volume.data(), covariance.data(), nullptr,       margin};
     }
-    // Take the patch of another row; the separation stays.
-    void take_patch(size_t row, const Columns& other, size_t from) {
-      volume[row] = other.volume[from];
-      std::copy_n(&other.normal[3 * from], 3, &normal[3 * row]);
-      std::copy_n(&other.point[3 * from], 3, &point[3 * row]);
-      std::copy_n(&other.covariance[9 * from], 9, &covariance[9 * row]);
+    // Set the patch to that of a contact; the separation stays.
+    void set_patch(size_t row, const bc_contact& contact) {
+      volume[row] = contact.volume;
+      std::copy_n(contact.normal, 3, &normal[3 * row]);
+      std::copy_n(contact.point, 3, &point[3 * row]);
+      std::copy_n(contact.covariance[0], 9, &covariance[9 * row]);
     }
   };
-  // Pairs that are a little apart, moved together along the normal.
-  struct Near {
-    std::vector<size_t> row;
-    std::vector<bc_pose> pose_a, pose_b;
-    std::vector<bc_size> size_a, size_b;
-    Columns found;
-
-    void reserve(size_t n) {
-      row.reserve(n);
-      for (auto* poses : {&pose_a, &pose_b}) poses->reserve(n);
-      for (auto* sizes : {&size_a, &size_b}) sizes->reserve(n);
-      found.resize(n);
-    }
-    void clear() {
-      row.clear();
-      for (auto* poses : {&pose_a, &pose_b}) poses->clear();
-      for (auto* sizes : {&size_a, &size_b}) sizes->clear();
-    }
-    void add(size_t k, const bc_pose& a, bc_pose b, const bc_size& of_a, const bc_size& of_b,
-             const Vec<double>& way) {
-      for (int i = 0; i < 3; ++i) b.position[i] += way[i];
-      row.push_back(k);
-      pose_a.push_back(a);
-      pose_b.push_back(b);
-      size_a.push_back(of_a);
-      size_b.push_back(of_b);
-    }
-  };
-
   void resize(size_t n) {
     asked_.resize(n);
     is_all_ = true;
+    chosen_for_ = none_chosen;
     found_.resize(n);
     make_room();
   }
@@ -283,46 +257,34 @@ class OwnContacts {
   }
   // Note which of the next keys are not among the last ones, or are new there.
   template <class IsKnown>
-  void note_new(bool is_any_at_rest, const IsKnown& is_known) {
-    next_is_new_.assign(next_keys_.size(), 0);
+  void note_new(bool is_any_asleep, const IsKnown& is_known) {
     is_any_new_ = false;
     auto last = keys_.begin();
-    for (const Key& key : next_keys_) {
-      if (!is_any_at_rest) break;
+    for (Key& key : next_keys_) {
+      if (!is_any_asleep) break;
       while (last != keys_.end() && last->pair < key.pair) ++last;
-      bool was_asked = last != keys_.end() && last->pair == key.pair && !is_new_[last->row];
-      next_is_new_[key.row] = !was_asked && !is_known(key.pair);
-      is_any_new_ = is_any_new_ || next_is_new_[key.row];
+      bool was_asked = last != keys_.end() && last->pair == key.pair && !last->is_new;
+      key.is_new = !was_asked && !is_known(key.pair);
+      is_any_new_ = is_any_new_ || key.is_new;
     }
-    is_new_.swap(next_is_new_);
   }
-  template <class Solve>
-  long solve_near(const Gaps& gaps, const Solve& solve) {
-    near_.clear();
+  // Give pairs that are apart, but near, the patches that they have once moved together along the normal.
+  long solve_near(const Gaps& gaps, SolvePair solve) {
     const Pairs& live = chosen();
     for (size_t k = 0; k < live.count(); ++k) {
       double apart = found_.separation[k];
       Vec<double> normal = vector_at(&found_.normal[3 * k]);
       if (!(apart > 0.0) || normal[0] != normal[0]) continue;  // in contact, or beyond the farthest
       auto a = size_t(live.pairs[2 * k]), b = size_t(live.pairs[2 * k + 1]);
-      if (gaps.is_near(int32_t(a), int32_t(b), normal, apart))
-        near_.add(k, poses_[a], poses_[b], sizes_[a], sizes_[b], -apart * normal);
+      if (!gaps.is_near(int32_t(a), int32_t(b), normal, apart)) continue;
+      bc_pose moved = poses_[b];
+      for (int i = 0; i < 3; ++i) moved.position[i] -= apart * normal[i];
+      bc_contact found;
+      detail::PairNumbers pair{poses_[a].position, moved.position, sizes_[a].extent,
+                               sizes_[b].extent};
+      if (!solve(pair, found)) return long(k);
+      if (found.volume > 0.0) found_.set_patch(k, found);
     }
-    if (near_.row.empty()) return -1;
-    auto numbers = [](const auto& rows) { return reinterpret_cast<const double*>(rows.data()); };
-    auto n = long(near_.row.size());
-    detail::Rows rows{numbers(near_.pose_a),
-                      numbers(near_.pose_b),
-                      numbers(near_.size_a),
-                      numbers(near_.size_b),
-                      3,
-                      3,
-                      nullptr,
-                      n};
-    long refused = solve(rows, n, near_.found.results(0.0));
-    if (refused >= 0) return long(near_.row[size_t(refused)]);
-    for (size_t i = 0; i < near_.row.size(); ++i)
-      if (near_.found.volume[i] > 0.0) found_.take_patch(near_.row[i], near_.found, i);
     return -1;
   }
 
@@ -330,19 +292,16 @@ class OwnContacts {
   std::vector<bc_size> sizes_;  // of the boxes
   std::vector<bc_pose> poses_;  // of the boxes, in the common frame
   Pairs asked_;
-  struct {
-    bool friction, surface, stiffness;
-  } is_given_{};  // which columns of them were, and do not have the number that stands for none
-  std::vector<uint8_t> is_new_, next_is_new_;  // of them
   bool is_any_new_ = false;
   // Those that are solved, by pair, unless all are.
+  static constexpr int64_t none_chosen = -1;
+  int64_t chosen_for_ = none_chosen;
   bool is_all_ = true;
   Pairs live_;
   std::vector<size_t> rows_;    // theirs among those that are asked for
   std::vector<size_t> placed_;  // their boxes
   std::vector<uint8_t> is_placed_;
   Columns found_;
-  Near near_;
   std::vector<Key> keys_, next_keys_;  // by pair
 };
 

@@ -12,13 +12,20 @@
 #include <vector>
 
 #include "../../include/box_contact/force.h"
-#include "faces.hpp"
+#include "../faces/face_patch.hpp"
+#include "rectangle.hpp"
 #include "rigid_body.hpp"
+#include "tuning.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// A patch that is at least so wide as a part of its faces stops a turn by itself [1].
-constexpr double wide = 0.5;
+using namespace faces;
+
+inline Span span_along(const Face& face, const Vec<double>& axis) {
+  double middle = dot(face.centre, axis);
+  double half = std::fabs(dot(face.half_1, axis)) + std::fabs(dot(face.half_2, axis));
+  return {middle - half, middle + half};
+}
 
 // The faces by which two boxes meet, from the point of their patch: how far both reach along its axes. Where
 // it is narrow, also the gap between them, gap + slope · place.
@@ -37,8 +44,16 @@ struct FacePair {
 // The boxes of a pair, the lower first.
 using BoxPair = std::pair<int32_t, int32_t>;
 
-// The patch of a pair, where it was asked for, and the impulses that its rows gave in the last window:
-// in the last step, and before it if that was short.
+// The impulses that a patch gave in its last window: in the last step, and before it if that was short.
+template <class T>
+struct Kept {
+  T window;                                  // [s]
+  T normal_impulse, torsion_impulse;         // N [N s], m [N m s]
+  Vec<T> friction_impulse, rocking_impulse;  // f [N s], τ [N m s]
+  Vec<T> impulse_arm;                        // from A's centre of mass to where they acted [m]
+};
+
+// The patch of a pair, where it was asked for, and what it gave.
 struct Patch {
   int32_t box_a, box_b;  // box_a < box_b
   int32_t a, b;          // their bodies
@@ -51,14 +66,11 @@ struct Patch {
   double stiffness;     // [N/m], up to what step and answers bear; 0: that
   Vec<double> surface;  // velocity of B's surface relative to A's, beside the bodies' own [m/s]
   double late;          // from the question to the answer [s]
-  double age;           // since the answer was taken [s]
+  double age;           // since the answer came [s]
 
-  double force;                            // pressing: mean of the last advance [N]
-  double lasting;                          // what of it lasts: a part of an impact is not that [N]
-  double window;                           // in which the impulses were given [s]
-  double normal_impulse, torsion_impulse;  // N [N s], m [N m s]
-  Vec<double> friction_impulse, rocking_impulse;  // f [N s], τ [N m s]
-  Vec<double> impulse_arm;                        // from A's centre of mass to where they acted [m]
+  double force;    // pressing: mean of the last advance [N]
+  double lasting;  // what of it lasts: a part of an impact is not that [N]
+  Kept<double> kept;
 
   BoxPair pair() const { return {box_a, box_b}; }
 
@@ -66,18 +78,14 @@ struct Patch {
   void keep(const Patch& before) {
     force = before.force;
     lasting = before.lasting;
-    window = before.window;
-    normal_impulse = before.normal_impulse;
-    torsion_impulse = before.torsion_impulse;
-    friction_impulse = before.friction_impulse;
-    rocking_impulse = before.rocking_impulse;
-    impulse_arm = before.impulse_arm;
+    kept = before.kept;
   }
   // Keep the impulses of a window that is longer by a factor.
   void scale(double factor) {
-    window *= factor;
-    for (double* impulse : {&normal_impulse, &torsion_impulse}) *impulse *= factor;
-    for (Vec<double>* impulse : {&friction_impulse, &rocking_impulse}) *impulse = factor * *impulse;
+    for (double* each : {&kept.window, &kept.normal_impulse, &kept.torsion_impulse})
+      *each *= factor;
+    for (Vec<double>* each : {&kept.friction_impulse, &kept.rocking_impulse})
+      *each = factor * *each;
   }
 
   // Take the geometry of a contact, whose boxes are where the bodies are. box_axes: see rectangle_of.
@@ -99,8 +107,8 @@ struct Patch {
                   const bc_size& size_b) {
     Face a = face_along(box_at_a, size_a, point, normal),
          b = face_along(box_at_b, size_b, point, -normal);
-    faces = {a.span_along(shape.axis_1).within(b.span_along(shape.axis_1)),
-             a.span_along(shape.axis_2).within(b.span_along(shape.axis_2)),
+    faces = {span_along(a, shape.axis_1).within(span_along(b, shape.axis_1)),
+             span_along(a, shape.axis_2).within(span_along(b, shape.axis_2)),
              0.0,
              {0.0, 0.0}};
     shape.span_1 = shape.span_1.within(faces.span_1);
@@ -169,6 +177,27 @@ struct ByPair {
     return p.pair() < q.pair();
   }
 };
+// Merge copies of rows into others, where `goes(place)`. Both are by pair, and there is room.
+template <class Row, class Goes>
+void merge_rows(const std::vector<Row>& from, std::vector<Row>& to, const Goes& goes) {
+  size_t count = 0, old = to.size();
+  for (size_t k = 0; k < from.size(); ++k) count += goes(k);
+  size_t end = old + count;
+  to.resize(end);
+  for (size_t k = from.size(); end > old && k-- > 0;) {
+    if (!goes(k)) continue;
+    while (old > 0 && from[k].pair() < to[old - 1].pair()) to[--end] = to[--old];
+    to[--end] = from[k];
+  }
+}
+template <class Row, class Goes>
+void drop_rows(std::vector<Row>& rows, const Goes& goes) {
+  size_t kept = 0;
+  for (size_t k = 0; k < rows.size(); ++k)
+    if (!goes(k)) rows[kept++] = rows[k];
+  rows.resize(kept);
+}
+
 // The patch of a pair among those that are by pair, or null.
 inline const Patch* find(const std::vector<Patch>& patches, const BoxPair& pair) {
   auto before = [](const Patch& patch, const BoxPair& other) { return patch.pair() < other; };

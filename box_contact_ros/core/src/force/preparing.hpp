@@ -9,20 +9,9 @@
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// Of pushing out [1]: an overlap shrinks by a ninth a step. With 1, impacts are half as deep again.
-constexpr double soft_damping_ratio = 5.0;
-// The same where answers are late, or a patch has a stiffness of its own.
-constexpr double slow_damping_ratio = 2.0;
-// Speed at which an overlap is pushed out, at most [m/s]. The spring bears as much as without the limit.
-// Speeds add up in a stack, and relaxation leaves some: with 1, eight cubes that overlap by 2 mm jump by
-// 0.8 m.
-constexpr double push_out_limit = 0.1;
-// The same where answers are late, which bear nothing that is as hard.
-constexpr double late_push_out_limit = 1.0;
-
 // How a body turns by an angular impulse. One that no force moves does not.
 template <class T, class Body>
-BC_INLINE Vec<T> turned_by(const Body& body, const Vec<T>& impulse) {
+BC_INLINE Vec<T> angular_change(const Body& body, const Vec<T>& impulse) {
   Mask<T> is_free = body.inverse_mass > 0.0;
   if (!any(is_free)) return {};
   return select(is_free, body.inverse_inertia * impulse, Vec<T>{});
@@ -31,17 +20,17 @@ BC_INLINE Vec<T> turned_by(const Body& body, const Vec<T>& impulse) {
 // How the velocities along three rows change by impulses along them. A row turns the bodies about an
 // axis through their centres of mass, and the first `linear` rows have a direction as well.
 template <int linear, class T, class Body>
-BC_INLINE Mat<T> compliance(const Body& a, const Body& b, const Vec<T> (&turn_a)[3],
-                            const Vec<T> (&turn_b)[3], const Vec<T> (&directions)[linear]) {
+BC_INLINE Mat<T> compliance(const Body& a, const Body& b, const Vec<T> (&about_a)[3],
+                            const Vec<T> (&about_b)[3], const Vec<T> (&directions)[linear]) {
   Mat<T> m;
   for (int j = 0; j < 3; ++j) {
-    Vec<T> spun_a = turned_by<T>(a, turn_a[j]), spun_b = turned_by<T>(b, turn_b[j]);
+    Vec<T> spun_a = angular_change<T>(a, about_a[j]), spun_b = angular_change<T>(b, about_b[j]);
     for (int i = j; i < 3; ++i) {
       T moved{};
       if (i < linear)
         moved =
             (a.inverse_mass + b.inverse_mass) * dot(directions[i % linear], directions[j % linear]);
-      m[i][j] = m[j][i] = moved + dot(turn_a[i], spun_a) + dot(turn_b[i], spun_b);
+      m[i][j] = m[j][i] = moved + dot(about_a[i], spun_a) + dot(about_b[i], spun_b);
     }
   }
   return m;
@@ -49,9 +38,9 @@ BC_INLINE Mat<T> compliance(const Body& a, const Body& b, const Vec<T> (&turn_a)
 
 // Catto's soft step: a spring and a damper, implicit in time. Relaxation is without them, but for a
 // stiffness of the patch's own. Rocking is soft where answers are late: the wedge of the overlap,
-// which levels a body, is late then. `turned()`: by how much B has turned more than A since.
-template <class T, class Turned>
-BC_INLINE void soften(const SubSteps& step, const Turned& turned, Rows<T>& block) {
+// which levels a body, is late then. `rotated()`: by how much B has rotated more than A since.
+template <class T, class Rotated>
+BC_INLINE void soften(const SubSteps& step, const Rotated& rotated, Rows<T>& block) {
   const Mat<T>& compliance = block.across;
   T depth = block.depth, none{};
   double h = step.length;
@@ -69,7 +58,7 @@ BC_INLINE void soften(const SubSteps& step, const Turned& turned, Rows<T>& block
   }
   T frequency = splat<T>(soft_frequency / step.window);
   T bearable = frequency_of(block.late, step.period);
-  Mask<T> is_late = pushes & (bearable < frequency * step.share);
+  Mask<T> is_late = pushes & (bearable < frequency * step.window_share);
   frequency = select<T>(is_late, bearable, frequency);
   T own = sqrt(block.stiffness * compliance[0][0]);
   Mask<T> is_spring = pushes & (own > 0.0) & (own < frequency);
@@ -79,13 +68,13 @@ BC_INLINE void soften(const SubSteps& step, const Turned& turned, Rows<T>& block
   T rate = frequency / (2.0 * damping + h * frequency);
   T softness = rate / (h * frequency * frequency);
   if (any(is_late)) {
-    Vec<T> turn = turned(), soft = softness * Vec<T>{none, compliance[1][1], compliance[2][2]};
-    put<T>(
-        is_late,
-        NormalRows<T>{
-            soft, rate * Vec<T>{none, dot(turn, block.shape.axis_1), dot(turn, block.shape.axis_2)},
-            inverse(softened(compliance, soft))},
-        relaxed);
+    Vec<T> angles = rotated(), soft = softness * Vec<T>{none, compliance[1][1], compliance[2][2]};
+    put<T>(is_late,
+           NormalRows<T>{soft,
+                         rate * Vec<T>{none, dot(angles, block.shape.axis_1),
+                                       dot(angles, block.shape.axis_2)},
+                         inverse(softened(compliance, soft))},
+           relaxed);
     put<T>(is_late, relaxed, pushing);
   }
   T limit = select<T>(is_late, splat<T>(late_push_out_limit), splat<T>(push_out_limit));
@@ -136,15 +125,15 @@ BC_INLINE void weigh(const Body& a, const Body& b, const Rows<T>& block, Masses<
 }
 
 // Make the rows of a patch, where its bodies are now.
-template <class T, class Body, class Turned>
+template <class T, class Body, class Rotated>
 BC_INLINE void prepare(const SubSteps& step, const Body& a, const Body& b, const Where<T>& at_a,
-                       const Where<T>& at_b, const Turned& turned, Rows<T>& block) {
+                       const Where<T>& at_b, const Rotated& rotated, Rows<T>& block) {
   block.normal_counted = block.friction_counted = {};
   auto [arms, depth] = place(a, b, at_a, at_b, step.length, block);
   static_cast<Arms<T>&>(block) = arms;
   block.depth = depth;
   weigh<T>(a, b, block, block);
-  soften(step, turned, block);
+  soften(step, rotated, block);
 }
 
 // `still`: rows stay where they are while their bodies turn by no more than this [rad], and slide by no

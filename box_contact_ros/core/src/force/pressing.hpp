@@ -39,22 +39,22 @@ class OnTheRim {
     const Mask<T> beyond_seconds[] = {(y < n * seconds[0]), (y > n * seconds[1])};
     for (int i = 0; i < 2; ++i) {
       for (int j = 0; j < 2; ++j)
-        take_edge(beyond_firsts[i] | beyond_seconds[j], {one, firsts[i], seconds[j]});
-      take_face(beyond_firsts[i], {one, firsts[i], none}, 2);
+        consider_edge(beyond_firsts[i] | beyond_seconds[j], {one, firsts[i], seconds[j]});
+      consider_face(beyond_firsts[i], {one, firsts[i], none}, 2);
     }
-    for (int j = 0; j < 2; ++j) take_face(beyond_seconds[j], {one, none, seconds[j]}, 1);
+    for (int j = 0; j < 2; ++j) consider_face(beyond_seconds[j], {one, none, seconds[j]}, 1);
   }
   BC_INLINE const Vec<T>& impulses() const { return best_; }
 
  private:
-  BC_INLINE void take_edge(Mask<T> may_bear, const Vec<T>& edge) {
+  BC_INLINE void consider_edge(Mask<T> may_bear, const Vec<T>& edge) {
     if (!any(may_bear)) return;
     T along = dot(edge, b_);
     Mask<T> presses = may_bear & (along < 0.0);
-    if (any(presses)) take(presses, (-along / dot(edge, a_ * edge)) * edge);
+    if (any(presses)) consider(presses, (-along / dot(edge, a_ * edge)) * edge);
   }
   // The face along an edge, whose rocking `row` is free.
-  BC_INLINE void take_face(Mask<T> may_bear, const Vec<T>& edge, int row) {
+  BC_INLINE void consider_face(Mask<T> may_bear, const Vec<T>& edge, int row) {
     if (!any(may_bear)) return;
     Vec<T> pushed = a_ * edge;
     T ee = dot(edge, pushed), er = pushed[row], rr = a_[row][row];
@@ -69,9 +69,9 @@ class OnTheRim {
     if (!any(is_within)) return;
     Vec<T> impulses = pressing * edge;
     impulses[row] = rocking;
-    take(is_within, impulses);
+    consider(is_within, impulses);
   }
-  BC_INLINE void take(Mask<T> allowed, const Vec<T>& impulses) {
+  BC_INLINE void consider(Mask<T> allowed, const Vec<T>& impulses) {
     T energy = dot(impulses, 0.5 * (a_ * impulses) + b_);
     Mask<T> is_less = allowed & (energy < energy_);
     energy_ = select<T>(is_less, energy, energy_);

@@ -24,31 +24,6 @@ constexpr double torsion_share = 0.966;
 // A patch is a square where its variances differ from their mean by less [1].
 constexpr double square_slack = 1e-3;
 
-// By how much the length of a normal may differ from 1 [1].
-constexpr double normal_slack = 1e-6;
-// By how much of its trace an eigenvalue of a covariance may be below zero [1]: rounding.
-constexpr double covariance_slack = 1e-9;
-
-inline bool is_unit(const Vec<double>& a) {
-  double squared = dot(a, a);
-  return squared >= (1.0 - normal_slack) * (1.0 - normal_slack) &&
-         squared <= (1.0 + normal_slack) * (1.0 + normal_slack);
-}
-
-// Whether numbers (3, 3) are symmetric, and have no eigenvalue below zero: by the pivots of Cholesky's
-// decomposition, with the slack on the diagonal.
-inline bool is_covariance(const double* c) {
-  double trace = (c[0] + c[4]) + c[8], s = 1.0 / trace;
-  if (!(trace > 0.0 && trace <= largest_number)) return false;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < i; ++j)
-      if (!(std::fabs(c[3 * i + j] - c[3 * j + i]) <= covariance_slack * trace)) return false;
-  double xx = s * c[0] + covariance_slack, xy = s * c[1], xz = s * c[2];
-  double yy = s * c[4] + covariance_slack - xy * xy / xx, yz = s * c[5] - xy * xz / xx;
-  double zz = s * c[8] + covariance_slack - xz * xz / xx - yz * yz / yy;
-  return xx > 0.0 && yy > 0.0 && zz > 0.0;
-}
-
 // From where to where along an axis, with 0 within [m].
 template <class T>
 struct SpanOf {

@@ -10,37 +10,17 @@
 #include <vector>
 
 #include "../../include/box_contact/force.h"
-#include "../poses.hpp"
+#include "../placed.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
-// Masses [kg] and moments of inertia [kg m²] accepted: a product of three inverses is a number.
-constexpr double mass_min = 1e-50, mass_max = 1e50;
-// By how much of it a moment of inertia may exceed the sum of the two others [1]: rounding.
-constexpr double inertia_slack = 1e-9;
-// Speeds accepted, at most [m/s], [rad/s]: their squares times a moment of inertia are numbers.
-constexpr double speed_max = 1e50;
-// Forces, torques and impulses accepted, at most [N], [N m], [N s]: those of the largest mass at the
-// largest speed.
-constexpr double wrench_max = 1e100;
-// Times, frictions and stiffnesses accepted, at most [s], [1], [N/m]: their squares are numbers.
-constexpr double amount_max = 1e50;
 // Of a place of a centre of mass [m]: that of a box, and a centre in it.
 constexpr double place_max = 4.0 * length_max;
 
-// NaN fails all of these.
-inline bool are_within(const double* numbers, int64_t count, double limit) {
-  return std::all_of(numbers, numbers + count,
-                     [limit](double number) { return std::fabs(number) <= limit; });
-}
 inline bool is_still(const bc_velocity& velocity) {
-  return are_within(velocity.linear, 3, 0.0) && are_within(velocity.angular, 3, 0.0);
-}
-inline bool is_within(const Vec<double>& a, double limit) { return are_within(a.v, 3, limit); }
-inline bool is_amount(double number) { return number >= 0.0 && number <= amount_max; }
-inline bool is_mass(double number) { return number >= mass_min && number <= mass_max; }
-inline bool is_inertia(const Vec<double>& moments) {
-  return (moments[0] + moments[1]) + moments[2] >= (2.0 - inertia_slack) * largest(moments);
+  auto is_zero = [](double number) { return number == 0.0; };
+  return std::all_of(velocity.linear, velocity.linear + 3, is_zero) &&
+         std::all_of(velocity.angular, velocity.angular + 3, is_zero);
 }
 
 // A body that no force moves has inverses of zero.
@@ -52,28 +32,9 @@ struct Body {
   bool is_free() const { return inverse_mass > 0.0; }
 };
 
-// Where a body is: its centre of mass, and its axes as columns; common frame.
-template <class T>
-struct PlacedOf {
-  Vec<T> position;
-  Mat<T> axes;
-};
-using Placed = PlacedOf<double>;
-
 struct Motion {
   Vec<double> linear, angular;  // of the centre of mass [m/s], [rad/s]
 };
-
-template <class T>
-BC_INLINE Vec<T> cross(const Vec<T>& a, const Vec<T>& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-template <class T>
-BC_INLINE T length(const Vec<T>& a) {
-  return sqrt(dot(a, a));
-}
-inline Vec<double> vector_at(const double* numbers) { return {numbers[0], numbers[1], numbers[2]}; }
-inline Vec<double> vector(const double (&numbers)[3]) { return vector_at(numbers); }
 
 // The inverse of a matrix, by its cofactors. One whose determinant is not positive gives zero.
 template <class T>
@@ -97,10 +58,6 @@ inline Placed placed_at(const bc_pose& pose, const Vec<double>& centre) {
   Mat<double> axes = rotation_matrix(pose.quaternion);
   return {vector(pose.position) + axes * centre, axes};
 }
-// The same of a box, about its own centre.
-inline Placed box_at(const bc_pose& pose) {
-  return {vector(pose.position), rotation_matrix(pose.quaternion)};
-}
 // The pose of a body that is placed so. quaternion: of any length.
 inline bc_pose pose_at(const Placed& placed, const double (&quaternion)[4],
                        const Vec<double>& centre) {
@@ -112,37 +69,6 @@ inline bc_pose pose_at(const Placed& placed, const double (&quaternion)[4],
   return pose;
 }
 
-// Where bodies or boxes are that are asked for: each is found once.
-class PlacedOnce {
- public:
-  void make_room(size_t count) {
-    placed_.reserve(count);
-    asked_.reserve(count);
-    is_asked_.reserve(count);
-  }
-  void forget(size_t count) {
-    placed_.resize(count);
-    asked_.clear();
-    is_asked_.assign(count, 0);
-  }
-  void ask(size_t k) {
-    if (!is_asked_[k]) asked_.push_back(k);
-    is_asked_[k] = 1;
-  }
-  size_t count() const { return asked_.size(); }
-  // Find those from one that was asked for to another, or to the last one.
-  template <class Find>
-  void find(size_t first, size_t last, const Find& find) {
-    for (size_t i = first; i < std::min(last, count()); ++i) placed_[asked_[i]] = find(asked_[i]);
-  }
-  const Placed& operator[](size_t k) const { return placed_[k]; }
-
- private:
-  std::vector<Placed> placed_;
-  std::vector<size_t> asked_;
-  std::vector<uint8_t> is_asked_;
-};
-
 // The pose of a box in the common frame, of a pose in the frame of a body at `body`.
 inline bc_pose in_common_frame(const bc_pose& body, const bc_pose& box) {
   auto read = [](const bc_pose& pose) -> Pose<double> {
@@ -153,8 +79,8 @@ inline bc_pose in_common_frame(const bc_pose& body, const bc_pose& box) {
   return {{at[0], at[1], at[2]}, {turned[0], turned[1], turned[2], turned[3]}};
 }
 
-// The turn of a body between two places, as a vector: sin θ along the axis, for small θ its angle.
-inline Vec<double> turn(const Placed& from, const Placed& to) {
+// The rotation of a body between two places, as a vector: sin θ along the axis, for small θ its angle.
+inline Vec<double> rotation(const Placed& from, const Placed& to) {
   Vec<double> sum{0.0, 0.0, 0.0};
   for (int k = 0; k < 3; ++k) sum = sum + cross(column(from.axes, k), column(to.axes, k));
   return 0.5 * sum;

@@ -122,20 +122,16 @@ template <class T>
 template <class T>
 [[gnu::noinline]] inline void prepare(const Work& work, Group<T>& group) {
   auto [at_a, at_b, a, b] = Bodies<T>(work.moving, group);
-  auto turned = [&] {
+  auto rotated = [&] {
     Vec<T> all{};
     for (int i = 0; i < width<T>; ++i) {
-      auto one = turned_since(work.patches[work.blocks[group.block[i]].patch],
-                              work.moving[group.a[i]], work.moving[group.b[i]]);
+      auto one = rotation_since(work.patches[work.blocks[group.block[i]].patch],
+                                work.moving[group.a[i]], work.moving[group.b[i]]);
       for (int k = 0; k < 3; ++k) set_lane(all[k], i, one[k]);
     }
     return all;
   };
-  prepare<T>(work.steps, a, b, at_a, at_b, turned, group);
-  T impact = impact_share * closing_speed<T>(group, a, b);
-  if (!any(impact > impact_change)) return;
-  for (int i = 0; i < width<T>; ++i)
-    group.island[i]->impact = max(group.island[i]->impact, lane(impact, i));
+  prepare<T>(work.steps, a, b, at_a, at_b, rotated, group);
 }
 
 template <class T>
@@ -154,33 +150,32 @@ template <class T>
 }
 
 template <class T>
-[[gnu::noinline]] inline bool solve(const Work& work, const Turn& turn, Group<T>& group) {
-  int iteration = turn.iteration;
+[[gnu::noinline]] inline bool solve(const Work& work, const Iteration& at, Group<T>& group) {
+  int iteration = at.number;
   if (iteration > 1) {  // most groups of islands at rest end here
-    double changed = 0.0;
+    double last = 0.0;
     for (int i = 0; i < width<T>; ++i)
-      changed = max<double>(changed,
-                            max(work.moving[group.a[i]].changed, work.moving[group.b[i]].changed));
-    if (changed < iteration - 1) return false;
+      last = max<double>(
+          last, max(work.moving[group.a[i]].last_change, work.moving[group.b[i]].last_change));
+    if (last < iteration - 1) return false;
   }
   Side<T> a{speeds_of<T>(work.moving, group.a), group.inverse_inertia_a};
   Side<T> b{speeds_of<T>(work.moving, group.b), group.inverse_inertia_b};
-  Mask<T> due = max(a.changed, b.changed) >= double(iteration - 1);
-  T closing = solve_normal<T>(group, rows_of<T>(group, turn.is_pushing), due, a, b);
+  Mask<T> due = max(a.last_change, b.last_change) >= double(iteration - 1);
+  T closing = solve_normal<T>(group, rows_of<T>(group, at.is_pushing), due, a, b);
   T slipping = solve_friction<T>(group, due, a, b);
   unsigned solved = bits(due) & group.filled;
-  T change = max(slipping, closing),
-    least = splat<T>(turn.is_beyond ? impact_change : least_change);
+  T change = max(slipping, closing), least = splat<T>(at.is_beyond ? impact_change : least_change);
   if (any(change > impact_change))
     for (int i = 0; i < width<T>; ++i) {
       Island& island = *group.island[i];
       if ((solved >> i & 1) && lane(closing, i) > island.impact) island.is_struck = true;
-      if (turn.is_beyond) set_lane(least, i, island.impact);
+      if (at.is_beyond) set_lane(least, i, island.impact);
     }
   Mask<T> calm = change <= least;
   T now = splat<T>(iteration);
-  a.changed = select<T>(calm, a.changed, now);
-  b.changed = select<T>(calm, b.changed, now);
+  a.last_change = select<T>(calm, a.last_change, now);
+  b.last_change = select<T>(calm, b.last_change, now);
   write_speeds<T>(work.moving, group.a, solved & group.is_free_a, a);
   write_speeds<T>(work.moving, group.b, solved & group.is_free_b, b);
   return (solved & ~bits(calm)) != 0;

@@ -18,8 +18,8 @@ class Stages {
     if constexpr (!is_alone) {
       const Work& work = work_of(all);
       each(work, [](G& group) { group.filled = group.is_free_a = group.is_free_b = 0; });
-      each_shared(work, [&](Island& island) {
-        each_block(island, [&](size_t k) { join(work, island, k); });
+      each_due(work, [&](Island& island) {
+        for (size_t k = island.block; k < island.block_end; ++k) join(work, island, k);
       });
       each(work, [&](G& group) {
         for (int i = 0; i < G::lanes; ++i)
@@ -39,18 +39,16 @@ class Stages {
     for (Island* island = work.first; island < work.last; ++island)
       island->impact = work.steps.is_late ? no_impact : least_impact(*island, work.steps.length);
     forget_changes(work);
-    work.meet();
     each(work, [&](G& group) { prepare(work, group); });
-    agree_on_impact(work);
-    each_in_turn(work, [&](G& group) { warm_start(work, group); });
-    iterate_all(work, work.iterations, true);
-    if (work.counts) each_in_turn(work, [&](G& group) { count(work, group); });
+    each(work, [&](G& group) { warm_start(work, group); });
+    iterate_all(work, iterations, true);
+    if (work.counts) each(work, [&](G& group) { count(work, group); });
   }
   // Move bodies by their velocities.
   static void move(void* all) {
     const Work& work = work_of(all);
     if constexpr (is_alone) {
-      each_shared_body(work, [&](size_t k) { force::move(work, work.moving[k]); });
+      each_due_body(work, [&](size_t k) { force::move(work, work.moving[k]); });
     } else {
       int32_t places[G::lanes];
       int filled = 0;
@@ -59,7 +57,7 @@ class Stages {
         force::move<typename G::Type>(work, places, (1u << filled) - 1);
         filled = 0;
       };
-      each_shared_body(work, [&](size_t k) {
+      each_due_body(work, [&](size_t k) {
         places[filled++] = int32_t(k);
         if (filled == G::lanes) move_them();
       });
@@ -70,13 +68,9 @@ class Stages {
   static void relax(void* all) {
     const Work& work = work_of(all);
     forget_changes(work);
-    work.meet();
-    if (work.relaxations > 0) {
-      each(work, [&](G& group) { follow(work, group); });
-      work.meet();
-      iterate_all(work, work.relaxations, false);
-    }
-    if (work.counts && !work.is_last) each_in_turn(work, [&](G& group) { count(work, group); });
+    each(work, [&](G& group) { follow(work, group); });
+    iterate_all(work, relaxations, false);
+    if (work.counts && !work.is_last) each(work, [&](G& group) { count(work, group); });
     each(work, [&](G& group) { store(work.steps, group); });
   }
   // Give blocks what is known.
@@ -102,29 +96,18 @@ class Stages {
   static G* groups(const Work& work) { return static_cast<G*>(work.groups); }
   template <class Visit>
   static void each(const Work& work, const Visit& visit) {
-    for (size_t k = work.group; k < work.group_end; ++k) visit(groups(work)[k]);
-  }
-  // The same, where bodies see their blocks in turn.
-  template <class Visit>
-  static void each_in_turn(const Work& work, const Visit& visit) {
-    if (is_alone || !work.team) return each(work, visit);
-    work.team->begin_round(work.part);
-    for (size_t k = work.group; k < work.group_end; ++k) {
-      work.team->reach(work.part, work.turns[k].level);
-      work.team->await(work.part, work.turns[k]);
-      visit(groups(work)[k]);
-    }
-    work.team->reach(work.part, last_level);
+    for (size_t k = 0; k < work.group_count; ++k) visit(groups(work)[k]);
   }
   template <class Visit>
-  static void each_shared(const Work& work, const Visit& visit) {
+  static void each_due(const Work& work, const Visit& visit) {
     for (Island* island = work.first; island < work.last; ++island)
-      if (island->is_shared) visit(*island);
+      if (island->is_due) visit(*island);
   }
-
   template <class Visit>
-  static void each_shared_body(const Work& work, const Visit& visit) {
-    each_shared(work, [&](const Island& island) { each_body(island, visit); });
+  static void each_due_body(const Work& work, const Visit& visit) {
+    each_due(work, [&](const Island& island) {
+      for (size_t k = island.body; k < island.body_end; ++k) visit(k);
+    });
   }
 
   static void join(const Work& work, Island& island, size_t k) {
@@ -141,41 +124,23 @@ class Stages {
     if (work.moving[block.b].inverse_mass > 0.0) group.is_free_b |= bit;
   }
 
-  // Before a meeting: other parts warm-start bodies of this one.
   static void forget_changes(const Work& work) {
     for (Island* island = work.first; island < work.last; ++island)
       force::forget_changes(*island, work.moving);
   }
-  // The largest impact of any part is that of its island.
-  static void agree_on_impact(const Work& work) {
-    if (!work.team) return;
-    work.meet();
-    double most = 0.0;
-    for (int part = 0; part < work.team->parts(); ++part) most = max(most, work.parts[part].impact);
-    work.meet();  // all have read it
-    work.first->impact = most;
-  }
 
-  static void iterate_all(const Work& work, int iterations, bool is_pushing) {
-    iterations *= work.steps.rounds;
+  static void iterate_all(const Work& work, int count, bool is_pushing) {
+    count *= work.steps.rounds;
     auto solve_all = [&](int iteration, bool is_beyond) {
       bool is_changed = false;
-      each_in_turn(work, [&](G& group) {
-        is_changed |= solve(work, {is_pushing, iteration, is_beyond}, group);
-      });
-      if (!work.team) return is_changed;
-      if (iteration < iterations && iteration % agreed_every != 0) return true;
-      unsigned brought = work.meet(unsigned(is_changed) + 2 * unsigned(work.first->is_struck));
-      work.first->is_struck = brought & 2;
-      return bool(brought & 1);
+      each(work,
+           [&](G& group) { is_changed |= solve(work, {is_pushing, iteration, is_beyond}, group); });
+      return is_changed;
     };
-    auto scale_all = [&](const Island& island, int iteration) {
-      if (!work.team) return scale_one(work, island, is_pushing, iteration);
-      work.meet();
-      if (work.part == 0) scale_one(work, *work.whole, is_pushing, iteration);
-      work.meet();
+    auto scale_it = [&](const Island& island, int iteration) {
+      scale_one(work, island, is_pushing, iteration);
     };
-    iterate(work.first, work.last, iterations, work.moving, solve_all, scale_all);
+    iterate(work.first, work.last, count, work.moving, solve_all, scale_it);
   }
   // Its blocks are in all groups, so they come out for it.
   static void scale_one(const Work& work, const Island& island, bool is_pushing, int iteration) {

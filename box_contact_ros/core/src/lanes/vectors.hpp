@@ -100,6 +100,14 @@ template <class Three>
 BC_INLINE auto largest(const Three& a) {
   return max(max(a[0], a[1]), a[2]);
 }
+template <class T>
+BC_INLINE Vec<T> cross(const Vec<T>& a, const Vec<T>& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+template <class T>
+BC_INLINE T length(const Vec<T>& a) {
+  return sqrt(dot(a, a));
+}
 
 // A 3 × 3 matrix, row by row: m[i][j].
 template <class T>

@@ -23,13 +23,13 @@ const PatchForces& forces_of(const bc_patch_forces* forces) {
 }
 bc_patch_forces* handle(Handled* forces) { return reinterpret_cast<bc_patch_forces*>(forces); }
 
-bc_status explain(PatchForces::Held held) {
-  switch (held) {
-    case PatchForces::Held::pair_twice:
+bc_status explain(PatchForces::HoldResult result) {
+  switch (result) {
+    case PatchForces::HoldResult::pair_twice:
       return fail(BC_BAD_ARGUMENT, "pairs: a pair of boxes comes twice");
-    case PatchForces::Held::no_patch:
+    case PatchForces::HoldResult::no_patch:
       return fail(BC_BAD_ARGUMENT, "covariance: a patch has no area, or volume / area no number");
-    case PatchForces::Held::all:
+    case PatchForces::HoldResult::all:
       break;
   }
   return BC_OK;
@@ -39,19 +39,29 @@ bool solve_exactly(const PairNumbers& pair, bc_contact& contact) {
   return solve_pair({chosen_kernel(), Model::exact, nullptr}, pair, BC_COVARIANCE, 0.0, contact);
 }
 
-// Solve the contacts of one's own, and take them.
-bc_status solve_own(Handled& all, double dt, const bc_pose* poses, const bc_wrench* outside) {
+// Solve the contacts of one's own, and read them.
+bc_status solve_own(Handled& all, double dt, const Given& given) {
   const Kernel* kernel = chosen_kernel();
   if (!kernel) return fail(BC_BAD_ENVIRONMENT, "BOX_CONTACT_INSTRUCTION_SET is unknown");
   auto solve = [&](const Rows& rows, long count, const Results& results) {
     return solve_rows({kernel, Model::exact, nullptr}, rows, count, results, all.forces.threads(),
                       &all.threads);
   };
-  PatchForces::Held held;
-  long refused = all.forces.solve_own(dt, poses, outside, solve, all.threads, held);
+  PatchForces::HoldResult result;
+  long refused = all.forces.solve_own(dt, given, solve, solve_exactly, all.threads, result);
   if (refused >= 0) return fail(BC_BAD_POSE, "pairs[%ld]: a box is beyond 1e50 m", refused);
-  return explain(held);
+  return explain(result);
 }
+
+// Cancels an advance that is refused, or for which there is no memory.
+struct Advancing {
+  PatchForces& self;
+  bool is_done = false;
+
+  ~Advancing() {
+    if (!is_done) self.cancel();
+  }
+};
 
 bc_status advance(bc_patch_forces* forces, double dt, const Given& given, const Changed& changed,
                   const bc_motion* motion) {
@@ -63,17 +73,15 @@ bc_status advance(bc_patch_forces* forces, double dt, const Given& given, const 
   if (!read(motion, all)) return fail(BC_BAD_ABI, "motion.size is unknown");
   if (bc_status status = check_step(dt)) return status;
   if (bc_status status = check_changed(changed, self.bodies().size())) return status;
-  self.keep();
-  self.rouse(given, changed, all);
+  Advancing advancing{self};
+  self.begin(given, changed, all);
   bc_status status = check_given(self, given);
-  if (!status) status = solve_own(handled(forces), dt, given.poses, given.outside);
-  if (!status && self.has_woken()) status = check_given(self, given);
-  if (status) {
-    self.restore();
-    return status;
-  }
+  if (!status) status = solve_own(handled(forces), dt, given);
+  if (!status && self.is_waking()) status = check_given(self, given);
+  if (status) return status;
   int64_t lost = self.advance(dt, given, all, solve_exactly, handled(forces).threads);
-  if (lost < 0) return BC_OK;
+  advancing.is_done = lost < 0;
+  if (advancing.is_done) return BC_OK;
   return fail(
       BC_BAD_ARGUMENT,
       "bodies[%lld]: in a step of %g s its numbers leave the range of float64; try a shorter "
@@ -99,11 +107,9 @@ bc_status bc_patch_forces_create(const bc_body* bodies, int64_t count,
     std::vector<Body> read;
     if (bc_status status = read_bodies(bodies, count, read)) return status;
     const Kernel* kernel = chosen_kernel();
-    *forces = handle(
-        new Handled{PatchForces(std::move(read),
-                                {all.substeps, all.iterations, all.relaxations, all.threads,
-                                 all.friction, all.most_depth, all.rest ? all.rest_speed : 0.0},
-                                kernel ? &kernel->side : nullptr)});
+    *forces = handle(new Handled{PatchForces(
+        std::move(read), {all.substeps, all.threads, all.friction, all.most_depth, all.rest != 0},
+        kernel ? &kernel->side : nullptr)});
     return BC_OK;
   });
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "../force/patch_forces.hpp"
+#include "force_limits.hpp"
 #include "refusals.hpp"
 
 namespace box_contact::detail {
@@ -20,13 +21,13 @@ using force::Given;
 using force::PatchForces;
 
 inline bool is_amount_at(const double* numbers, int64_t k) {  // none is as good
-  return !numbers || force::is_amount(numbers[k]);
+  return !numbers || is_amount(numbers[k]);
 }
 
 // Refuse rows of which one has a number that is not within the limit.
 inline bc_status check_within(const char* field, size_t row, const double* numbers, int64_t count,
                               double limit) {
-  if (force::are_within(numbers, count, limit)) return BC_OK;
+  if (are_within(numbers, count, limit)) return BC_OK;
   const double* worst = std::find_if_not(
       numbers, numbers + count, [limit](double number) { return std::fabs(number) <= limit; });
   return fail(BC_BAD_ARGUMENT, "%s[%zu] has %g, which is not finite, or beyond %g", field, row,
@@ -36,21 +37,21 @@ inline bc_status check_within(const char* field, size_t row, const double* numbe
 inline bc_status read_body(const bc_body& given, size_t k, Body& body) {
   const double *inertia = given.inertia, mass = given.mass;
   bool moves = mass != 0.0;
-  if (moves && !force::is_mass(mass))
+  if (moves && !is_mass(mass))
     return fail(BC_BAD_ARGUMENT, "mass of body %zu must be 0, or within 1e-50 to 1e50 kg, not %g",
                 k, mass);
   for (int i = 0; i < 3; ++i)
-    if (!force::is_mass(inertia[i]) && (moves || inertia[i] != 0.0))
+    if (!is_mass(inertia[i]) && (moves || inertia[i] != 0.0))
       return fail(BC_BAD_ARGUMENT,
                   "inertia of body %zu must be within 1e-50 to 1e50 kg m², not (%g, %g, %g)", k,
                   inertia[0], inertia[1], inertia[2]);
-  Vec<double> moments = force::vector(given.inertia);
-  if (!force::is_inertia(moments))
+  Vec<double> moments = vector(given.inertia);
+  if (!is_inertia(moments))
     return fail(BC_BAD_ARGUMENT,
                 "inertia of body %zu (%g, %g, %g) has a moment that exceeds the sum of the others",
                 k, inertia[0], inertia[1], inertia[2]);
   Vec<double> ones{1.0, 1.0, 1.0}, zeros{0.0, 0.0, 0.0};
-  body = {moves ? 1.0 / mass : 0.0, moves ? ones / moments : zeros, force::vector(given.centre)};
+  body = {moves ? 1.0 / mass : 0.0, moves ? ones / moments : zeros, vector(given.centre)};
   return check_within("centre", k, given.centre, 3, length_max);
 }
 
@@ -88,10 +89,10 @@ inline bc_status check_patch(const bc_patches& answer, size_t k) {
                 k, volume);
   if (bc_status status = check_within("point", k, answer.point + 3 * k, 3, length_max))
     return status;
-  if (!force::is_unit(force::vector_at(normal)))
+  if (!is_unit(vector_at(normal)))
     return fail(BC_BAD_ARGUMENT, "normal[%zu] (%g, %g, %g) has the length %g, not 1", k, normal[0],
-                normal[1], normal[2], force::length(force::vector_at(normal)));
-  if (!force::is_covariance(c))
+                normal[1], normal[2], length(vector_at(normal)));
+  if (!is_covariance(c))
     return fail(BC_BAD_ARGUMENT,
                 "covariance[%zu] (%g, %g, %g; %g, %g, %g; %g, %g, %g) is not symmetric, or has an "
                 "eigenvalue below 0",
@@ -105,7 +106,8 @@ inline bc_status check_row(const bc_patches& answer, size_t k, const PatchForces
     if (boxes[side] < 0 || boxes[side] >= self.box_count())
       return fail(BC_BAD_ARGUMENT, "pairs[%zu] is (%lld, %lld): there is no box %lld", k,
                   (long long)boxes[0], (long long)boxes[1], (long long)boxes[side]);
-  if (self.body_of(boxes[0]) == self.body_of(boxes[1]))
+  bool is_late = answer.separation && boxes[0] != boxes[1];  // they may have been joined since
+  if (self.body_of(boxes[0]) == self.body_of(boxes[1]) && !is_late)
     return fail(BC_BAD_ARGUMENT, "pairs[%zu]: both boxes are of body %lld", k,
                 (long long)self.body_of(boxes[0]));
   using Column = std::pair<const char*, const double*>;
@@ -116,7 +118,7 @@ inline bc_status check_row(const bc_patches& answer, size_t k, const PatchForces
                   column[k]);
   if (answer.surface)
     if (bc_status status =
-            check_within("surface_velocity", k, answer.surface + 3 * k, 3, force::speed_max))
+            check_within("surface_velocity", k, answer.surface + 3 * k, 3, speed_max))
       return status;
   if (!answer.separation) return BC_OK;
   bool is_left_out = answer.separation[k] != answer.separation[k] || answer.volume[k] == 0.0;
@@ -124,26 +126,16 @@ inline bc_status check_row(const bc_patches& answer, size_t k, const PatchForces
 }
 
 inline bc_status check_options(const bc_force_options& all) {
-  struct Count {
-    const char* field;
-    int least, count;
-  };
-  for (auto [field, least, count] :
-       {Count{"substeps", 1, all.substeps}, Count{"iterations", 1, all.iterations},
-        Count{"relaxations", 0, all.relaxations}})
-    if (count < least || count > force::iterations_max)
-      return fail(BC_BAD_ARGUMENT, "%s must be within %d and %d, not %d", field, least,
-                  force::iterations_max, count);
+  if (all.substeps < 1 || all.substeps > substeps_max)
+    return fail(BC_BAD_ARGUMENT, "substeps must be within 1 and %d, not %d", substeps_max,
+                all.substeps);
   if (all.threads < 1 || all.threads > threads_max)
     return fail(BC_BAD_ARGUMENT, "threads must be within 1 and %d, not %d", threads_max,
                 all.threads);
   if (!(all.most_depth > 0.0 && all.most_depth <= length_max))
     return fail(BC_BAD_ARGUMENT, "most_depth must be above 0 and at most 1e50 m, not %g",
                 all.most_depth);
-  if (!(all.rest_speed >= 0.0 && all.rest_speed <= force::speed_max))
-    return fail(BC_BAD_ARGUMENT, "rest_speed must be within 0 and 1e50 m/s, not %g",
-                all.rest_speed);
-  if (!force::is_amount(all.friction))
+  if (!is_amount(all.friction))
     return fail(BC_BAD_ARGUMENT, "friction must be within 0 and 1e50, not %g", all.friction);
   return BC_OK;
 }
@@ -152,9 +144,9 @@ inline bc_status check_answer(const bc_patches& all, const PatchForces& self,
                               const bc_pose* poses) {
   if (all.count < 0)
     return fail(BC_BAD_ARGUMENT, "count must be 0 or more, not %lld", (long long)all.count);
-  if (!force::is_amount(all.age))
+  if (!is_amount(all.age))
     return fail(BC_BAD_ARGUMENT, "age must be within 0 and 1e50 s, not %g", all.age);
-  if (!force::is_amount(all.period))
+  if (!is_amount(all.period))
     return fail(BC_BAD_ARGUMENT, "period must be within 0 and 1e50 s, not %g", all.period);
   bool is_answer = all.separation && all.normal && all.point && all.volume && all.covariance;
   if (all.count > 0 && !(all.pairs && (is_answer || !all.separation)))
@@ -183,7 +175,7 @@ inline bc_status read_boxes(const bc_body_box* given, int64_t count, size_t bodi
     if (boxes[k].body < 0 || size_t(boxes[k].body) >= bodies)
       return fail(BC_BAD_ARGUMENT, "body[%zu]: there is no body %lld", k, (long long)boxes[k].body);
     if (!pose_is_valid(pose)) return refuse_pose(field, pose);
-    if (!size_valid<double>(triple(force::vector_at(size))))
+    if (!size_valid<double>(triple(vector_at(size))))
       return fail(BC_BAD_SIZE, "sizes[%zu] (%g, %g, %g) is not within 1e-50 to 1e50 m", k, size[0],
                   size[1], size[2]);
   }
@@ -191,7 +183,7 @@ inline bc_status read_boxes(const bc_body_box* given, int64_t count, size_t bodi
 }
 
 inline bc_status check_step(double dt) {
-  if (dt >= force::step_min && dt < force::step_limit) return BC_OK;
+  if (dt >= step_min && dt < step_limit) return BC_OK;
   return fail(BC_BAD_ARGUMENT, "dt must be at least 1e-50 s and below 1 s, not %g", dt);
 }
 inline bc_status check_changed(const Changed& changed, size_t bodies) {
@@ -211,9 +203,9 @@ inline bc_status check_given(const PatchForces& self, const Given& given) {
   bc_status status = BC_OK;
   self.each_read([&](size_t k) {
     if (!status) status = check_pose(k, given.poses[k]);
-    if (!status) status = check_within("velocities", k, speeds + 6 * k, 6, force::speed_max);
+    if (!status) status = check_within("velocities", k, speeds + 6 * k, 6, speed_max);
     if (!status && loads)
-      status = check_within("wrenches", k, loads + 6 * k, 6, force::wrench_max);
+      status = check_within("wrenches", k, loads + 6 * k, 6, wrench_max);
   });
   return status;
 }

@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The C interface, and the choice of the instruction set.
-#include <cmath>
 #include <cstdlib>
 #include <cstring>
 
+#include "../faces/face_patch.hpp"
 #include "../mlp/shipped_network.hpp"
 #include "pair_arguments.hpp"
 
@@ -66,6 +66,23 @@ bc_status with_query(const bc_query* given, Work work) {
 
 PairNumbers pair_of(const bc_box& a, const bc_box& b) {
   return {numbers(&a.pose), numbers(&b.pose), numbers(&a.size), numbers(&b.size)};
+}
+
+bc_status find_face_patch(const bc_box& a, const bc_box& b, const double* normal, double tolerance,
+                          bc_polygon& patch) {
+  auto [pose_a, pose_b, size_a, size_b] = pair_of(a, b);
+  if (!pose_is_valid(pose_a) || !pose_is_valid(pose_b) || !size_is_valid(size_a) ||
+      !size_is_valid(size_b))
+    return refuse_pair(pose_a, pose_b, size_a, size_b);
+  Vec<double> from_a = vector_at(normal);
+  if (!is_unit(from_a))
+    return fail(BC_BAD_ARGUMENT, "normal (%g, %g, %g) must be of length 1", normal[0], normal[1],
+                normal[2]);
+  if (!(tolerance >= 0.0 && tolerance <= length_max))
+    return fail(BC_BAD_ARGUMENT, "tolerance must be within 0 and 1e50 m, not %g", tolerance);
+  patch = faces::in_common_frame(
+      faces::patch_of_faces(a.pose, a.size, b.pose, b.size, from_a, tolerance));
+  return BC_OK;
 }
 
 }  // namespace
@@ -152,16 +169,14 @@ bc_status bc_distance_rows(const bc_rows* rows, const bc_nearest_results* result
   return status;
 }
 
-// e₁·e₂ of the covariance C across the normal n is n·adj(C)·n.
-double bc_patch_area(const double* n, const double* c) {
-  if (!n || !c) return NAN;
-  double xx = c[0], xy = c[1], xz = c[2], yy = c[4], yz = c[5], zz = c[8];
-  double product = n[0] * n[0] * (yy * zz - yz * yz) + n[1] * n[1] * (xx * zz - xz * xz) +
-                   n[2] * n[2] * (xx * yy - xy * xy) +
-                   2.0 * (n[0] * n[1] * (xz * yz - xy * zz) + n[0] * n[2] * (xy * yz - xz * yy) +
-                          n[1] * n[2] * (xy * xz - xx * yz));
-  // Rounding may leave a line's product below zero. NaN stays NaN.
-  return 12.0 * std::sqrt(product < 0.0 ? 0.0 : product);
+bc_status bc_face_patch(const bc_box* a, const bc_box* b, const double* normal, double tolerance,
+                        bc_polygon* patch) {
+  return guarded([&] {
+    if (!a || !b || !normal || !patch)
+      return refuse_null(!a ? "a" : !b ? "b" : !normal ? "normal" : "patch");
+    if (patch->size != sizeof(bc_polygon)) return fail(BC_BAD_ABI, "patch.size is unknown");
+    return find_face_patch(*a, *b, normal, tolerance, *patch);
+  });
 }
 
 }  // extern "C"

@@ -15,9 +15,24 @@
 #include <thread>
 #include <vector>
 
-#include "../waiting.hpp"
-
 namespace box_contact::detail {
+
+// A thread looks so many times before it gives its core away: some 50 µs, as long as another takes to wake.
+constexpr int looks = 2000;
+
+// Whether a condition holds within a moment.
+template <class Condition>
+bool holds_soon(const Condition& holds) {
+  for (int k = 0; k < looks; ++k) {
+    if (holds()) return true;
+#if defined(__x86_64__) || defined(__i386__)
+    __builtin_ia32_pause();
+#elif defined(__aarch64__)
+    asm volatile("yield");
+#endif
+  }
+  return holds();
+}
 
 // More threads than this are refused: a number that no machine's cores ask for is a mistake.
 constexpr int threads_max = 1024;
@@ -43,38 +58,17 @@ class Threads {
   template <class Work>
   void operator()(long threads, long chunks, const Work& work) {
     std::atomic<long> next{0};
-    together(begin(std::min(threads, chunks)), [&](long thread) {
+    auto work_on = [&](long thread) {
       for (long chunk = next++; chunk < chunks; chunk = next++) work(thread, chunk);
-    });
-  }
-  // Call `work(thread)` in each of threads that have begun: they may wait for each other.
-  template <class Work>
-  void together(long threads, const Work& work) {
+    };
+    using WorkOn = decltype(work_on);
+    threads = begin(std::min(threads, chunks));
     if (threads > 1)
       call(
-          threads, [](const void* all, long thread) { (*static_cast<const Work*>(all))(thread); },
-          &work);
-    work(0L);
+          threads, [](const void* all, long thread) { (*static_cast<const WorkOn*>(all))(thread); },
+          &work_on);
+    work_on(0L);
     if (threads > 1) await_end();
-  }
-  // Begin threads, with the caller's. Returns how many there are: no more than cores, and fewer where the
-  // machine has no memory for them.
-  long begin(long threads) {
-    static const long cores = std::max(1L, long(std::thread::hardware_concurrency()));
-    threads = std::min(threads, cores);
-    if (threads <= 1) return 1;
-    if (!is_of_this_process()) {
-      leave();
-      kept_ = std::make_unique<Kept>();
-    }
-    try {
-      kept_->threads.reserve(size_t(threads - 1));
-      while (long(kept_->threads.size()) < threads - 1)
-        kept_->threads.emplace_back(serve, std::ref(*kept_), long(kept_->threads.size()) + 1);
-    } catch (const std::exception&) {
-      threads = long(kept_->threads.size()) + 1;
-    }
-    return threads;
   }
 
  private:
@@ -94,6 +88,25 @@ class Threads {
     pid_t process = getpid();
   };
 
+  // Begin threads, with the caller's. Returns how many there are: no more than cores, and fewer where the
+  // machine has no memory for them.
+  long begin(long threads) {
+    static const long cores = std::max(1L, long(std::thread::hardware_concurrency()));
+    threads = std::min(threads, cores);
+    if (threads <= 1) return 1;
+    if (!is_of_this_process()) {
+      leave();
+      kept_ = std::make_unique<Kept>();
+    }
+    try {
+      kept_->threads.reserve(size_t(threads - 1));
+      while (long(kept_->threads.size()) < threads - 1)
+        kept_->threads.emplace_back(serve, std::ref(*kept_), long(kept_->threads.size()) + 1);
+    } catch (const std::exception&) {
+      threads = long(kept_->threads.size()) + 1;
+    }
+    return threads;
+  }
   bool is_of_this_process() const { return kept_ && kept_->process == getpid(); }
   // A process that forked has the threads, and whatever they hold.
   void leave() { static_cast<void>(kept_.release()); }

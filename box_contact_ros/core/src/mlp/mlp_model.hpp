@@ -89,41 +89,47 @@ BC_INLINE Sym<T> covariance(const PatchBox<T>& box, const Features<Floats<T>>& f
 
 }  // namespace mlp
 
-// `FoundOf`: Moments, or PointAndVolume.
-template <template <class> class FoundOf>
+// What the network finds of an overlap. `FoundOf`: Moments, or PointAndVolume.
+template <class T, template <class> class FoundOf>
 struct OverlapByNetwork {
-  template <class T>
   using Found = FoundOf<T>;
 
-  template <class T>
-  [[gnu::noinline]] static void solve(const Network& network, Queries<T> queries,
-                                      Answers<Found<T>, T> found) {
-    using F = Floats<T>;
-    mlp::PatchBox<T> box(queries);
-    mlp::Features<F> features(box);
-    constexpr bool patch = std::is_same_v<Found<T>, Moments<T>>;
-    mlp::Overlap<F> overlap(network, features,
-                            patch ? detail::network_outputs : mlp::point_outputs);
-    F by_half2[3], from_origin[3];
+  BC_INLINE OverlapByNetwork(const Network& network, Queries<T> queries)
+      : box(queries), features(box), overlap(network, features, wanted) {
+    F by_half2[3];
     for (int i = 0; i < 3; ++i) by_half2[i] = 1.0F / (box.half[i] * box.half[i]);
     for (int n = 0; n < mlp::moves_inwards; ++n) {
       overlap.move_into(box.a, by_half2);
       overlap.move_into(box.b, by_half2);
     }
     for (int i = 0; i < 3; ++i) from_origin[i] = box.centre[i] + box.half[i] * overlap.point[i];
-    F volume = (8.0F * ((box.half[0] * box.half[1]) * box.half[2])) * overlap.volume;
-    for (int n = 0; n < blocks_together<T>; ++n) {
-      const Query<T>& query = *queries[n];
-      T unit = box.meetings[n].unit, unit3 = (unit * unit) * unit;
-      found[n]->centroid =
-          components<T>(point_in_common_frame(query.pair, box.point(from_origin, n)));
-      found[n]->volume = unit3 * doubles<T>(volume, n);
-      if constexpr (patch) found[n]->covariance = mlp::covariance(box, features, overlap, n);
-    }
+    volume = (8.0F * ((box.half[0] * box.half[1]) * box.half[2])) * overlap.volume;
   }
+  BC_INLINE void write(int block, Found& found) const {
+    T unit = box.meetings[block].unit, unit3 = (unit * unit) * unit;
+    found.centroid = components<T>(
+        point_in_common_frame(box.queries[block]->pair, box.point(from_origin, block)));
+    found.volume = unit3 * doubles<T>(volume, block);
+    if constexpr (patch) found.covariance = mlp::covariance(box, features, overlap, block);
+  }
+
+ private:
+  using F = Floats<T>;
+  static constexpr bool patch = std::is_same_v<Found, Moments<T>>;
+  static constexpr int wanted = patch ? detail::network_outputs : mlp::point_outputs;
+
+  mlp::PatchBox<T> box;
+  mlp::Features<F> features;
+  mlp::Overlap<F> overlap;
+  F from_origin[3], volume;
 };
 
-using MlpModel = NetworkModel<OverlapByNetwork<Moments>>;
-using MlpPointModel = NetworkModel<OverlapByNetwork<PointAndVolume>>;
+template <class T>
+using MomentsByNetwork = OverlapByNetwork<T, Moments>;
+template <class T>
+using PointAndVolumeByNetwork = OverlapByNetwork<T, PointAndVolume>;
+
+using MlpModel = NetworkModel<MomentsByNetwork>;
+using MlpPointModel = NetworkModel<PointAndVolumeByNetwork>;
 
 }  // namespace box_contact::BOX_CONTACT_SET

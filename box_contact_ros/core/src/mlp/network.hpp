@@ -121,28 +121,33 @@ template <class F>
   layer(numbers, second, units, wanted, Activation::none, outputs);
 }
 
-// What a network finds of queries.
-template <class Found, class T>
-using Answers = Found* const (&)[blocks_together<T>];
-
-// A model that asks a network. `Way` has Found<T>, and solve<T>(network, Queries<T>, Answers<Found<T>, T>).
-template <class Way>
+// A model that asks a network. `Way<T>` is made of a network and Queries<T>, and has
+// write(block, Found&) for what it found.
+template <template <class> class Way>
 struct NetworkModel {
   static constexpr bool solves_two_blocks = true;
 
   Network network;
 
   template <class T>
-  using Found = typename Way::template Found<T>;
+  using Found = typename Way<T>::Found;
 
   BC_INLINE unsigned solve(const Query<double>& query, Found<double>& found) const {
-    Way::template solve<double>(network, {&query}, {&found});
+    solve_blocks<double>({&query}, {&found});
     return 0;
   }
   template <class T>
   BC_INLINE void solve_two(const Query<T>& query, const Query<T>& other, Found<T>& found,
                            Found<T>& other_found) const {
-    Way::template solve<T>(network, {&query, &other}, {&found, &other_found});
+    solve_blocks<T>({&query, &other}, {&found, &other_found});
+  }
+
+ private:
+  template <class T>
+  [[gnu::noinline]] void solve_blocks(Queries<T> queries,
+                                      Found<T>* const (&found)[blocks_together<T>]) const {
+    Way<T> way(network, queries);
+    for (int n = 0; n < blocks_together<T>; ++n) way.write(n, *found[n]);
   }
 };
 

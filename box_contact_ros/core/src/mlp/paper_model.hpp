@@ -123,15 +123,11 @@ struct PointAndNormal : PointAndVolume<T> {
   Vec<T> normal;  // from the caller's A, common frame
 };
 
+template <class T>
 struct ImpactByNetwork {
-  template <class T>
   using Found = PointAndNormal<T>;
 
-  template <class T>
-  [[gnu::noinline]] static void solve(const Network& network, Queries<T> queries,
-                                      Answers<Found<T>, T> found) {
-    using F = Floats<T>;
-    paper::Touching<T> pairs[blocks_together<T>];
+  BC_INLINE ImpactByNetwork(const Network& network, Queries<T> of) : queries(of) {
     for (int n = 0; n < blocks_together<T>; ++n) pairs[n] = {*queries[n], network.in_half_edges};
     auto vector = [&](auto get) {
       return components<F>(triple_of_floats<T>([&](int n) { return get(pairs[n]); }));
@@ -141,30 +137,34 @@ struct ImpactByNetwork {
       columns[k] = vector([k](const auto& pair) { return pair.rotation[k]; });
     paper::Impact<F> impact(network, vector([](const auto& pair) { return pair.offset; }), columns,
                             vector([](const auto& pair) { return pair.half; }));
-    Triple<F> point = triple(impact.point), normal = triple(impact.normal);
-    for (int n = 0; n < blocks_together<T>; ++n)
-      write(*queries[n], pairs[n], triple_of_doubles<T>(point, n), triple_of_doubles<T>(normal, n),
-            *found[n]);
+    point = triple(impact.point), normal = triple(impact.normal);
+  }
+  // To the common frame.
+  BC_INLINE void write(int block, Found& found) const {
+    const Query<T>& query = *queries[block];
+    const Pair<T>& pair = query.pair;
+    const paper::Touching<T>& touching = pairs[block];
+    Columns<T> axes = select<T>(touching.first_is_b, pair.axes_b, pair.axes_a);
+    Triple<T> origin = select(touching.first_is_b, pair.origin_b, pair.origin_a);
+    Triple<T> at = touching.unit * triple_of_doubles<T>(point, block) +
+                   (0.5 * query.axis.separation) * touching.normal;
+    Triple<T> answered = triple_of_doubles<T>(normal, block);
+    T by_length = 1.0 / sqrt(dot(answered, answered));  // of float32, 1 to seven digits
+    Triple<T> unit_normal = axes * (by_length * answered), zero{};
+    // Zeros keep no sign on a swap.
+    unit_normal =
+        select(Mask<T>(touching.first_is_b ^ pair.swapped), zero - unit_normal, zero + unit_normal);
+    found.centroid = components<T>(origin + axes * at);
+    found.volume = splat<T>(not_a_number);
+    found.normal = components<T>(unit_normal);
   }
 
  private:
-  // To the common frame.
-  template <class T>
-  BC_INLINE static void write(const Query<T>& q, const paper::Touching<T>& touching,
-                              const Triple<T>& point, const Triple<T>& answered, Found<T>& found) {
-    const Pair<T>& pair = q.pair;
-    Columns<T> axes = select<T>(touching.first_is_b, pair.axes_b, pair.axes_a);
-    Triple<T> origin = select(touching.first_is_b, pair.origin_b, pair.origin_a);
-    Triple<T> at = touching.unit * point + (0.5 * q.axis.separation) * touching.normal;
-    T by_length = 1.0 / sqrt(dot(answered, answered));  // of float32, 1 to seven digits
-    Triple<T> normal = axes * (by_length * answered);
-    Triple<T> zero{};
-    // Zeros keep no sign on a swap.
-    normal = select(Mask<T>(touching.first_is_b ^ pair.swapped), zero - normal, zero + normal);
-    found.centroid = components<T>(origin + axes * at);
-    found.volume = splat<T>(not_a_number);
-    found.normal = components<T>(normal);
-  }
+  using F = Floats<T>;
+
+  Queries<T> queries;
+  paper::Touching<T> pairs[blocks_together<T>];
+  Triple<F> point, normal;  // of the first box's frame and unit
 };
 
 using PaperModel = NetworkModel<ImpactByNetwork>;

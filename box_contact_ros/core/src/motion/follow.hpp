@@ -63,7 +63,7 @@ class Follower {
     if (count[1] == 2) add(Follows::face_of_b, vector_of(motion_.rate, 1));
     bool are_edges = count[0] == 1 && count[1] == 1;
     if (Vector sides = are_edges ? cross(edge[0], edge[1]) : Vector{};
-        are_edges && norm(sides) > 1e-6) {
+        are_edges && length(sides) > 1e-6) {
       keep(Plane::across(which[0], which[1], dot(n, sides) > 0.0 ? 1.0 : -1.0));
     } else if (count[0] < 2 && count[1] < 2) {
       Vector speed = velocity(near);

@@ -42,12 +42,12 @@ struct Plane {
                    : follows == Follows::face_of_b ? now.local(1, n)
                                                    : n;
     plane.rate = nu;
-    plane.turn = norm(nu);
-    plane.crossing = norm(cross(nu, n));
+    plane.turn = length(nu);
+    plane.crossing = length(cross(nu, n));
     plane.against = motion.rate - both(nu, nu);
-    plane.against_speed = norm(plane.against);
+    plane.against_speed = length(plane.against);
     plane.against_bend = plane.against_speed * plane.against_speed +
-                         norm(cross(plane.against, both(nu, nu)));
+                         length(cross(plane.against, both(nu, nu)));
     return plane;
   }
   static Plane across(int edge_a, int edge_b, double side) {
@@ -107,18 +107,18 @@ inline Bound bound_turning(const Motion& motion, const Instant& now, const Plane
   BothVectors turning = cross(normals, plane.against);  // n·(δ × x) = (n × δ)·x
   BothVectors speeds = cross(motion.rate, vertices);
   // A normal along the axis of a turn sees nothing of it.
-  Both oblique = min(one, norm(cross(motion.turns.axis, normals)) + d * p);
-  Both pull = motion.turned * norm(speeds), pull_along = oblique * pull;
+  Both oblique = min(one, length(cross(motion.turns.axis, normals)) + d * p);
+  Both pull = motion.turned * length(speeds), pull_along = oblique * pull;
   Both bend = min(plane.against_bend, (oblique * motion.turned + 2.0 * p) * motion.turned + nu * p);
-  Both in_turn = norm(vertices) * plane.against_bend, moving = plane.against_speed * motion.reach;
+  Both in_turn = length(vertices) * plane.against_bend, moving = plane.against_speed * motion.reach;
   for (int k = 0; k < 3; ++k)
     bound.add_least((side[k] - one) * motion.half[k], (side[k] + one) * motion.half[k],
                     {along[k], -sign * dot(turning, now.axes[k]), bend});
   double far = larger_norm(now.between, now.between + d * motion.way);
   double by_turn = (in_turn[0] + in_turn[1]) + p * (nu * far + 2.0 * motion.speed);
-  double speed = norm(motion.way + difference(speeds)) + d * (pull[0] + pull[1]);
+  double speed = length(motion.way + difference(speeds)) + d * (pull[0] + pull[1]);
   double by_frame = (pull_along[0] + pull_along[1]) +
-                    p * (2.0 * speed + nu * (norm(between) + d * speed));
+                    p * (2.0 * speed + nu * (length(between) + d * speed));
   bound.rate = (dot(n, motion.way) + dot(cross(plane.rate, n), now.between)) +
                difference(dot(turning, vertices));
   bound.rate -= rounding_share * (motion.speed + p * motion.far + (moving[0] + moving[1]));
@@ -134,7 +134,7 @@ inline Bound bound_across(const Motion& motion, const Instant& now, const Plane&
                           double target, double slack) {
   Bound bound;
   Vector a = now.axis(0, plane.edges[0]), b = now.axis(1, plane.edges[1]), edges = cross(a, b);
-  double size = 1.0 / norm(edges), scale = plane.side * size, half_target = 0.5 * max(target, 0.0);
+  double size = 1.0 / length(edges), scale = plane.side * size, half_target = 0.5 * max(target, 0.0);
   if (!(size < 1e6)) return bound;  // too nearly parallel
   Vector n = scale * edges, way = now.between + difference(now.arms);
   BothVectors u[2], v[2];
@@ -152,9 +152,9 @@ inline Bound bound_across(const Motion& motion, const Instant& now, const Plane&
   Vector moving = motion.way + difference(cross(motion.rate, now.arms));
   Vector rate_a = vector_of(motion.rate, 0), rate_b = vector_of(motion.rate, 1);
   Vector da = cross(rate_a, a), db = cross(rate_b, b), against = rate_b - rate_a;
-  Both levers = norm(motion.lever), turned = motion.turned, pulls = turned * turned * levers;
-  double pa = norm(da), pb = norm(db), against_speed = norm(against);
-  double bend = against_speed * against_speed + norm(cross(against, rate_a));
+  Both levers = length(motion.lever), turned = motion.turned, pulls = turned * turned * levers;
+  double pa = length(da), pb = length(db), against_speed = length(against);
+  double bend = against_speed * against_speed + length(cross(against, rate_a));
   double d = 1.0 - now.s;
   double far = larger_norm(way, way + d * motion.way) + 2.0 * (levers[0] + levers[1]);
   double fast = motion.speed + (turned[0] * levers[0] + turned[1] * levers[1]);

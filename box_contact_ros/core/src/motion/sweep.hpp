@@ -82,13 +82,13 @@ class Motion {
     }
     turned = 2.0 * turns.half_angle;
     rate = turned * turns.axis;
-    reach = norm(half) + norm(lever);
+    reach = length(half) + length(lever);
     froms_ = both(starts_[0].position, starts_[1].position) - arms_at_start;
     ways_ = (both(ends_[0].position, ends_[1].position) - arms_at_end) - froms_;
     from_ = (starts_[1].position - starts_[0].position) - difference(arms_at_start);
     Vector to = (ends_[1].position - ends_[0].position) - difference(arms_at_end);
     way = to - from_;
-    speed = norm(way);
+    speed = length(way);
     far = larger_norm(from_, to);
     double out = max(larger_norm(starts_[0].position, starts_[1].position),
                      larger_norm(ends_[0].position, ends_[1].position));

@@ -15,15 +15,6 @@ using Vector = Vec<double>;
 using Both = Lanes<double, 2>;  // a number of A, and one of B
 using BothVectors = Vec<Both>;
 
-template <class T>
-BC_INLINE Vec<T> cross(const Vec<T>& a, const Vec<T>& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-template <class T>
-BC_INLINE T norm(const Vec<T>& a) {
-  return sqrt(dot(a, a));
-}
-
 BC_INLINE double larger_norm(const Vector& a, const Vector& b) {
   return std::sqrt(max(dot(a, a), dot(b, b)));
 }
@@ -93,7 +84,7 @@ inline int find_shortest_turns(const Both (&start)[4], const Both (&end)[4], Tur
   BothVectors way = (turns.start[3] * q - to[3] * p) - cross(q, p);
   for (int box = 0; box < 2; ++box)
     if (!(std::fabs(cosine[box]) >= least_cosine)) return box;
-  Both sine = norm(way);  // q and −q are one orientation
+  Both sine = length(way);  // q and −q are one orientation
   Both sign = select<Both>(cosine < splat<Both>(0.0), -one, one);
   Mask<Both> is_turn = sine > splat<Both>(0.0);
   turns.half_angle = angles_of(sine, abs(cosine));

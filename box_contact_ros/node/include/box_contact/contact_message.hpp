@@ -30,9 +30,9 @@ inline Contact from_message(const box_contact_msgs::msg::Contact& message) {
   return contact;
 }
 
-// Return the message of the contact of a pair, by its name and the names of its boxes.
-inline box_contact_msgs::msg::Contact to_message(const Contact& contact, const std::string& pair,
-                                                 const std::string& box_a,
+// Return the message of the contact of boxes A and B, by the names of the pair and of both.
+inline box_contact_msgs::msg::Contact to_message(const Contact& contact, const Box& a, const Box& b,
+                                                 const std::string& pair, const std::string& box_a,
                                                  const std::string& box_b) {
   box_contact_msgs::msg::Contact message;
   message.pair = pair, message.box_a = box_a, message.box_b = box_b;
@@ -41,7 +41,7 @@ inline box_contact_msgs::msg::Contact to_message(const Contact& contact, const s
   message.normal.z = contact.normal[2], message.point.z = contact.point[2];
   message.depth = -contact.separation;
   message.volume = contact.volume;
-  message.area = patch_area(contact);
+  message.area = contact.colliding ? face_patch(a, b, contact.normal).area : 0.0;
   for (int row = 0, number = 0; row < 3; ++row)
     for (int column = row; column < 3; ++column, ++number)
       message.covariance[number] = contact.covariance[row][column];

@@ -1,0 +1,80 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""What stands: how far centres are inside the hulls of what carries them, from the ground up."""
+from __future__ import annotations
+
+import numpy as np
+
+from ..core import DEPTH_FLOOR, native
+from ..solver.pose import rotation_matrix
+
+
+def across_of(direction: np.ndarray) -> np.ndarray:
+    """Return two unit vectors (2, 3) across a direction, and across each other."""
+    return np.linalg.svd(direction[None])[2][1:]
+
+
+def base_areas(sizes: np.ndarray, poses: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """Return the areas (n,) of the faces most across `up`, as seen along it [m²]."""
+    turned = np.abs(up @ rotation_matrix(poses[:, 3:]))
+    face = turned.argmax(axis=1)
+    rows = np.arange(len(sizes))
+    return sizes.prod(axis=1) / sizes[rows, face] * turned[rows, face]
+
+
+def needs(sizes: np.ndarray, pairs: np.ndarray, separation: np.ndarray, tolerance: np.ndarray,
+          upper: np.ndarray, count: int) -> np.ndarray:
+    """Return how far inside its hull each of so many centres must be (n,): tolerance and depth [m].
+
+    upper: what each pair (k, 2) carries. Boxes that merely touch count as pressed together by the
+    solver's share of the larger one; those that overlap, by the tolerance (k,).
+    """
+    need = np.zeros(count)
+    longest = sizes.max(axis=1)[pairs].max(axis=1)
+    np.maximum.at(need, upper, tolerance + np.maximum(
+        np.minimum(-separation, tolerance), DEPTH_FLOOR * longest))
+    return need
+
+
+def heights(sizes: np.ndarray, poses: np.ndarray, frame: np.ndarray, body: np.ndarray,
+            hangs: np.ndarray) -> np.ndarray:
+    """Return how high the boxes (n,) of bodies that hang are above what is below [m].
+
+    frame: (3, 3) rows: two directions across gravity, and the one against it. hangs: by body.
+    By bounding boxes along the frame. Infinity: above nothing; NaN: the box does not hang.
+    """
+    half = np.abs(frame @ rotation_matrix(poses[:, 3:])) @ sizes[:, :, None] / 2.0
+    middle, half = poses[:, :3] @ frame.T, half[:, :, 0]
+    low, high = middle - half, middle + half
+    height = np.full(len(sizes), np.nan)
+    for box in np.flatnonzero(hangs[body]):
+        below = (body != body[box]) & (high[:, 2] <= low[box, 2]) & (
+            (low < high[box]) & (low[box] < high))[:, :2].all(axis=1)
+        height[box] = low[box, 2] - high[below, 2].max(initial=-np.inf)
+    return height
+
+
+def hull_margins(points: np.ndarray, upper: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return how far each of n places (n, 2) is inside the hull of what carries it [m].
+
+    points: (k, h, 2) of k patches. upper: (k,) which of the n each patch carries. Outside, it is
+    below 0; −infinity: nothing carries it.
+    """
+    order = np.argsort(upper, kind='stable')
+    first = np.searchsorted(upper[order], np.arange(len(at) + 1))
+    return native.hull_depths(np.ascontiguousarray(points[order].reshape(-1, 2)),
+                              first * points.shape[1], np.ascontiguousarray(at))
+
+
+def standing(lower: np.ndarray, upper: np.ndarray, inside: np.ndarray, on_ground: np.ndarray,
+             ) -> np.ndarray:
+    """Return which of n stand: from the ground up, so a ring does not."""
+    stands = on_ground
+    while True:
+        leans = ~inside
+        leans[upper[~stands[lower]]] = True
+        higher = on_ground | ~leans
+        if np.array_equal(higher, stands):
+            return stands
+        stands = higher

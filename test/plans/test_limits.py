@@ -1,0 +1,118 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a file may cost: nothing is waited for, and little memory and time is taken."""
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from box_contact_ros.plans import inspect_files
+
+pytest.importorskip('clarabel')
+
+from test_read_plan import A, body, mjcf, model, sheet, world, written
+
+MEMORY, SECONDS = 300 * 2**20, 2.0
+"""That the program may take, with all its imports [bytes, s of the processor]."""
+
+
+def judged(path: Path, *options: str) -> tuple[int, str, float, int]:
+    """Return exit status, what is printed, processor time [s] and memory [bytes] of the program."""
+    started = resource.getrusage(resource.RUSAGE_CHILDREN)
+    # VmHWM is the program's own; ru_maxrss also counts the process that started it.
+    done = subprocess.run([sys.executable, '-c', (
+        'import resource, sys\nfrom box_contact_ros.plans.inspect_files import main\n'
+        'status = main(sys.argv[1:])\nown = next(int(line.split()[1]) for line in '
+        'open("/proc/self/status") if line.startswith("VmHWM"))\n'
+        'print(max(own, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss), '
+        'file=sys.stderr)\nsys.exit(status)'),
+        str(path), *options], capture_output=True, text=True, timeout=100)
+    ended = resource.getrusage(resource.RUSAGE_CHILDREN)
+    *errors, peak = done.stderr.splitlines()
+    seconds = ended.ru_utime - started.ru_utime + ended.ru_stime - started.ru_stime
+    return done.returncode, done.stdout + '\n'.join(errors), seconds, 1024 * int(peak)
+
+
+@pytest.mark.parametrize('name', ['p.csv', 'p.sdf', 'p.xml', 'p.yaml', 'p'])
+@pytest.mark.parametrize('make', [os.mkfifo, os.mkdir, lambda path: os.symlink('/dev/zero', path)])
+def test_what_is_no_file_is_refused_at_once(name, make, tmp_path, capsys):
+    path = tmp_path / name
+    make(path)
+    assert inspect_files.main([str(path)]) == 2
+    assert capsys.readouterr().err == f'{path}: it is not a regular file\n'
+
+
+@pytest.mark.parametrize('make', [os.mkfifo, os.mkdir, lambda path: os.symlink('/dev/zero', path)])
+@pytest.mark.parametrize('text', [
+    mjcf('<include file="other"/>'), mjcf('<include file="middle.xml"/>'),
+    mjcf(more='<asset><mesh name="m" file="other"/></asset>'),
+    mjcf(more='<compiler meshdir="sub"/><asset><mesh name="m" file="../other"/></asset>'),
+    '<robot name="r"><link name="l"><collision><geometry><mesh filename="other"/></geometry>'
+    '</collision></link></robot>'])
+def test_what_a_model_names_must_be_a_file(make, text, tmp_path, capsys):
+    pytest.importorskip('mujoco')
+    (tmp_path / 'sub').mkdir()
+    written(tmp_path, 'middle.xml', '<mujocoinclude><include file="other"/></mujocoinclude>')
+    make(tmp_path / 'other')
+    path = written(tmp_path, 'p.xml', text)
+    assert inspect_files.main([str(path)]) == 2
+    assert capsys.readouterr().err == f'{path}: it is not a regular file\n'
+
+
+def test_what_a_model_names_is_read(tmp_path, capsys):
+    pytest.importorskip('mujoco')
+    written(tmp_path, 'other.xml', f'<mujocoinclude>{body("a", 1.4)}</mujocoinclude>')
+    path = written(tmp_path, 'p.xml', mjcf('<include file="other.xml"/>'))
+    assert inspect_files.main([str(path)]) == 1
+    assert capsys.readouterr().out.startswith('hangs                 a  ')
+
+
+@pytest.mark.parametrize('text', [
+    '<mujoco><asset><hfield name="h" nrow="100000" ncol="100000" size="1 1 1 1"/></asset>'
+    '<worldbody><geom type="hfield" hfield="h"/></worldbody></mujoco>',
+    '<mujoco><size nkey="2000000000"/><worldbody><geom type="box" size="1 1 1"/></worldbody>'
+    '</mujoco>',
+    '<mujoco><size nuserdata="2000000000"/><worldbody><geom type="box" size="1 1 1"/></worldbody>'
+    '</mujoco>'])
+def test_a_model_that_needs_much_is_refused(text, tmp_path):
+    """MuJoCo took 9.6 s for the keyframes, and as much memory as there is for the others."""
+    pytest.importorskip('mujoco')
+    status, printed, seconds, peak = judged(written(tmp_path, 'p.xml', text))
+    assert status == 2 and 'MuJoCo does not read it' in printed and '\n' not in printed
+    assert seconds < SECONDS and peak < MEMORY
+
+
+IN_ONE_PLACE = {
+    'p.csv': sheet(*(f'{n},1,1,1,0,0,0.5' for n in range(2000))),
+    'p.sdf': world(*(A.replace('"a"', f'"{n}"') for n in range(2000)))}
+
+
+@pytest.mark.parametrize('name', IN_ONE_PLACE)
+def test_too_many_overlaps(name, tmp_path):
+    """2,000 boxes in one place took 1.3 GB."""
+    status, printed, seconds, peak = judged(written(tmp_path, name, IN_ONE_PLACE[name]))
+    assert status == 1 and 'too many' in printed and printed.startswith('overlap ')
+    assert seconds < SECONDS and peak < MEMORY
+
+
+def test_the_bound_on_pairs_keeps_the_answer(tmp_path, monkeypatch, capsys):
+    """What touches and does not overlap, or may, is not called certainly wrong."""
+    touching = sheet(*(f'{n},1,1,1,{n % 2},0,{n // 2 + 0.5}' for n in range(2)))
+    overlapping = touching.replace('1.0,', '0.4,').replace('1,1,1,1,0', '1,1,1,0.4,0')
+    one_model = world(model('m', ''.join(
+        f'<link name="l{n}"><collision name="c"><geometry><box><size>1 1 1</size></box></geometry>'
+        '</collision></link>' for n in range(3))))
+    for module in 'bodies', 'crowd', 'inspect_plan':
+        monkeypatch.setattr(f'box_contact_ros.plans.{module}.most_near', lambda count: 2)
+    for text, name, status in ((touching, 'a.csv', 3), (overlapping, 'b.csv', 1),
+                               (one_model, 'c.sdf', 3)):
+        for options in [], ['--json'], ['--csv']:
+            path = written(tmp_path, name, text)
+            assert inspect_files.main([str(path), *options]) == status
+            assert 'too many' in capsys.readouterr().out
