@@ -16,7 +16,6 @@ import pytest
 
 from box_contact_ros import Approach, Approaches, ContactSolver
 from box_contact_ros.core import instruction_sets
-from box_contact_ros.solver.pose import rotation_matrix
 
 motions = pytest.importorskip('benchmarks.motions')
 
@@ -45,27 +44,11 @@ def ask(found, name='time_of_impact', rows=slice(None), **options):
         centre_b=found.centre_b, **options)
 
 
-def poses_at(start, end, centre, s):
-    """Return poses (n, 7) at times s (n,), by the definition of the motion."""
-    turn_a, turn_b = (pose[:, 3:] / np.linalg.norm(pose[:, 3:], axis=1)[:, None]
-                      for pose in (start, end))
-    relative = poses.multiply(turn_b, turn_a * [-1, -1, -1, 1])
-    relative *= np.where(relative[:, 3:] < 0.0, -1.0, 1.0)
-    length = np.linalg.norm(relative[:, :3], axis=1)
-    half = s * np.arctan2(length, relative[:, 3])
-    axis = relative[:, :3] / np.maximum(length, 1e-300)[:, None]
-    turn = poses.multiply(np.column_stack([np.sin(half)[:, None] * axis, np.cos(half)]), turn_a)
-    arms = [np.einsum('nij,nj->ni', rotation_matrix(pose[:, 3:]), centre) for pose in (start, end)]
-    low, high = start[:, :3] + arms[0], end[:, :3] + arms[1]
-    place = low + s[:, None] * (high - low)
-    return np.hstack([place - np.einsum('nij,nj->ni', rotation_matrix(turn), centre), turn])
-
-
 def nearest_at(found, s):
     """Return the distances at times s (n,)."""
     return ContactSolver().distance_batch(
-        poses_at(found.start_a, found.end_a, found.centre_a, s),
-        poses_at(found.start_b, found.end_b, found.centre_b, s), size_a=found.size_a,
+        poses.on_the_way(found.start_a, found.end_a, found.centre_a, s),
+        poses.on_the_way(found.start_b, found.end_b, found.centre_b, s), size_a=found.size_a,
         size_b=found.size_b)
 
 
@@ -250,8 +233,8 @@ def test_a_way_that_is_cut_in_two_is_the_same_way(kind):
     rng = np.random.default_rng(7)
     drawn = motions.draw(kind, 7, 300)
     cut = rng.uniform(0.0, 1.0, 300)
-    middle_a = poses_at(drawn.start_a, drawn.end_a, drawn.centre_a, cut)
-    middle_b = poses_at(drawn.start_b, drawn.end_b, drawn.centre_b, cut)
+    middle_a = poses.on_the_way(drawn.start_a, drawn.end_a, drawn.centre_a, cut)
+    middle_b = poses.on_the_way(drawn.start_b, drawn.end_b, drawn.centre_b, cut)
     parts = (drawn._replace(end_a=middle_a, end_b=middle_b),
              drawn._replace(start_a=middle_a, start_b=middle_b))
     whole = times(drawn, TOLERANCE)
