@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .plans.inspection import Inspection, Row
     from .plans.plan import Fault, Plan
     from .plans.read_plan import read_plan
+    from .scene.path import PathCheck
     from .scene.scene import Box, Frame, Pair, Scene
     from .scene.scene_file import read_scene
     from .scene.scene_solver import SceneSolver
@@ -31,8 +32,9 @@ if TYPE_CHECKING:
 
 __all__ = ['Approach', 'Approaches', 'Body', 'Box', 'Contact', 'ContactSolver', 'Contacts',
            'FacePatches', 'Fault', 'Frame', 'Inspection', 'Nearest', 'Nearests', 'Pair',
-           'PatchForces', 'Plan', 'ReadContacts', 'Row', 'Scene', 'SceneSolver', 'contacts_of',
-           'face_patches', 'inspect_plan', 'make_model', 'read_contacts', 'read_plan', 'read_scene']
+           'PatchForces', 'PathCheck', 'Plan', 'ReadContacts', 'Row', 'Scene', 'SceneSolver',
+           'contacts_of', 'face_patches', 'inspect_plan', 'make_model', 'read_contacts',
+           'read_plan', 'read_scene']
 # `ContactNode` needs ROS, and `import *` does without.
 
 _LOADED_WHEN_USED = {
@@ -43,6 +45,7 @@ _LOADED_WHEN_USED = {
     'plans.inspection': ('Inspection', 'Row'),
     'plans.plan': ('Fault', 'Plan'),
     'plans.read_plan': ('read_plan',),
+    'scene.path': ('PathCheck',),
     'scene.scene_file': ('read_scene',),
     'scene.scene': ('Box', 'Frame', 'Pair', 'Scene'),
     'scene.scene_solver': ('SceneSolver',),
