@@ -3,12 +3,12 @@
 
 """Where the forces end: a figure for each hard case, beside the line that it must not cross.
 
-`python -m benchmarks.force_lines` runs the cases of eight subjects by `PatchForces` with contacts
+`python -m benchmarks.force_lines` runs the cases of nine subjects by `PatchForces` with contacts
 of its own: uneven steps, heavy bodies on light ones, impacts, carriers, gaps of a nanometre, a wide
-floor, loads of feet, and tipping. It prints and writes force_lines.md, which also lists the tuned
-numbers of the forces, and force_lines.csv. The lines of impacts, feet and tipping come from theory;
-the other ones say what a user may expect. The exit status is 1 if a figure is beyond its line.
-`--only SUBJECT` runs some of the subjects.
+floor, loads of feet, tipping, and a rope. It prints and writes force_lines.md, which also lists the
+tuned numbers of the forces, and force_lines.csv. The lines of impacts, feet, tipping and the rope
+come from theory; the other ones say what a user may expect. The exit status is 1 if a figure is
+beyond its line. `--only SUBJECT` runs some of the subjects.
 """
 from __future__ import annotations
 
@@ -264,6 +264,35 @@ def tipping(*, quick: bool) -> Iterator[Line]:
     yield Line(subject='tipping', case=cube.name, what='falls within [s]', figure=tipped, line=3.0)
 
 
+# --- ropes ----------------------------------------------------------------------------------------
+
+def load_on_rope(degrees: float = 5.0, length: float = 20.0) -> Scene:
+    """Return a load of 18 t that swings on a rope of 3 MN/m, damped along itself."""
+    mass, stiffness, angle = 18e3, 3e6, math.radians(degrees)
+    damping, slack = 0.6 * math.sqrt(stiffness * mass), length - mass * GRAVITY / stiffness
+
+    def act(t: float, boxes: Boxes, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        far, pull = np.linalg.norm(pose[0, :3]), np.zeros((1, 6))
+        up = -pose[0, :3] / far
+        pull[0, :3] = (stiffness * (far - slack) - damping * (velocity[0, :3] @ up)) * up
+        return pull
+
+    at = length * math.sin(angle), 0, -length * math.cos(angle)
+    return Scene('18 t on 20 m', Boxes.of([((6.0, 2.4, 2.6), mass, at)]), 600.0, act=act)
+
+
+def ropes(*, quick: bool) -> Iterator[Line]:
+    """Yield how the angle changes by which a load swings, in ten minutes."""
+    for name in ('1/60 s', '1/120 s'):
+        scene, widest = load_on_rope(), 0.0
+        scene.seconds = 60.0 if quick else 600.0
+        for loop in runs(scene, FRAMES[name]):
+            if loop.time > scene.seconds - 10.0:
+                widest = max(widest, abs(loop.boxes.pose[0, 0]))
+        yield Line(subject='rope', case=f'{scene.name}, {name}', what='angle changes by [%]',
+                   figure=100.0 * abs(math.degrees(math.asin(widest / 20.0)) / 5.0 - 1.0), line=1.0)
+
+
 # --- the numbers of the method --------------------------------------------------------------------
 
 TUNING = output.ROOT / 'box_contact_ros/core/src/force/tuning.hpp'
@@ -305,7 +334,8 @@ def tuned_numbers(text: str) -> list[Number]:
 
 SUBJECTS: dict[str, Callable[..., Iterator[Line]]] = {
     'uneven': uneven_steps, 'heavy': heavy_on_light, 'impact': impacts, 'carrier': carriers,
-    'gaps': gaps_of_a_nanometre, 'floor': wide_floors, 'feet': feet, 'tipping': tipping}
+    'gaps': gaps_of_a_nanometre, 'floor': wide_floors, 'feet': feet, 'tipping': tipping,
+    'rope': ropes}
 """Cases by the name that `--only` takes."""
 
 
