@@ -3,12 +3,12 @@
 
 """Where the forces end: a figure for each hard case, beside the line that it must not cross.
 
-`python -m benchmarks.force_lines` runs the cases of nine subjects by `PatchForces` with contacts
+`python -m benchmarks.force_lines` runs the cases of ten subjects by `PatchForces` with contacts
 of its own: uneven steps, heavy bodies on light ones, impacts, carriers, gaps of a nanometre, a wide
-floor, loads of feet, tipping, and a rope. It prints and writes force_lines.md, which also lists the
-tuned numbers of the forces, and force_lines.csv. The lines of impacts, feet, tipping and the rope
-come from theory; the other ones say what a user may expect. The exit status is 1 if a figure is
-beyond its line. `--only SUBJECT` runs some of the subjects.
+floor, loads of feet, tipping, a rope, and thin plates. It prints and writes force_lines.md, which
+also lists the tuned numbers of the forces, and force_lines.csv. The lines of impacts, feet, tipping
+and the rope come from theory; the other ones say what a user may expect. The exit status is 1 if a
+figure is beyond its line. `--only SUBJECT` runs some of the subjects.
 """
 from __future__ import annotations
 
@@ -135,6 +135,19 @@ def heavy_on_light(*, quick: bool) -> Iterator[Line]:
         if scene.name.startswith('heavy'):
             yield Line(subject='heavy on light', case=scene.name, what='rests after [s]',
                        figure=rest, line=0.5)
+
+
+def plates(count: int = 60, thick: float = 0.005) -> Scene:
+    """Return flush plates on each other, of 37 kg each."""
+    return Scene(f'{count} plates of {1e3 * thick:g} mm', Boxes.of([FLOOR, *(
+        ((1.2, 0.8, thick), 37.0, (0, 0, thick * (k + 0.5))) for k in range(count))]), 2.0)
+
+
+def thin_plates(*, quick: bool) -> Iterator[Line]:
+    """Yield how far thin plates sink into each other at 1/60 s."""
+    depth, rest = sunk(plates(), FRAMES['1/60 s'])
+    yield Line(subject='thin', case=plates().name, what='sinks [mm]', figure=1e3 * depth, line=10.0)
+    yield Line(subject='thin', case=plates().name, what='rests after [s]', figure=rest, line=1.5)
 
 
 # --- impacts --------------------------------------------------------------------------------------
@@ -335,7 +348,7 @@ def tuned_numbers(text: str) -> list[Number]:
 SUBJECTS: dict[str, Callable[..., Iterator[Line]]] = {
     'uneven': uneven_steps, 'heavy': heavy_on_light, 'impact': impacts, 'carrier': carriers,
     'gaps': gaps_of_a_nanometre, 'floor': wide_floors, 'feet': feet, 'tipping': tipping,
-    'rope': ropes}
+    'rope': ropes, 'thin': thin_plates}
 """Cases by the name that `--only` takes."""
 
 

@@ -183,7 +183,8 @@ class Loads(NamedTuple):
     corner_loads: np.ndarray
     """(k, 4) the part of `pressing` at each corner, never below 0 [N]: bilinear about `centre`."""
     too_deep: np.ndarray
-    """(k,) bool, whether the patch is deeper than `most_depth`."""
+    """(k,) bool, whether the patch is deeper than `most_depth`, or, with `set_boxes`, than a tenth
+    of the thinner box."""
 
 
 class PatchForces:

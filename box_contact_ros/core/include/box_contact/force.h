@@ -119,7 +119,8 @@ typedef struct bc_load {
                              within 0.1 mm; else it has the moments of the overlap, which at rest is a
                              wedge, and may reach beyond the rim */
   double corner_loads[4]; /* the part of `pressing` at each corner; never below 0 [N] */
-  int is_too_deep;        /* whether the patch is deeper than `most_depth` */
+  int is_too_deep;        /* whether the patch is deeper than `most_depth`, or, with
+                             bc_patch_forces_set_boxes, than a tenth of the thinner box */
 } bc_load;
 
 typedef struct bc_patch_forces bc_patch_forces;

@@ -77,6 +77,8 @@ constexpr double least_push = 600.0;
 constexpr double uneven_masses = 10.0;
 // The part of the depth that is wanted which is aimed at [1]: depths of a stack add up.
 constexpr double aimed_depth = 0.36;
+// The part of the thinner box, along the normal, that a patch may be deep [1].
+constexpr double deepest_part = 0.1;
 // A factor grows where this share more is needed [1], as each change moves what rests, and by as much more.
 constexpr double growth = 1.25;
 // Sub-steps are shorter by this factor at most.
