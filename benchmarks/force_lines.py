@@ -3,12 +3,13 @@
 
 """Where the forces end: a figure for each hard case, beside the line that it must not cross.
 
-`python -m benchmarks.force_lines` runs the cases of ten subjects by `PatchForces` with contacts
+`python -m benchmarks.force_lines` runs the cases of eleven subjects by `PatchForces` with contacts
 of its own: uneven steps, heavy bodies on light ones, impacts, carriers, gaps of a nanometre, a wide
-floor, loads of feet, tipping, a rope, and thin plates. It prints and writes force_lines.md, which
-also lists the tuned numbers of the forces, and force_lines.csv. The lines of impacts, feet, tipping
-and the rope come from theory; the other ones say what a user may expect. The exit status is 1 if a
-figure is beyond its line. `--only SUBJECT` runs some of the subjects.
+floor, loads of feet, tipping, friction off the centre, a rope, and thin plates. It prints and
+writes force_lines.md, which also lists the tuned numbers of the forces, and force_lines.csv. The
+lines of impacts, feet, tipping, friction and the rope come from theory; the other ones say what a
+user may expect. The exit status is 1 if a figure is beyond its line. `--only SUBJECT` runs some of
+the subjects.
 """
 from __future__ import annotations
 
@@ -22,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from box_contact_ros.forces.patch_forces import GRAVITY
+from box_contact_ros.forces.patch_forces import FRICTION, GRAVITY
 
 from . import output
 from .loops import FLOOR, FRAME, Boxes, Ours, Scene, Timing, corner_speeds, steps
@@ -277,6 +278,43 @@ def tipping(*, quick: bool) -> Iterator[Line]:
     yield Line(subject='tipping', case=cube.name, what='falls within [s]', figure=tipped, line=3.0)
 
 
+# --- friction -------------------------------------------------------------------------------------
+
+def pushed(name: str, aside: float, degrees: float) -> Scene:
+    """Return a plate of 1 t that lands and is pushed by 0.99 of what friction holds after 1 s.
+
+    Its mass is aside [m], and it falls 2 mm where it is tilted.
+    """
+    mass, tilt = 1000.0, math.radians(degrees)
+    push = np.zeros((2, 6))
+    push[1, 0] = 0.99 * FRICTION * mass * GRAVITY
+    height = 0.2 + math.sin(tilt) + (0.002 if tilt else 0.0)
+    return Scene(name, Boxes.of([
+        ((200.0, 50.0, 1.0), 0.0, (0, 0, -0.5)),
+        ((2.0, 2.0, 0.4), mass, (0, 0, height), (math.sin(0.5 * tilt), 0, 0, math.cos(0.5 * tilt)),
+         (0.0, aside, -0.19))]), 2.5, act=lambda t, *_: push * (t > 1.0))
+
+
+def friction(*, quick: bool) -> Iterator[Line]:
+    """Yield how far a plate slides below Coulomb's limit, and how far one turns that is thrown."""
+    for name in ('1 ms', '1/60 s'):
+        for case, aside, degrees in (('mass 0.8 m aside', 0.8, 0.0), ('landed tilted', 0.0, 0.1)):
+            scene, start = pushed(case, aside, degrees), np.zeros(3)
+            for loop in runs(scene, FRAMES[name]):
+                if loop.time <= 1.0:
+                    start = loop.boxes.pose[1, :3].copy()
+            way = float(np.linalg.norm(scene.boxes.pose[1, :3] - start))
+            yield Line(subject='friction', case=f'{case}, {name}', what='slides [mm]',
+                       figure=1e3 * way, line=2.0)
+        scene = pushed('thrown', 0.8, 0.0)
+        scene.seconds, scene.boxes.velocity[1, 0] = 1.0, 3.0
+        for _ in runs(scene, FRAMES[name]):
+            pass
+        turned = 2.0 * math.degrees(abs(math.asin(scene.boxes.pose[1, 5])))
+        yield Line(subject='friction', case=f'mass 0.8 m aside, 3 m/s, {name}', what='turns by [°]',
+                   figure=turned, line=1.0)
+
+
 # --- ropes ----------------------------------------------------------------------------------------
 
 def load_on_rope(degrees: float = 5.0, length: float = 20.0) -> Scene:
@@ -348,7 +386,7 @@ def tuned_numbers(text: str) -> list[Number]:
 SUBJECTS: dict[str, Callable[..., Iterator[Line]]] = {
     'uneven': uneven_steps, 'heavy': heavy_on_light, 'impact': impacts, 'carrier': carriers,
     'gaps': gaps_of_a_nanometre, 'floor': wide_floors, 'feet': feet, 'tipping': tipping,
-    'rope': ropes, 'thin': thin_plates}
+    'friction': friction, 'rope': ropes, 'thin': thin_plates}
 """Cases by the name that `--only` takes."""
 
 

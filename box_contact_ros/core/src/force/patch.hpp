@@ -59,6 +59,8 @@ struct Kept {
   T normal_impulse, torsion_impulse;         // N [N s], m [N m s]
   Vec<T> friction_impulse, rocking_impulse;  // f [N s], τ [N m s]
   Vec<T> impulse_arm;                        // from A's centre of mass to where they acted [m]
+  T pressure;                                // what pressed lately [N s]
+  Vec<T> pressure_arm;                       // from A's centre of mass to its centre [m]
 };
 
 // The patch of a pair, where it was asked for, and what it gave.

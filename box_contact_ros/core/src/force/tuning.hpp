@@ -52,6 +52,9 @@ constexpr double most_over_relaxation = 1.3;
 // But not where no rim is faster than this [m/s]: what rests stays solved.
 constexpr double least_over_relaxed = 1e-6;
 
+// Friction acts at the centre of what pressed in this time [s], which of piles shakes from step to step.
+constexpr double pressure_time = 0.05;
+
 // --- impacts ---
 // An impact goes on while an iteration changes a closing speed by more than this [m/s], and at most so often.
 constexpr double impact_change = 0.01;
