@@ -95,6 +95,7 @@ reports:
 	# Those with rivals come first: one that is missing shows at once.
 	run benchmarks.native $(ARGS) $(LEFT_OUT)
 	run benchmarks.distance $(ARGS) $(LEFT_OUT)
+	run benchmarks.motion $(ARGS) $(LEFT_OUT)
 	run benchmarks.frontier $(ARGS) $(LEFT_OUT)
 	run benchmarks.stacks $(ARGS) $(LEFT_OUT)
 	run benchmarks.accuracy $(ARGS)

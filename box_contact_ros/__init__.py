@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from .solver.contact import Contact, Contacts
 from .solver.contact_solver import ContactSolver
+from .solver.motion import Approach, Approaches
 from .solver.nearest import Nearest, Nearests
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from .plans.inspection import Inspection, Row
     from .plans.plan import Fault, Plan
     from .plans.read_plan import read_plan
+    from .scene.path import PathCheck
     from .scene.scene import Box, Frame, Pair, Scene
     from .scene.scene_file import read_scene
     from .scene.scene_solver import SceneSolver
@@ -28,10 +30,11 @@ if TYPE_CHECKING:
     from .solver.faces import FacePatches, face_patches
     from .stream.read_contacts import ReadContacts, read_contacts
 
-__all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'FacePatches', 'Fault', 'Frame',
-           'Inspection', 'Nearest', 'Nearests', 'Pair', 'PatchForces', 'Plan', 'ReadContacts',
-           'Row', 'Scene', 'SceneSolver', 'contacts_of', 'face_patches', 'inspect_plan',
-           'make_model', 'read_contacts', 'read_plan', 'read_scene']
+__all__ = ['Approach', 'Approaches', 'Body', 'Box', 'Contact', 'ContactSolver', 'Contacts',
+           'FacePatches', 'Fault', 'Frame', 'Inspection', 'Nearest', 'Nearests', 'Pair',
+           'PatchForces', 'PathCheck', 'Plan', 'ReadContacts', 'Row', 'Scene', 'SceneSolver',
+           'contacts_of', 'face_patches', 'inspect_plan', 'make_model', 'read_contacts',
+           'read_plan', 'read_scene']
 # `ContactNode` needs ROS, and `import *` does without.
 
 _LOADED_WHEN_USED = {
@@ -42,6 +45,7 @@ _LOADED_WHEN_USED = {
     'plans.inspection': ('Inspection', 'Row'),
     'plans.plan': ('Fault', 'Plan'),
     'plans.read_plan': ('read_plan',),
+    'scene.path': ('PathCheck',),
     'scene.scene_file': ('read_scene',),
     'scene.scene': ('Box', 'Frame', 'Pair', 'Scene'),
     'scene.scene_solver': ('SceneSolver',),

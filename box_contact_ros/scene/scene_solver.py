@@ -24,6 +24,8 @@ from ..solver.contacts_of import find_contacts, touching_and_near
 from ..solver.model import Model
 from ..solver.nearest import Nearest, Nearests
 from .changes import checked_changes
+from .path import PathCheck, as_path, check_course, course_of
+from .rides import Surroundings
 from .scene import NOWHERE, Box, Frame, Pair, Scene
 
 NO_BODIES = np.zeros(0, np.int64)
@@ -109,6 +111,7 @@ class SceneSolver:
         self.model = model
         self._solver = ContactSolver(model=model, margin=self.margin)
         self._at = _Revision.of(scene, 0, self.margin)
+        self._around: tuple[_Revision, Surroundings] | None = None
         self._refuse_sizes(*(np.unique(sizes, axis=0)
                              for sizes in (scene.sizes, scene.sizes[scene.rows].reshape(-1, 6))))
         self([None] * len(self.moving))
@@ -148,6 +151,7 @@ class SceneSolver:
         solver = object.__new__(SceneSolver)
         solver.model, solver.margin, solver._at = self.model, self.margin, later
         solver._most_near, solver._solver = self._most_near, self._solver
+        solver._around = None
         sizes = np.array([box.size for box in changes.boxes.values() if box is not None])
         listed = ([] if scene.listed_names.isdisjoint(changes.boxes) else
                   scene.sizes[scene.rows])
@@ -210,6 +214,30 @@ class SceneSolver:
         found = touching_and_near(pairs, contacts, self._solver, self.scene.sizes, self._at.poses,
                                   self.margin)
         return Answer(*found, len(pairs), stale, self.scene, self.revision)
+
+    def check_path(self, poses: ArrayLike, *, clearance: float = 0.0) -> PathCheck:
+        """Return what the boxes and bodies that move meet on a path, and how near all else comes.
+
+        poses: (m, n, 7), at each of m times those of `moving`; seven NaN at all times leave one
+        out. Between two of them centres, of a body its origin, go on a line, and axes turn the
+        shortest way at constant rate.
+        clearance: the distance from which on a pair counts [m].
+
+        Times are never late: before them the distance is above the clearance, by proof; at them it
+        is at most 1e-6 m more. The pairs are those of a tick. Nothing of a tick changes.
+        Raises ValueError for what is not a path, and for a turn by 180 degrees, which has two ways.
+        """
+        at = self._at
+        course = course_of(at.scene, at.poses, as_path(poses, self.moving), self.around)
+        return PathCheck(*check_course(course, clearance), at.scene, at.number)
+
+    @property
+    def around(self) -> Surroundings:
+        """Return the fixed boxes, as paths ask for them."""
+        if self._around is None or self._around[0] is not self._at:
+            fixed = self.scene.is_fixed
+            self._around = self._at, Surroundings(self.scene.sizes[fixed], self._at.poses[fixed])
+        return self._around[1]
 
     def _parts(self) -> tuple[native.BroadPhase, ContactSolver, float, int, np.ndarray, np.ndarray,
                               np.ndarray, np.ndarray, np.ndarray]:

@@ -220,20 +220,23 @@ def _holds_numbers(array: np.ndarray) -> bool:
     return array.dtype.kind in 'fiu'
 
 
-def as_boxes(sizes: ArrayLike, poses: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+def as_boxes(sizes: ArrayLike, poses: ArrayLike, names: tuple[str, str] = ('sizes', 'poses'),
+             ) -> tuple[np.ndarray, np.ndarray]:
     """Return full extents and poses of n boxes as arrays (n, 3) and (n, 7), checked.
 
     Extents (3,) are those of all boxes. A row of seven NaN is no bad pose: the box is not there.
+    names: of both, in a refusal.
     """
-    poses = as_floats(poses, 'poses', 'poses (n, 7) of rows x y z qx qy qz qw', (None, 7))
+    of_sizes, of_poses = names
+    poses = as_floats(poses, of_poses, 'poses (n, 7) of rows x y z qx qy qz qw', (None, 7))
     count = len(poses)
-    sizes = as_floats(sizes, 'sizes', f'full extents (3,) or ({count}, 3)', (3,), (count, 3))
+    sizes = as_floats(sizes, of_sizes, f'full extents (3,) or ({count}, 3)', (3,), (count, 3))
     if sizes.ndim == 1:
-        sizes = np.tile(as_size(sizes, 'sizes'), (count, 1))
+        sizes = np.tile(as_size(sizes, of_sizes), (count, 1))
     for row in np.flatnonzero(~((sizes >= LENGTH_MIN) & (sizes <= LENGTH_MAX)).all(axis=1))[:1]:
-        raise ValueError(f'sizes[{row}] {size_fault(sizes[row])}')
+        raise ValueError(f'{of_sizes}[{row}] {size_fault(sizes[row])}')
     for row in np.flatnonzero(~(are_poses(poses) | absent_poses(poses)))[:1]:
-        raise ValueError(f'poses[{row}] {pose_fault(poses[row])}; a pose is x y z qx qy qz qw')
+        raise ValueError(f'{of_poses}[{row}] {pose_fault(poses[row])}; a pose is x y z qx qy qz qw')
     return sizes, poses
 
 

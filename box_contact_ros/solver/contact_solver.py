@@ -25,6 +25,7 @@ from .checks import (
 )
 from .contact import Contact, Contacts, without_patch
 from .model import NATIVE_TYPES, Model, as_model
+from .motion import Approach, Approaches, find_approaches
 from .nearest import Nearest, Nearests
 
 Names = tuple[str, str, str, str]  # of poses and sizes of A and B, in a refusal
@@ -53,6 +54,7 @@ class ContactSolver(native.PairSolver):
     contact = solver(pose_a, pose_b)
     contacts = solver.batch(poses_a, poses_b)
     nearest = solver.distance(pose_a, pose_b)
+    first = solver.time_of_impact(start_a, end_a, start_b, end_b)
     ```
 
     Sizes are three full extents [m]. Without them, each batch brings its own. Poses are
@@ -106,6 +108,69 @@ class ContactSolver(native.PairSolver):
         distance = native.PairSolver.distance
         distance_batch = native.PairSolver.distance_batch
 
+    def time_of_impact(self, start_a: ArrayLike, end_a: ArrayLike, start_b: ArrayLike,
+                       end_b: ArrayLike, *, clearance: float = 0.0, tolerance: float = 1e-6,
+                       centre_a: ArrayLike | None = None, centre_b: ArrayLike | None = None,
+                       ) -> Approach:
+        """Return when two boxes first come as near as the clearance [m], and where.
+
+        Each box goes from a pose (7,) to another while s goes from 0 to 1: its centre on a line,
+        its axes the shortest way, at constant rate. centre_a, centre_b (3,): the points in the
+        boxes' own frames that go on lines instead of the centres [m]; for a box of a body, the
+        origin of the body's frame.
+
+        Before `time` the distance is above the clearance, by proof. At `time` it is at most
+        clearance + tolerance. NaN: they never come so near. Boxes that are so near at the start
+        have time 0.
+
+        Raises ValueError, with field and value, for a turn by 180 degrees, which has two ways, and
+        for a tolerance that rounding does not allow.
+        """
+        return self._approach(start_a, end_a, start_b, end_b, centre_a, centre_b, clearance,
+                              tolerance)
+
+    def least_distance(self, start_a: ArrayLike, end_a: ArrayLike, start_b: ArrayLike,
+                       end_b: ArrayLike, *, tolerance: float = 1e-6,
+                       centre_a: ArrayLike | None = None, centre_b: ArrayLike | None = None,
+                       ) -> Approach:
+        """Return the least distance on the way, to the tolerance [m], when it is, and where.
+
+        Boxes that touch on the way have the first time, as `time_of_impact` without a clearance:
+        the distance is then at most the tolerance. Arguments and errors are those of
+        `time_of_impact`.
+        """
+        return self._approach(start_a, end_a, start_b, end_b, centre_a, centre_b, None, tolerance)
+
+    def time_of_impact_batch(
+            self, starts_a: ArrayLike, ends_a: ArrayLike, starts_b: ArrayLike | None = None,
+            ends_b: ArrayLike | None = None, *, size_a: ArrayLike | None = None,
+            size_b: ArrayLike | None = None, sizes: ArrayLike | None = None,
+            pairs: ArrayLike | None = None, clearance: float = 0.0, tolerance: float = 1e-6,
+            centre_a: ArrayLike | None = None, centre_b: ArrayLike | None = None,
+            centres: ArrayLike | None = None, threads: int = 1) -> Approaches:
+        """Return the Approaches of n pairs: row i is what `time_of_impact` gives for row i.
+
+        Poses at the start and at the end, sizes, pairs and threads are those of `batch`: (starts_a,
+        ends_a, starts_b, ends_b), or (starts, ends, sizes=…, pairs=…). Centres are (3,), or have a
+        row for each pose.
+        """
+        return self._approaches(starts_a, ends_a, starts_b, ends_b, size_a, size_b, sizes, pairs,
+                                centre_a, centre_b, centres, clearance, tolerance, threads)
+
+    def least_distance_batch(
+            self, starts_a: ArrayLike, ends_a: ArrayLike, starts_b: ArrayLike | None = None,
+            ends_b: ArrayLike | None = None, *, size_a: ArrayLike | None = None,
+            size_b: ArrayLike | None = None, sizes: ArrayLike | None = None,
+            pairs: ArrayLike | None = None, tolerance: float = 1e-6,
+            centre_a: ArrayLike | None = None, centre_b: ArrayLike | None = None,
+            centres: ArrayLike | None = None, threads: int = 1) -> Approaches:
+        """Return the Approaches of n pairs: row i is what `least_distance` gives for row i.
+
+        All arguments are those of `time_of_impact_batch`.
+        """
+        return self._approaches(starts_a, ends_a, starts_b, ends_b, size_a, size_b, sizes, pairs,
+                                centre_a, centre_b, centres, None, tolerance, threads)
+
     def __reduce__(self) -> tuple[Callable[..., ContactSolver], tuple[Any, ...]]:
         """Pickle the arguments."""
         return (partial(ContactSolver, model=self.model, margin=self._margin),
@@ -149,12 +214,47 @@ class ContactSolver(native.PairSolver):
         return self._find_distances(
             self._rows(poses_a, poses_b, size_a, size_b, sizes, pairs, threads))
 
+    def _approach(self, start_a: ArrayLike, end_a: ArrayLike, start_b: ArrayLike, end_b: ArrayLike,
+                  centre_a: ArrayLike | None, centre_b: ArrayLike | None,
+                  clearance: float | None, tolerance: float) -> Approach:
+        found = native.approach(start_a, end_a, start_b, end_b, self._size_a, self._size_b,
+                                centre_a, centre_b, clearance, tolerance)
+        if found:
+            return Approach(*found)
+        try:
+            return find_approaches(
+                (_pose(start_a, 'start_a'), _pose(start_b, 'start_b'),
+                 _known(self._size_a, 'size_a'), _known(self._size_b, 'size_b')),
+                (_pose(end_a, 'end_a'), _pose(end_b, 'end_b')), (centre_a, centre_b),
+                ('end_a', 'end_b', 'centre_a', 'centre_b'), clearance=clearance,
+                tolerance=tolerance, threads=1, pairs=None)[0]
+        except ValueError as error:
+            raise ValueError(str(error).removeprefix('row 0: ')) from None
+
+    def _approaches(self, starts_a: ArrayLike, ends_a: ArrayLike, starts_b: ArrayLike | None,
+                    ends_b: ArrayLike | None, size_a: ArrayLike | None, size_b: ArrayLike | None,
+                    sizes: ArrayLike | None, pairs: ArrayLike | None, centre_a: ArrayLike | None,
+                    centre_b: ArrayLike | None, centres: ArrayLike | None,
+                    clearance: float | None, tolerance: float, threads: int) -> Approaches:
+        names = 'ends_a', 'ends_b', 'centre_a', 'centre_b'
+        if pairs is not None:
+            if any(value is not None for value in (centre_a, centre_b, ends_b)):
+                raise ValueError('pairs are places in starts, ends, sizes and centres: there is '
+                                 'neither ends_b nor centre_a nor centre_b')
+            names = 'ends', 'ends', 'centres', 'centres'
+            ends_b, centre_a, centre_b = ends_a, centres, centres
+        elif centres is not None or ends_b is None:
+            raise ValueError('a batch takes (starts_a, ends_a, starts_b, ends_b), or (starts, '
+                             'ends, sizes=…, pairs=…) and centres')
+        asked = self._rows(starts_a, starts_b, size_a, size_b, sizes, pairs, threads)
+        return find_approaches(asked[:4], (ends_a, ends_b), (centre_a, centre_b), names,
+                               clearance=clearance, tolerance=tolerance, threads=asked.threads,
+                               pairs=asked.places)
+
     def _pair(self, pose_a: ArrayLike, pose_b: ArrayLike) -> _Asked:
         """Return one pair of poses of any kind of numbers."""
-        a = as_floats(pose_a, 'pose_a', 'a pose (x y z qx qy qz qw)', (7,)).reshape(1, 7)
-        b = as_floats(pose_b, 'pose_b', 'a pose (x y z qx qy qz qw)', (7,)).reshape(1, 7)
-        return _Asked(a, b, _known(self._size_a, 'size_a'), _known(self._size_b, 'size_b'),
-                      _SINGLE)
+        return _Asked(_pose(pose_a, 'pose_a'), _pose(pose_b, 'pose_b'),
+                      _known(self._size_a, 'size_a'), _known(self._size_b, 'size_b'), _SINGLE)
 
     def _rows(self, poses_a: ArrayLike, poses_b: ArrayLike | None, size_a: ArrayLike | None,
               size_b: ArrayLike | None, sizes: ArrayLike | None, pairs: ArrayLike | None,
@@ -249,6 +349,11 @@ def _checked(answer: object, model: str, count: int) -> tuple[Contacts, int]:
         raise ValueError(f'model {model}: solve must return {count} contacts, a row a pair, not '
                          f'{len(contacts)}')
     return contacts, int(refused)
+
+
+def _pose(pose: ArrayLike, name: str) -> np.ndarray:
+    """Return a pose (7,) of any kind of numbers as (1, 7)."""
+    return as_floats(pose, name, 'a pose (x y z qx qy qz qw)', (7,)).reshape(1, 7)
 
 
 def _known(size: np.ndarray | None, name: str) -> np.ndarray:

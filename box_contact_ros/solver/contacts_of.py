@@ -45,8 +45,8 @@ class TooManyNear(ValueError):
 
 
 def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = None, *,
-                fixed: ArrayLike | None = None, margin: float = 0.0,
-                tolerance: float | np.ndarray = 0.0,
+                to: tuple[ArrayLike, ArrayLike] | None = None, fixed: ArrayLike | None = None,
+                margin: float = 0.0, tolerance: float | np.ndarray = 0.0,
                 threads: int = 1, most_near: int = sys.maxsize,
                 ) -> tuple[np.ndarray, Contacts]:
     """Return which boxes touch, as rows (k, 2) of their indices a and b, and the k contacts.
@@ -54,6 +54,8 @@ def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = No
     sizes: full extents (n, 3), or (3,) of all boxes [m].
     poses: (n, 7) in a common frame; seven NaN leave a box out.
     pairs: (m, 2), the pairs that are asked for, in their order; None: each two boxes, a < b.
+    to: sizes and poses of a second set of boxes. Pairs are then (i, j), box i of the first set and
+    box j of the second one; no two boxes of one set are a pair. Without `pairs` and `fixed`.
     fixed: (n,) bool, boxes that never move. Without `pairs`, two of them are no pair.
     margin: pairs apart are listed too, behind those in contact, up to this separation [m].
     tolerance: the gap up to which boxes touch [m]; an array (n,) has that of each box, and a pair
@@ -66,16 +68,33 @@ def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = No
     """
     sizes, poses = as_boxes(sizes, poses)
     margin = as_margin(margin)
+    first = len(poses)
+    if to is not None:
+        if pairs is not None or fixed is not None:
+            raise ValueError('to is a second set of boxes: there is neither pairs nor fixed')
+        others = as_boxes(*_two(to), names=('to[0]', 'to[1]'))
+        sizes, poses = (np.concatenate(both) for both in zip((sizes, poses), others))
     count = len(poses)
     listed = as_places([] if pairs is None else pairs, 'pairs', count)
     if (alone := np.flatnonzero(listed[:, 0] == listed[:, 1])).size:
         raise ValueError(f'pairs[{alone[0]}] is box {listed[alone[0], 0]} with itself')
     tolerances = as_tolerances(tolerance, sizes)
+    meet = np.array([[to is None, True], [False, False]], np.uint8)  # by the sets of both boxes
+    sets = min(1 + (to is not None), count) if pairs is None else 0
+    of_set = np.minimum(np.arange(count) >= first, max(0, sets - 1)).astype(np.int32)
+    broad_phase = native.BroadPhase(
+        sizes + tolerances[:, None], _as_flags(fixed, 'fixed', count), margin, listed, of_set,
+        meet[:sets, :sets].copy(), np.full(count, -1, np.int32))
+    near, contacts = _contacts_of_near(broad_phase, sizes, poses, margin, tolerances, most_near,
+                                       threads)
+    return near - [0, 0 if to is None else first], contacts
+
+
+def _contacts_of_near(broad_phase: native.BroadPhase, sizes: np.ndarray, poses: np.ndarray,
+                      margin: float, tolerances: np.ndarray, most_near: int, threads: int,
+                      ) -> tuple[np.ndarray, Contacts]:
+    """Return the pairs (k, 2) that touch, up to their tolerance, or are within the margin."""
     grown = sizes + tolerances[:, None]
-    groups_meet = np.ones((1, 1) if pairs is None and count else (0, 0), np.uint8)
-    broad_phase = native.BroadPhase(grown, _as_flags(fixed, 'fixed', count), margin, listed,
-                                    np.zeros(count, np.int32), groups_meet,
-                                    np.full(count, -1, np.int32))
     solver = ContactSolver(margin=margin)
     near, contacts, _ = find_contacts(broad_phase, solver, grown, poses, 'poses[{}]'.format,
                                       most_near=most_near, threads=threads)
@@ -91,6 +110,13 @@ def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = No
         point=np.where(touches[:, None], contacts.point, as_they_are.point),
         covariance=np.where(touches[:, None, None], contacts.covariance,
                             as_they_are.covariance)), margin)
+
+
+def _two(to: object) -> tuple[ArrayLike, ArrayLike]:
+    """Return sizes and poses of the second set; ValueError: `to` is no two things."""
+    if isinstance(to, tuple | list) and len(to) == 2:
+        return to[0], to[1]
+    raise ValueError(f'to must be (sizes, poses), not {short_repr(to)}')
 
 
 def _as_flags(value: ArrayLike | None, name: str, count: int) -> np.ndarray:

@@ -20,14 +20,13 @@ class Rows(Sequence[One]):
     """A dataclass of arrays that all have n rows. A number gives one row, a mask gives Rows."""
 
     __slots__ = ()
-    colliding: np.ndarray
 
     @abstractmethod
     def _one(self, *values: Any) -> One:
         """Return the answer for one row, by the values of its fields."""
 
     def __len__(self) -> int:
-        return len(self.colliding)
+        return len(getattr(self, fields(self)[0].name))  # type: ignore[arg-type]
 
     @overload
     def __getitem__(self, rows: int | np.integer) -> One: ...

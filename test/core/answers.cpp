@@ -8,7 +8,8 @@
 //
 // PAIRS has a line for each pair: two poses and two sizes, 20 numbers. The program prints a line for
 // each pair and model: verdict, separation and normal; and a line for each pair: verdict, distance and
-// normal. Then it prints a line for each body of the tower:
+// normal; and a line for each pair on the way to the poses of the next one: both times and the least
+// distance. Then it prints a line for each body of the tower:
 // pose and velocity. The exit status is 1 if a row of a batch has other bits than its single call.
 #include <algorithm>
 #include <cmath>
@@ -108,6 +109,37 @@ long print_distances(const Pairs& pairs) {
   return different;
 }
 
+// Print when pairs touch on the way to the poses of the next pair, and how near they come. Returns how
+// many differ from their row of a batch.
+long print_motion(const Pairs& pairs) {
+  const long count = long(pairs.poses_a.size());
+  auto next = [](std::vector<Pose> poses) {
+    std::rotate(poses.begin(), poses.begin() + 1, poses.end());
+    return poses;
+  };
+  const std::vector<Pose> ends_a = next(pairs.poses_a), ends_b = next(pairs.poses_b);
+  std::vector<double> first(count), least(count);
+  box_contact::SweepRows rows{{pairs.poses_a, pairs.poses_b, pairs.sizes_a, pairs.sizes_b},
+                              ends_a, ends_b};
+  long different = 0;
+  box_contact::time_of_impact(rows, {first.data(), nullptr, {}}, 0.0, 1e-6, 2);
+  box_contact::least_distance(rows, {least.data(), nullptr, {}}, 1e-6, 2);
+  for (long row = 0; row < count; ++row) {
+    if (first[row] == -1.0) {  // a turn of two ways, or coordinates without such a tolerance
+      std::puts("-1 -1 -1");
+      different += least[row] != -1.0;
+      continue;
+    }
+    const box_contact::Sweep a{pairs.poses_a[row], ends_a[row], pairs.sizes_a[row], {}};
+    const box_contact::Sweep b{pairs.poses_b[row], ends_b[row], pairs.sizes_b[row], {}};
+    const box_contact::Approach hit = box_contact::time_of_impact(a, b);
+    const box_contact::Approach low = box_contact::least_distance(a, b);
+    different += !same_bits(&hit.time, &first[row], 1) || !same_bits(&low.time, &least[row], 1);
+    std::printf("%a %a %a\n", hit.time, low.time, low.nearest.distance);
+  }
+  return different;
+}
+
 // Print where cubes on the ground end that stand askew: after 400 steps of 5 ms, each with an answer.
 // test_builds.py has the same loop in Python.
 void print_tower() {
@@ -150,7 +182,8 @@ int main(int argc, char** argv) {
   if (argc != 2) return 2;
   const Pairs pairs = read_pairs(argv[1]);
   const long different = print_answers(pairs, box_contact::Model::exact) +
-                         print_answers(pairs, box_contact::Model::mlp) + print_distances(pairs);
+                         print_answers(pairs, box_contact::Model::mlp) + print_distances(pairs) +
+                         print_motion(pairs);
   print_tower();
   if (different) std::fprintf(stderr, "%ld rows differ from their single calls\n", different);
   return different != 0;

@@ -1,7 +1,8 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-/* The C interface as a C program uses it: contacts, rows, distances, refusals. The exit status is 1 if a check
+/* The C interface as a C program uses it: contacts, rows, distances, motion,
+ * refusals. The exit status is 1 if a check
  * failed. */
 #include <math.h>
 #include <stdio.h>
@@ -130,6 +131,61 @@ static void check_distances(void) {
   check(bc_distance_rows(&rows, &results, 0, NULL) == BC_BAD_ARGUMENT, "no threads");
   rows.count = INT64_C(1) << 57;
   check(bc_distance_rows(&rows, &results, 1, NULL) == BC_BAD_ARGUMENT, "more rows than memory");
+}
+
+static bc_sweep falling(double from, double to) {
+  bc_sweep sweep = {{{0.0, 0.0, from}, {0.0, 0.0, 0.0, 1.0}},
+                    {{0.0, 0.0, to}, {0.0, 0.0, 0.0, 1.0}},
+                    {{2.0, 2.0, 2.0}},
+                    {0.0, 0.0, 0.0}};
+  return sweep;
+}
+
+static void check_motion(void) {
+  bc_sweep a = falling(0.0, 0.0), b = falling(6.0, 1.0);
+  bc_approach hit = {.size = sizeof hit}, low = hit;
+  check(bc_time_of_impact(&a, &b, 0.0, 1e-9, &hit) == BC_OK, "time of impact");
+  check(hit.time <= 0.8 && hit.time > 0.8 - 1e-9 && hit.nearest.distance <= 1e-9, "when");
+  check(hit.closing_speed == 5.0 && hit.nearest.normal[2] == 1.0, "how fast, and where");
+  check(bc_least_distance(&a, &b, 1e-9, &low) == BC_OK && low.time == hit.time, "they touch");
+  b = falling(6.0, 3.0);
+  check(bc_time_of_impact(&a, &b, 0.5, 1e-9, &hit) == BC_OK && isnan(hit.time), "never");
+  check(isnan(hit.nearest.distance) && !hit.nearest.colliding, "nothing of it");
+  check(bc_least_distance(&a, &b, 1e-9, &low) == BC_OK && low.time == 1.0, "at the end");
+  check(low.nearest.distance == 1.0, "the least distance");
+  check(bc_time_of_impact(&a, &b, -1.0, 1e-9, &hit) == BC_BAD_ARGUMENT, "a clearance");
+  check(bc_least_distance(&a, &b, 1e-16, &low) == BC_BAD_ARGUMENT, "a fine tolerance");
+  check(strstr(bc_error_text(), "tolerance 1e-16 is below") != NULL, "its words");
+  b.end.quaternion[0] = 1.0, b.end.quaternion[3] = 0.0;
+  check(bc_time_of_impact(&a, &b, 0.0, 1e-9, &hit) == BC_BAD_POSE, "half a circle");
+  check(strstr(bc_error_text(), "from start_b to end_b by 180 degrees has two ways") != NULL,
+        "its words");
+  b.size.extent[0] = -1.0;
+  check(bc_least_distance(&a, &b, 1e-9, &low) == BC_BAD_SIZE && low.time == 1.0, "a bad size");
+  low.size = 8;
+  check(bc_least_distance(&a, &a, 1e-9, &low) == BC_BAD_ABI, "another struct");
+
+  bc_pose starts[3] = {a.start, falling(6.0, 0.0).start, falling(9.0, 0.0).start};
+  bc_pose ends[3] = {a.start, falling(0.0, 1.0).end, falling(0.0, 4.0).end};
+  int64_t pairs[4] = {0, 1, 1, 2}, refused = 7;
+  bc_sweep_rows rows = {sizeof rows,
+                        {sizeof(bc_rows), 2, 3, starts, starts, &a.size, &a.size, 1, 1, pairs},
+                        ends, ends, NULL, NULL};
+  double time[2], distance[2];
+  bc_approach_results results = {
+      sizeof results, time, NULL, {sizeof(bc_nearest_results), NULL, distance, NULL, NULL, NULL}};
+  check(bc_time_of_impact_rows(&rows, 0.0, 1e-9, &results, 2, &refused) == BC_OK, "rows");
+  check(refused == -1 && time[0] > 0.8 - 1e-9 && isnan(time[1]), "by place");
+  check(bc_least_distance_rows(&rows, 1e-9, &results, 1, NULL) == BC_OK, "without `refused`");
+  check(time[1] == 0.0 || time[1] == 1.0, "when");
+  check(distance[1] == 1.0, "the least distances");
+  ends[1].quaternion[3] = NAN;
+  check(bc_time_of_impact_rows(&rows, 0.0, 1e-9, &results, 1, &refused) == BC_BAD_ROWS, "a bad pose");
+  check(refused == 0 && time[0] == -1.0 && time[1] == -1.0, "no time is that of never");
+  check(strstr(bc_error_text(), "row 0: end_b quaternion (0, 0, 0, nan) is not finite") != NULL,
+        "its words");
+  results.nearest.size = 0;
+  check(bc_time_of_impact_rows(&rows, 0.0, 1e-9, &results, 1, NULL) == BC_BAD_ABI, "another struct");
 }
 
 /* Cubes of which one is half a metre aside; faces apart; and what is refused. */
@@ -276,6 +332,7 @@ int main(void) {
   check_contacts();
   check_rows();
   check_distances();
+  check_motion();
   check_face_patches();
   check_broad_phase();
   check_fixed_that_stay();

@@ -32,7 +32,8 @@ BUILDS: dict[str, tuple[str, tuple[str, ...]]] = {
 def compile_library(compiler: str, folder: Path) -> Path:
     """Return the program `answers`, with the library in it."""
     sources = [Path(__file__).with_name('answers.cpp'), *(
-        CORE / 'src' / f'{name}.cpp' for name in ('kernel', 'library/library', 'library/force'))]
+        CORE / 'src' / f'{name}.cpp' for name in (
+            'kernel', 'library/library', 'library/force', 'library/motion'))]
     objects = [folder / f'{source.stem}.o' for source in sources]
 
     def run(*words: object) -> None:
@@ -68,7 +69,7 @@ def tower() -> np.ndarray:
 @pytest.mark.parametrize('name', [
     pytest.param('clang++', marks=pytest.mark.builds), pytest.param('arm', marks=pytest.mark.arm)])
 def test_another_build_has_the_same_bits(name: str, tmp_path: Path) -> None:
-    """Verdict, separation and normal of both models, distances; a row is its single call."""
+    """Verdict, separation, normal of both models, distances, motion; a row is its single call."""
     compiler, emulator = BUILDS[name]
     for program in (compiler, *emulator[:1]):
         if not shutil.which(program):
@@ -83,7 +84,17 @@ def test_another_build_has_the_same_bits(name: str, tmp_path: Path) -> None:
     bodies = tower()
     assert 10.9 < bodies[-1, 2] + 0.5 < 11.0
     assert np.array_equal(lines[-len(bodies):], bodies)
-    *of_models, of_distances = np.split(np.array(lines[:-len(bodies)]), 3)
+    count = len(pairs.pose_a)
+    *of_models, of_distances = np.split(np.array(lines[:3 * count]), 3)
+    of_motion = np.array(lines[3 * count:-len(bodies)])
+    good = of_motion[:, 0] != -1.0
+    ways = [np.roll(pose, shift, axis=0)[good] for pose in pairs[:2] for shift in (0, -1)]
+    first, least = (getattr(ContactSolver(), f'{name}_batch')(
+        *ways, size_a=pairs.size_a[good], size_b=pairs.size_b[good])
+        for name in ('time_of_impact', 'least_distance'))
+    assert good.mean() > 0.5
+    assert np.array_equal(of_motion[good], np.column_stack(
+        (first.time, least.time, least.nearest.distance)), equal_nan=True)
     nearest = ContactSolver().distance_batch(*pairs[:2], size_a=pairs.size_a, size_b=pairs.size_b)
     assert np.array_equal(of_distances, np.column_stack(
         (nearest.colliding, nearest.distance, nearest.normal)))

@@ -298,6 +298,35 @@ def test_the_gradient_is_the_normal(family):
             assert np.abs(slope - wanted)[clear].max() < 1e-5
 
 
+ALMOST_PARALLEL = {
+    6e-7: ((5.20733876894605, 2.069278159741244, 5.510804389477162, -0.4177544467314386,
+            0.7956642548503797, 0.14525961340350255, 0.41388314836843104),
+           (0.4060011366551828, -3.14420208237689, -0.598282773114929, -0.32307430688793914,
+            0.808501554351711, -0.022520743978119442, 0.4913665077418457),
+           (8.058787972934853, 0.45799409903427174, 2.0959715657854634),
+           (10.110315456258082, 1.3183022562170756, 2.292494382031198)),
+    5e-6: ((2.4794393813372686, 2.3266676512659727, -0.3611602350923536, -0.7464455310622984,
+            0.17000655129184855, -0.1492745091252181, -0.6258066495335445),
+           (-3.278776594147902, 3.504214690730179, -0.4840373813040718, 0.5776547287472026,
+            0.15966442433894687, 0.1602884237974992, -0.7843021784701493),
+           (3.497169724441383, 2.3405447947159623, 1.1739512963577101),
+           (7.105095614906032, 1.972656434746702, 1.4786493060700696))}
+"""Boxes some micrometres apart whose edges are parallel to so many radians. A vertex of either box
+is nearest, but for rounding, and the way from one of them is not across both edges."""
+
+
+@pytest.mark.parametrize('angle', ALMOST_PARALLEL)
+def test_the_normal_is_across_edges_that_are_almost_parallel(angle):
+    """The boxes are apart along it by the distance."""
+    given = [np.array([part]) for part in ALMOST_PARALLEL[angle]]
+    for pair in (poses.Pairs(*given), poses.Pairs(*(given[k] for k in (1, 0, 3, 2)))):
+        found = distances(pair)
+        gap = found.normal[0] @ (pair.pose_b - pair.pose_a)[0, :3] - sum(
+            np.abs(found.normal[0] @ rotation_matrix(pose[:, 3:])[0]) @ size[0] / 2
+            for pose, size in zip(pair[:2], pair[2:]))
+        assert gap == pytest.approx(found.distance[0], abs=1e-14)
+
+
 @pytest.mark.parametrize('family', ['random', 'aligned', 'aligned, moved', 'yaw, side by side',
                                     'yaw, stacked', 'yaw, stacked, moved'])
 def test_points_tend_to_the_contact_point(family):

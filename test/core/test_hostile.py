@@ -55,7 +55,7 @@ def test_with_sanitizers(tmp_path: Path) -> None:
     run(*compiler, '-fno-sanitize=alignment,vptr', '-c', CORE / 'src/kernel.cpp', '-o', kernel)
     run(*compiler, '-shared', f'-I{sysconfig.get_path("include")}', f'-I{np.get_include()}', kernel,
         CORE / 'binding/module.cpp', *(CORE / 'src/library' / f'{name}.cpp' for name in (
-            'library', 'broad_phase', 'force')), '-o', extension)
+            'library', 'broad_phase', 'force', 'motion')), '-o', extension)
     libraries = [run('g++', f'-print-file-name=lib{name}.so').strip() for name in ('asan', 'ubsan')]
     assert min(attack(37, 5000, EXTENSION=str(extension), LD_PRELOAD=' '.join(libraries),
                       ASAN_OPTIONS='detect_leaks=0:allocator_may_return_null=1')) > 200
@@ -85,6 +85,10 @@ def test_null_pointers(library: CLibrary) -> None:
     pose, contact, rows = (c_double * 7)(0, 0, 0, 0, 0, 0, 1), (c_double * 64)(), Rows()
     rows.size, results = ctypes.sizeof(Rows), Results(ctypes.sizeof(Results))
     nearest, nearest_results = (c_int64 * 12)(12 * 8), (c_int64 * 6)(6 * 8)
+    sweep = (c_double * 20)(*pose, *pose, 1, 1, 1)
+    approach, approach_results = (c_int64 * 15)(15 * 8), (c_int64 * 9)(9 * 8, 0, 0, 6 * 8)
+    sweep_rows = (c_int64 * 15)(15 * 8, ctypes.sizeof(Rows))  # no rows
+    no, fine = c_double(0.0), c_double(1e-6)
     answer = (c_int64 * 13)(13 * 8)  # a bc_patches without rows
     body_box = (c_double * 11)(0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1)
     step, motion = c_double(0.001), (c_int64 * 4)(4 * 8)  # a bc_motion that wants nothing
@@ -94,6 +98,10 @@ def test_null_pointers(library: CLibrary) -> None:
         (library.bc_collide_rows, [byref(rows), None, byref(results), 1, None], {0, 2}),
         (library.bc_distance, [box, box, nearest], {0, 1, 2}),
         (library.bc_distance_rows, [byref(rows), nearest_results, 1, None], {0, 1}),
+        (library.bc_time_of_impact, [sweep, sweep, no, fine, approach], {0, 1, 4}),
+        (library.bc_least_distance, [sweep, sweep, fine, approach], {0, 1, 3}),
+        (library.bc_time_of_impact_rows, [sweep_rows, no, fine, approach_results, 1, None], {0, 3}),
+        (library.bc_least_distance_rows, [sweep_rows, fine, approach_results, 1, None], {0, 2}),
         (library.bc_patch_forces_create,
          [(c_double * 7)(1, 1, 1, 1), c_int64(1), None, byref(made)], {0, 3}),
         (library.bc_patch_forces_copy, [library.forces, byref(made)], {0, 1}),

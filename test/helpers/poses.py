@@ -402,3 +402,18 @@ def extreme_pairs(rng, n):
         values = (a, b, size_a, size_b)[rng.integers(4)][row]
         values[rng.integers(len(values))] = rng.choice(BAD_NUMBERS)
     return Pairs(a, b, size_a, size_b)
+
+
+def on_the_way(start, end, centre, s):
+    """Return poses (n, 7) at times s (n,), by the definition of the motion."""
+    turn_a, turn_b = (pose[:, 3:] / np.linalg.norm(pose[:, 3:], axis=1)[:, None]
+                      for pose in (start, end))
+    relative = multiply(turn_b, turn_a * [-1, -1, -1, 1])
+    relative *= np.where(relative[:, 3:] < 0.0, -1.0, 1.0)
+    length = np.linalg.norm(relative[:, :3], axis=1)
+    half = s * np.arctan2(length, relative[:, 3])
+    axis = relative[:, :3] / np.maximum(length, 1e-300)[:, None]
+    turn = multiply(np.column_stack([np.sin(half)[:, None] * axis, np.cos(half)]), turn_a)
+    low, high = start[:, :3] + rotate(turn_a, centre), end[:, :3] + rotate(turn_b, centre)
+    place = low + s[:, None] * (high - low)
+    return np.hstack([place - rotate(turn, centre), turn])

@@ -10,6 +10,7 @@
 #include "forces.hpp"
 #include "message_numbers.hpp"
 #include "named_poses.hpp"
+#include "motion.hpp"
 #include "pair_solver.hpp"
 #include "pose_faults.hpp"
 #include "read_pose.hpp"
@@ -39,6 +40,16 @@ PyMethodDef module_methods[] = {
     {"distances", method<distances>(), METH_FASTCALL,
      "distances(a, b, size_a, size_b, threads, pairs)\n--\n\n"
      "Return Nearests, and the first refused row or -1; arguments as of the models' `solve`."},
+    {"approach", method<approach>(), METH_FASTCALL,
+     "approach(start_a, end_a, start_b, end_b, size_a, size_b, centre_a, centre_b, clearance, "
+     "tolerance)\n--\n\n"
+     "Return time, closing_speed and Nearest of one pair, or None where Python has to convert.\n\n"
+     "Clearance None: of the least distance. Sizes are (1, 3), centres (3,) or None."},
+    {"approaches", method<approaches>(), METH_FASTCALL,
+     "approaches(starts_a, starts_b, sizes_a, sizes_b, ends_a, ends_b, centres_a, centres_b, "
+     "clearance, tolerance, threads, pairs)\n--\n\n"
+     "Return arrays with a row for each pair: time, closing_speed, and the fields of Nearests.\n\n"
+     "Clearance None: of the least distances. Centres and pairs may be None."},
     {"pose_fault", method<pose_fault>(), METH_O,
      "pose_fault(pose)\n--\n\nReturn why seven numbers are no pose, a PoseFault; 0 if they are."},
     {"pose_faults", method<pose_faults>(), METH_O,

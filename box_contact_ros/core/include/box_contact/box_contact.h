@@ -1,8 +1,9 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-/* The C interface of libbox_contact: whether two boxes touch, where, and along which direction; or
- * how far they are apart, and between which points; or where two of their faces meet.
+/* The C interface of libbox_contact: whether two boxes touch, where, and along which direction;
+ * how far they are apart, and between which points; where two of their faces meet; or when they come
+ * near each other on their ways.
  *
  *   bc_box a = {{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}}, {{1.0, 1.0, 1.0}}};
  *   bc_box b = {{{0.0, 0.0, 0.99}, {0.0, 0.0, 0.0, 1.0}}, {{1.0, 1.0, 1.0}}};
@@ -179,6 +180,66 @@ BC_API bc_status bc_distance(const bc_box* a, const bc_box* b, bc_nearest* neare
  * `colliding` false and `distance` NaN. */
 BC_API bc_status bc_distance_rows(const bc_rows* rows, const bc_nearest_results* results,
                                   int threads, int64_t* refused);
+
+/* A box goes from one pose to another while s goes from 0 to 1. Its centre of turning goes on a line,
+ * and its axes turn the shortest way, at constant rate. */
+typedef struct bc_sweep {
+  bc_pose start, end; /* at s = 0 and at s = 1 */
+  bc_size size;
+  double centre[3]; /* of turning, in the box's own frame [m]. Zeros: the box's centre. For a box of a
+                       body: the origin of the body's frame */
+} bc_sweep;
+
+/* How near two boxes come, and when. */
+typedef struct bc_approach {
+  size_t size;          /* sizeof(bc_approach) */
+  double time;          /* s from 0 to 1; NaN: never, and all other numbers are NaN */
+  double closing_speed; /* minus the rate of the distance by s at that time [m] */
+  bc_nearest nearest;   /* at that time */
+} bc_approach;
+
+/* Find the first time at which two boxes are as near as the clearance [m]. Before it the distance is
+ * above the clearance, by proof; at it, it is at most clearance + tolerance. Boxes that are so near at
+ * the start have time 0.
+ *
+ * The least tolerance [m] is 1.42e-14 · S. S is the largest distance of a centre from the origin or from
+ * the other box's, plus twice the half diagonals and centres of turning of both. A smaller one is refused
+ * with the number that is accepted. Turns by 180 degrees are refused: they have two ways. On failure
+ * *approach is as it was. */
+BC_API bc_status bc_time_of_impact(const bc_sweep* a, const bc_sweep* b, double clearance,
+                                   double tolerance, bc_approach* approach);
+
+/* Find the least distance on the way, to the tolerance [m], and when. Boxes that touch on the way have
+ * the first time, as bc_time_of_impact without a clearance: the distance is then at most the tolerance. */
+BC_API bc_status bc_least_distance(const bc_sweep* a, const bc_sweep* b, double tolerance,
+                                   bc_approach* approach);
+
+/* Rows of pairs of boxes on their ways. */
+typedef struct bc_sweep_rows {
+  size_t size;           /* sizeof(bc_sweep_rows) */
+  bc_rows starts;        /* poses at s = 0, sizes, and pairs */
+  const bc_pose* ends_a; /* poses at s = 1, as many as at s = 0 */
+  const bc_pose* ends_b;
+  const double* centres_a; /* of turning, (pose_count, 3), or NULL: the boxes' centres */
+  const double* centres_b;
+} bc_sweep_rows;
+
+/* Arrays of a row for each pair, or NULL for what is not wanted. */
+typedef struct bc_approach_results {
+  size_t size; /* sizeof(bc_approach_results) */
+  double* time;
+  double* closing_speed;
+  bc_nearest_results nearest;
+} bc_approach_results;
+
+/* The same of many pairs, by 1 to 1,024 threads: bit for bit the answers of single calls. Each refused
+ * row gets time −1, and the rest of it has no meaning; *refused is the first of them, or −1. */
+BC_API bc_status bc_time_of_impact_rows(const bc_sweep_rows* rows, double clearance,
+                                        double tolerance, const bc_approach_results* results,
+                                        int threads, int64_t* refused);
+BC_API bc_status bc_least_distance_rows(const bc_sweep_rows* rows, double tolerance,
+                                        const bc_approach_results* results, int threads,
+                                        int64_t* refused);
 
 /* Most corners of the patch of two faces. */
 #define BC_CORNERS_MAX 9

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The C++17 interface of libbox_contact: whether two boxes touch, where, and along which direction;
-// or how far they are apart, and between which points; or where two of their faces meet.
+// how far they are apart, and between which points; where two of their faces meet; or when they come
+// near each other on their ways.
 //
 //   box_contact::Box a{{{0.0, 0.0, 1.49}, {0.0, 0.0, 0.0, 1.0}}, {1.0, 1.0, 1.0}};
 //   box_contact::Box b{{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}}, {2.0, 2.0, 2.0}};
@@ -60,6 +61,8 @@ using Pose = bc_pose;        // position [m]; quaternion x y z w of any length
 using Box = bc_box;          // pose and size
 using Contact = bc_contact;  // see above
 using Nearest = bc_nearest;  // see box_contact.h
+using Sweep = bc_sweep;      // poses at s = 0 and s = 1, size, and centre of turning; see box_contact.h
+using Approach = bc_approach;
 using Polygon = bc_polygon;  // see box_contact.h
 
 enum class Model { exact = BC_EXACT, mlp = BC_MLP };
@@ -160,6 +163,11 @@ struct NearestResults {
 
 namespace detail {
 
+inline bc_nearest_results plain(const NearestResults& results) {
+  return {sizeof(bc_nearest_results), results.colliding, results.distance,
+          results.normal,             results.point_a,   results.point_b};
+}
+
 // Ask `call` for rows. Returns the first row that is refused, or −1.
 template <class Call>
 std::int64_t ask_rows(const Rows& rows, Call call) {
@@ -216,11 +224,77 @@ inline Nearest distance(const Box& a, const Box& b) {
 
 // The same of many pairs, as `collide` takes and answers them. A refused row gets `distance` NaN.
 inline std::int64_t distance(const Rows& rows, const NearestResults& results, int threads = 1) {
-  const bc_nearest_results wanted{sizeof(bc_nearest_results), results.colliding,
-                                  results.distance,           results.normal,
-                                  results.point_a,            results.point_b};
+  const bc_nearest_results wanted = detail::plain(results);
   return detail::ask_rows(rows, [&](const bc_rows& plain, std::int64_t& refused) {
     return bc_distance_rows(&plain, &wanted, threads, &refused);
+  });
+}
+
+// The first time at which two boxes are as near as the clearance [m], to the tolerance [m]; time NaN:
+// never. See bc_time_of_impact. Throws as `collide`, for turns by 180 degrees, and for a tolerance that
+// rounding does not allow.
+inline Approach time_of_impact(const Sweep& a, const Sweep& b, double clearance = 0.0,
+                               double tolerance = 1e-6) {
+  Approach approach{};
+  approach.size = sizeof(Approach);
+  detail::check(bc_time_of_impact(&a, &b, clearance, tolerance, &approach));
+  return approach;
+}
+
+// The least distance of two boxes on their ways, to the tolerance [m], and when. See bc_least_distance.
+// Throws likewise.
+inline Approach least_distance(const Sweep& a, const Sweep& b, double tolerance = 1e-6) {
+  Approach approach{};
+  approach.size = sizeof(Approach);
+  detail::check(bc_least_distance(&a, &b, tolerance, &approach));
+  return approach;
+}
+
+// Rows of pairs on their ways. Poses at s = 1 are as many as those at s = 0.
+struct SweepRows {
+  Rows starts;  // poses at s = 0, sizes, and pairs
+  Span<const Pose> ends_a, ends_b;
+  const double* centres_a = nullptr;  // three numbers a pose [m]; nullptr: the boxes' centres
+  const double* centres_b = nullptr;
+};
+
+// Arrays of a row for each pair; nullptr for what is not wanted.
+struct ApproachResults {
+  double* time = nullptr;
+  double* closing_speed = nullptr;
+  NearestResults nearest{};
+};
+
+namespace detail {
+
+template <class Call>
+std::int64_t ask_sweeps(const SweepRows& rows, const ApproachResults& results, Call call) {
+  for (const Span<const Pose>& ends : {rows.ends_a, rows.ends_b})
+    if (ends.size() != rows.starts.poses_a.size())
+      raise(BC_BAD_ARGUMENT, "ends must be as many as starts");
+  const bc_approach_results wanted{sizeof(bc_approach_results), results.time,
+                                   results.closing_speed, plain(results.nearest)};
+  return ask_rows(rows.starts, [&](const bc_rows& starts, std::int64_t& refused) {
+    const bc_sweep_rows plain{sizeof(bc_sweep_rows), starts,         rows.ends_a.data(),
+                              rows.ends_b.data(),    rows.centres_a, rows.centres_b};
+    return call(plain, wanted, refused);
+  });
+}
+
+}  // namespace detail
+
+// The same of many pairs, as `collide` takes and answers them. A refused row gets `time` −1.
+inline std::int64_t time_of_impact(const SweepRows& rows, const ApproachResults& results,
+                                   double clearance = 0.0, double tolerance = 1e-6,
+                                   int threads = 1) {
+  return detail::ask_sweeps(rows, results, [&](auto& plain, auto& wanted, auto& refused) {
+    return bc_time_of_impact_rows(&plain, clearance, tolerance, &wanted, threads, &refused);
+  });
+}
+inline std::int64_t least_distance(const SweepRows& rows, const ApproachResults& results,
+                                   double tolerance = 1e-6, int threads = 1) {
+  return detail::ask_sweeps(rows, results, [&](auto& plain, auto& wanted, auto& refused) {
+    return bc_least_distance_rows(&plain, tolerance, &wanted, threads, &refused);
   });
 }
 

@@ -11,7 +11,8 @@
 //    the separation, or the gap along the way between its points, is as large as its distance.
 // 4. Pairs that are left, one by one: faces that oblique edges are parallel to (facing.hpp); and
 //    all pairs of edges where the proof fails. Which edges the winning axis names depends on the
-//    signs of R's entries. Where those are rounding, it may name others than the nearest.
+//    signs of R's entries. Where those are rounding, it may name others than the nearest. Of a vertex of
+//    either box that are equally near but for rounding, the one is taken that is proved.
 #pragma once
 
 #include "../query.hpp"
@@ -51,11 +52,25 @@ inline bool find_centroid(const Pair<double>& pair, const SeparatingAxis<double>
   return is_there;
 }
 
+// Take a vertex that is as near as the points found, and is proved: near edges that are almost parallel
+// rounding chooses the other box's, and the way from there is not across both.
+inline void take_proved_vertex(const Pair<double>& pair, const SeparatingAxis<double>& axis,
+                               NearestPoints<double>& found) {
+  double slack = proof_tolerance * (pair.size + sum(abs(pair.offset_a)));
+  for (const NearestPoints<double>& other : {nearest_vertex_of_a(pair), nearest_vertex_of_b(pair)})
+    if (other.distance <= found.distance + slack && is_proved(pair, axis, other)) {
+      found = other;
+      return;
+    }
+}
+
 // Find what steps 1 to 3 leave of a pair.
 [[gnu::noinline]] inline void finish(const Pair<double>& pair, const SeparatingAxis<double>& axis,
                                      bool is_facing, NearestPoints<double>& found) {
   if (is_facing && find_centroid(pair, axis, found)) return;
-  if (!is_proved(pair, axis, found)) try_all_edges(pair, found);
+  if (is_proved(pair, axis, found)) return;
+  try_all_edges(pair, found);
+  if (!is_proved(pair, axis, found)) take_proved_vertex(pair, axis, found);
 }
 
 }  // namespace apart

@@ -168,6 +168,20 @@ BC_INLINE NearestPoints<T> try_vertices(const Pair<T>& pair) {
           select(of_a_is_nearer, pair.b_in_a * (on_b - from_a), Triple<T>(from_b - on_a))};
 }
 
+// The nearest vertex of each box of a single pair.
+inline NearestPoints<double> nearest_vertex_of_a(const Pair<double>& pair) {
+  View<double> b = view_of_b(pair);
+  Vertex<double> of_a = nearest_vertex(b);
+  Triple<double> from_a = b.bring(of_a.place), on_b = clamp(from_a, pair.half_b);
+  return {std::sqrt(of_a.distance2), of_a.place, on_b, pair.b_in_a * (on_b - from_a)};
+}
+inline NearestPoints<double> nearest_vertex_of_b(const Pair<double>& pair) {
+  View<double> a = view_of_a(pair);
+  Vertex<double> of_b = nearest_vertex(a);
+  Triple<double> from_b = a.bring(of_b.place), on_a = clamp(from_b, pair.half_a);
+  return {std::sqrt(of_b.distance2), on_a, of_b.place, from_b - on_a};
+}
+
 }  // namespace apart
 
 }  // namespace box_contact::BOX_CONTACT_SET

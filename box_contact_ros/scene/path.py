@@ -1,0 +1,221 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""A path through a scene: what comes too near on it, when, and how near all else comes.
+
+The time of a path goes from k to k + 1 between pose k and pose k + 1. Bounding boxes find the rides
+that matter, as rides.py has them; `time_of_impact` and `least_distance` answer these.
+"""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..core import native
+from ..solver.checks import absent_poses, as_floats, as_margin, pose_fault
+from ..solver.contact_solver import ContactSolver
+from ..solver.motion import Approach, Approaches
+from ..solver.nearest import Nearests
+from ..solver.pose import rotation_matrix
+from .rides import Course, Rides, Surroundings, turns_between
+from .scene import Pair, Scene
+
+TOLERANCE = 1e-6  # of distances [m]
+LEAST_COSINE = 1e-9
+"""Of half the turn on a segment: below, it has two ways. That of core/src/motion/turn.hpp."""
+PARTING_ANGLE = 0.02
+"""Turn [rad] after which boxes that begin within the clearance are looked at once more."""
+MOST_RIDES = 1000
+"""That a search for the least distance takes at first."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PathCheck:
+    """What a path meets. Boxes are their indices in `scene`; times go from 0 to m − 1."""
+
+    pairs: np.ndarray
+    """(k, 2) boxes a and b of the pairs that come within the clearance, in the order of time."""
+    impacts: Approaches
+    """(k,) their first times: `time`, `closing_speed` [m per unit of time], `nearest`."""
+    at_start: np.ndarray
+    """(l, 2) pairs within the clearance at the first pose. Each is judged from where it is apart:
+    at a pose, or after a turn by 0.02 rad on the way there."""
+    least_pair: np.ndarray | None
+    """(2,) the pair that comes nearest, of those not in `at_start`; None: there is none."""
+    least: Approach | None
+    """When, and how near it comes; where boxes touch, the first of these times."""
+    scene: Scene
+    revision: int = 0  # of the scene, as of `SceneSolver.set_boxes`
+
+    @property
+    def is_free(self) -> bool:
+        """Return whether nothing comes within the clearance, but what was so at the start."""
+        return not len(self.pairs)
+
+    def named(self) -> list[tuple[Pair, Approach]]:
+        """Return each pair that comes within the clearance, by name, and its first time."""
+        return [(self.scene.pair_of(a, b), impact)
+                for (a, b), impact in zip(self.pairs.tolist(), self.impacts)]
+
+
+class Found(NamedTuple):
+    """The arrays of a `PathCheck`."""
+
+    pairs: np.ndarray
+    impacts: Approaches
+    at_start: np.ndarray
+    least_pair: np.ndarray | None
+    least: Approach | None
+
+
+def as_path(value: Any, names: tuple[str, ...]) -> np.ndarray:
+    """Return poses (m, n, 7) of what moves; ValueError for what is not a path."""
+    path = as_floats(value, 'poses', f'poses (m, {len(names)}, 7): at each of m times, those of '
+                     f'what moves, {", ".join(names) or "which is nothing"}',
+                     (None, len(names), 7))
+    if len(path) < 2:
+        raise ValueError(f'poses must be those of 2 times or more, not {len(path)}')
+    absent = absent_poses(path.reshape(-1, 7)).reshape(path.shape[:2])
+    for k, row in np.argwhere(absent != absent[0])[:1]:
+        raise ValueError(f'poses[{k}] of {names[row]}: it is there at some times alone; seven NaN '
+                         'at all of them leave it out')
+    bad = native.pose_faults(np.ascontiguousarray(path.reshape(-1, 7))) != 0
+    for k, row in np.argwhere(bad.reshape(absent.shape) & ~absent)[:1]:
+        raise ValueError(f'poses[{k}] of {names[row]}: {pose_fault(path[k, row])}')
+    half_turns = turns_between(path)[1] > math.pi - 2.0 * LEAST_COSINE
+    for k, row in np.argwhere(half_turns)[:1]:
+        raise ValueError(f'poses[{k}] to poses[{k + 1}] of {names[row]}: a turn by 180 degrees has '
+                         'two ways: give a pose between')
+    return path
+
+
+def course_of(scene: Scene, standing: np.ndarray, path: np.ndarray, around: Surroundings,
+              ) -> Course:
+    """Return the course of a scene.
+
+    standing: poses (n, 7) of boxes, of which those of fixed boxes are read.
+    path: poses (m, k, 7) of `scene.moving`, checked.
+    around: of the fixed boxes.
+    """
+    is_here = ~absent_poses(path[0])
+    rows = np.array([scene.row_of[name] for name in scene.moving], np.int64)[is_here]
+    path = path[:, is_here]
+    count = len(scene.boxes)
+    column = np.full(count + len(scene.bodies), -1)
+    column[rows] = np.arange(len(rows))
+    of_box = np.where(scene.body_of < 0, np.arange(count), count + scene.body_of)
+    movers = np.flatnonzero(column[of_box] >= 0)
+    body_rows, local = scene.placement
+    of_body = body_rows[movers] >= 0
+    local, base = local[movers], path[:, column[of_box[movers]]]
+    poses, centres = base.copy(), np.zeros((len(movers), 3))
+    if of_body.any():
+        # Boxes of all times behind one another, and then their bodies.
+        parts, bases = local[of_body], base[:, of_body].reshape(-1, 7)
+        places = np.concatenate((np.empty_like(bases), bases))
+        native.place_boxes(places, len(bases) + np.arange(len(bases)),
+                           np.tile(parts, (len(path), 1)))
+        poses[:, of_body] = places[:len(bases)].reshape(len(path), -1, 7)
+        centres[of_body] = -np.einsum('nji,nj->ni', rotation_matrix(parts[:, 3:]), parts[:, :3])
+    fixed = np.where(scene.is_fixed[:, None], standing, np.nan)
+    group, allowed = scene.groups
+    return Course(scene.sizes, fixed, movers, poses, centres, scene.rigid, scene.rows, group,
+                  allowed, around, np.flatnonzero(scene.is_fixed))
+
+
+def check_course(course: Course, clearance: float) -> Found:
+    """Return what comes within a clearance [m], and how near all else comes."""
+    rides = Rides(course)
+    radius = as_margin(clearance, 'clearance') + TOLERANCE
+    near, _ = rides.within(radius)
+    pairs = near[near[:, 0] == 0, 1:]
+    held = pairs[rides.at_first(pairs).distance <= radius]
+    near = near[~rides.are_of(near, held)]
+    rides.leave_out(held)
+    impacts = rides.solve(near, clearance)
+    if clearance and len(near):
+        touches = rides.solve(near, 0.0)
+    else:
+        touches = impacts
+    rows = _first_rows(near, touches)
+    least_pair, least = ((near[rows[0], 1:], touches[int(rows[0])]) if rows.size else
+                         _least(rides, near, radius))
+    parts = [(near, impacts), *(_after_parting(rides, pair, clearance) for pair in held)]
+    near = np.concatenate([part for part, _ in parts])
+    impacts = _joined([found for _, found in parts])
+    rows = _first_rows(near, impacts)
+    return Found(near[rows, 1:], impacts[rows], held, least_pair, least)
+
+
+def _first_rows(rides: np.ndarray, found: Approaches) -> np.ndarray:
+    """Return the row of the first time of each pair that has one, in the order of time."""
+    _, a, b = rides.T
+    order = np.lexsort((b, a, found.time))
+    order = order[np.isfinite(found.time[order])]
+    _, first = np.unique(rides[order, 1:], axis=0, return_index=True)
+    return order[np.sort(first)]
+
+
+def _joined(parts: list[Approaches]) -> Approaches:
+    """Return the rows of all parts."""
+    def joined(arrays: list[Any], name: str) -> np.ndarray:
+        return np.concatenate([getattr(array, name) for array in arrays])
+
+    nearest = [part.nearest for part in parts]
+    return Approaches(joined(parts, 'time'), joined(parts, 'closing_speed'), Nearests(*(
+        joined(nearest, name) for name in Nearests.__dataclass_fields__)))
+
+
+def _after_parting(rides: Rides, pair: np.ndarray, clearance: float,
+                   ) -> tuple[np.ndarray, Approaches]:
+    """Return the rides of a pair from where it is first apart, and their first times.
+
+    Apart is farther than the clearance and two tolerances: what is as near as that may be answered.
+    """
+    turns = sum(rides.turns_of(int(box)) for box in pair)
+    looks = 1 + np.ceil(turns / PARTING_ANGLE).astype(np.int64)  # of each segment
+    segments = np.repeat(np.arange(rides.segments), looks)
+    shares = (np.arange(len(segments)) - np.repeat(np.cumsum(looks) - looks, looks) + 1) / (
+        looks[segments])
+    solver = ContactSolver(*rides.course.sizes[pair])
+    seen = solver.distance_batch(*(rides.poses_at(int(box), segments, shares) for box in pair))
+    apart = np.flatnonzero(seen.distance > clearance + 2.0 * TOLERANCE)[:1]
+    begin = int(apart[0]) + 1 if apart.size else len(seen)
+    share = float(shares[begin - 1]) % 1.0 if apart.size else 0.0  # 1: the next segment begins
+    later = np.arange(segments[begin - 1] + (share == 0.0), rides.segments)[:, None]
+    near = np.hstack((later, np.broadcast_to(pair, (len(later), 2))))
+    return near, rides.solve(near, clearance, first_from=share)
+
+
+def _least(rides: Rides, near: np.ndarray, radius: float,
+           ) -> tuple[np.ndarray | None, Approach | None]:
+    """Return the pair that comes nearest, and how near, of boxes that do not touch.
+
+    near: the rides whose bounding boxes are within a radius [m]. The radius grows
+    until a ride is found, and then to its distance: nothing beyond it is nearer.
+    """
+    best: tuple[np.ndarray | None, Approach | None] = None, None
+    bound, most, is_all = np.inf, MOST_RIDES, True
+    while True:
+        gaps = rides.gaps(near)
+        order = np.argsort(gaps, kind='stable')
+        first, size = 0, 8
+        while first < len(order):
+            rows = order[first:first + size]
+            asked = near[rows[gaps[rows] < bound - TOLERANCE]]
+            if np.isfinite(bound) and len(asked):  # few of them come nearer, and this takes less
+                asked = asked[np.isfinite(rides.solve(asked, bound - TOLERANCE).time)]
+            if len(asked):
+                found = rides.solve(asked, None)
+                row = int(np.argmin(found.nearest.distance))
+                if found.nearest.distance[row] < bound:
+                    bound, best = found.nearest.distance[row], (asked[row, 1:], found[row])
+            first, size = first + size, 4 * size
+        if is_all and (bound - TOLERANCE <= radius or radius > rides.farthest):
+            return best
+        most *= 1 if is_all else 4
+        radius = min(bound - TOLERANCE, max(4.0 * radius, rides.step))
+        near, is_all = rides.within(radius, most)
