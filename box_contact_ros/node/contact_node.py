@@ -155,7 +155,7 @@ class ContactNode(GuardedNode, LifecycleNode):
         self._check_answerer: CheckAnswerer | None = None  # of the solver's scene and model
         self.add_on_set_parameters_callback(self._set_live)
         self._checks = PacedService(self, self.counts, 'checks', (Check, '~/check'), self._check,
-                                    check.kind_and_size)
+                                    check.kind_and_size, is_timed=True)
         self._taken: SetBoxes.Request | None = None  # the last request of ~/set_boxes
         PacedService(self, self.counts, 'changes', (SetBoxes, '~/set_boxes'), self._set_boxes,
                      set_boxes.kind_and_size, in_turn=True)

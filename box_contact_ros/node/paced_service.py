@@ -44,10 +44,11 @@ class PacedService:
     def __init__(self, node: GuardedNode, counts: Counter[str], what: str, service: tuple[Any, str],
                  answer: Callable[[Any, Any], Iterable[None]],
                  kind_and_size: Callable[[Any], tuple[Kind, int]], *, in_turn: bool = False,
-                 ) -> None:
+                 is_timed: bool = False) -> None:
         """Serve a service, by its type and name, of a node; `answer` fills in a response in steps.
 
-        what: what `counts` calls the requests. in_turn: whether none overtakes another.
+        what: what `counts` calls the requests. in_turn: whether none overtakes another. is_timed:
+        whether `take_times` is called again and again.
         """
         self._counts, self._what = counts, what
         self._answer, self._kind_and_size, self._in_turn = answer, kind_and_size, in_turn
@@ -57,7 +58,8 @@ class PacedService:
         self._waiting: deque[tuple[float, Any, Any, Send]] = deque()
         """When each came [s], and what `_begin` takes."""
         self._running: Running | None = None
-        self._times: deque[float] = deque(maxlen=KEPT_TIMES)  # from taking to answering [s]
+        # From taking to answering [s].
+        self._times: deque[float] = deque(maxlen=KEPT_TIMES if is_timed else 0)
         self._next_step = node.answered(self._step, service[1])
         self._timer = node.create_timer(LONG, self._go_on, clock=Clock(
             clock_type=ClockType.STEADY_TIME))

@@ -379,7 +379,7 @@ class Bench:
                     answered=lambda callback, name: callback)
         self.counts: Counter[str] = Counter()
         self.service = PacedService(node, self.counts, 'checks', (Check, '~/check'), self.answer,
-                                    check_module.kind_and_size, in_turn=in_turn)
+                                    check_module.kind_and_size, in_turn=in_turn, is_timed=True)
         self.end_of_pause = node.create_timer.call_args.args[1]
 
     def answer(self, request: Any, response: Check.Response) -> Iterator[None]:
