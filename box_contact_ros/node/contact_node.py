@@ -123,6 +123,12 @@ def scene_of(values: Mapping[str, Any]) -> Scene:
     return read_scene(values['scene'])
 
 
+def keep_from_collections() -> None:
+    """Keep what there is: no full collection of garbage (10 ms and more) looks at it any more."""
+    gc.collect()
+    gc.freeze()
+
+
 class ContactNode(GuardedNode, LifecycleNode):
     """Wires parameters, topics, ticks and diagnostics to the states of a lifecycle node.
 
@@ -199,9 +205,7 @@ class ContactNode(GuardedNode, LifecycleNode):
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer poses. SUCCESS: active."""
         if self.has_process:
-            # What start-up made stays for good. No full collection (10 ms) has to look at it.
-            gc.collect()
-            gc.freeze()
+            keep_from_collections()
         self._monitor.restart(watched_of(self._tick.solver.scene))
         self._tick.active = True
         self._say_ready()
@@ -336,6 +340,9 @@ class ContactNode(GuardedNode, LifecycleNode):
         response.success, response.revision = True, solver.revision
         yield
         topics.boxes.publish(set_boxes.boxes_message(answerer.epoch, solver, request))
+        if self.has_process and set_boxes.size_of_request(request) > set_boxes.STEP:
+            yield
+            keep_from_collections()
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Forget all poses and stamps: a simulation begins anew."""

@@ -202,6 +202,18 @@ def test_lifts_leave_nothing_behind(client: YardClient, scene: str) -> None:
         assert count_blocks() - before < LIFTS / 2
 
 
+def test_collections_pass_over_a_large_change(client: YardClient, scene: str) -> None:
+    """In the node's own process, no full collection of garbage looks at boxes that came."""
+    boxes = [a_box(f'c{number}', AWAY, CUBE) for number in range(500)]
+    with serving(ContactNode, scene=scene, pair_topics=False) as node:
+        before = gc.get_freeze_count()
+        assert client.set_boxes(fixed=boxes[:1]).success and gc.get_freeze_count() <= before
+        node.has_process = True
+        assert client.set_boxes(fixed=boxes).success
+        assert gc.get_freeze_count() > before + len(boxes)
+    gc.unfreeze()
+
+
 def test_a_request_is_made_for_a_scene(client: YardClient, scene: str) -> None:
     """For another one it is refused. The same request again is answered as before."""
     with serving(ContactNode, scene=scene, pair_topics=False) as node:
