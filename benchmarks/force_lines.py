@@ -3,12 +3,13 @@
 
 """Where the forces end: a figure for each hard case, beside the line that it must not cross.
 
-`python -m benchmarks.force_lines` runs the cases of eight subjects by `PatchForces` with contacts
+`python -m benchmarks.force_lines` runs the cases of eleven subjects by `PatchForces` with contacts
 of its own: uneven steps, heavy bodies on light ones, impacts, carriers, gaps of a nanometre, a wide
-floor, loads of feet, and tipping. It prints and writes force_lines.md, which also lists the tuned
-numbers of the forces, and force_lines.csv. The lines of impacts, feet and tipping come from theory;
-the other ones say what a user may expect. The exit status is 1 if a figure is beyond its line.
-`--only SUBJECT` runs some of the subjects.
+floor, loads of feet, tipping, friction off the centre, a rope, and thin plates. It prints and
+writes force_lines.md, which also lists the tuned numbers of the forces, and force_lines.csv. The
+lines of impacts, feet, tipping, friction and the rope come from theory; the other ones say what a
+user may expect. The exit status is 1 if a figure is beyond its line. `--only SUBJECT` runs some of
+the subjects.
 """
 from __future__ import annotations
 
@@ -22,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from box_contact_ros.forces.patch_forces import GRAVITY
+from box_contact_ros.forces.patch_forces import FRICTION, GRAVITY
 
 from . import output
 from .loops import FLOOR, FRAME, Boxes, Ours, Scene, Timing, corner_speeds, steps
@@ -135,6 +136,19 @@ def heavy_on_light(*, quick: bool) -> Iterator[Line]:
         if scene.name.startswith('heavy'):
             yield Line(subject='heavy on light', case=scene.name, what='rests after [s]',
                        figure=rest, line=0.5)
+
+
+def plates(count: int = 60, thick: float = 0.005) -> Scene:
+    """Return flush plates on each other, of 37 kg each."""
+    return Scene(f'{count} plates of {1e3 * thick:g} mm', Boxes.of([FLOOR, *(
+        ((1.2, 0.8, thick), 37.0, (0, 0, thick * (k + 0.5))) for k in range(count))]), 2.0)
+
+
+def thin_plates(*, quick: bool) -> Iterator[Line]:
+    """Yield how far thin plates sink into each other at 1/60 s."""
+    depth, rest = sunk(plates(), FRAMES['1/60 s'])
+    yield Line(subject='thin', case=plates().name, what='sinks [mm]', figure=1e3 * depth, line=10.0)
+    yield Line(subject='thin', case=plates().name, what='rests after [s]', figure=rest, line=1.5)
 
 
 # --- impacts --------------------------------------------------------------------------------------
@@ -264,6 +278,72 @@ def tipping(*, quick: bool) -> Iterator[Line]:
     yield Line(subject='tipping', case=cube.name, what='falls within [s]', figure=tipped, line=3.0)
 
 
+# --- friction -------------------------------------------------------------------------------------
+
+def pushed(name: str, aside: float, degrees: float) -> Scene:
+    """Return a plate of 1 t that lands and is pushed by 0.99 of what friction holds after 1 s.
+
+    Its mass is aside [m], and it falls 2 mm where it is tilted.
+    """
+    mass, tilt = 1000.0, math.radians(degrees)
+    push = np.zeros((2, 6))
+    push[1, 0] = 0.99 * FRICTION * mass * GRAVITY
+    height = 0.2 + math.sin(tilt) + (0.002 if tilt else 0.0)
+    return Scene(name, Boxes.of([
+        ((200.0, 50.0, 1.0), 0.0, (0, 0, -0.5)),
+        ((2.0, 2.0, 0.4), mass, (0, 0, height), (math.sin(0.5 * tilt), 0, 0, math.cos(0.5 * tilt)),
+         (0.0, aside, -0.19))]), 2.5, act=lambda t, *_: push * (t > 1.0))
+
+
+def friction(*, quick: bool) -> Iterator[Line]:
+    """Yield how far a plate slides below Coulomb's limit, and how far one turns that is thrown."""
+    for name in ('1 ms', '1/60 s'):
+        for case, aside, degrees in (('mass 0.8 m aside', 0.8, 0.0), ('landed tilted', 0.0, 0.1)):
+            scene, start = pushed(case, aside, degrees), np.zeros(3)
+            for loop in runs(scene, FRAMES[name]):
+                if loop.time <= 1.0:
+                    start = loop.boxes.pose[1, :3].copy()
+            way = float(np.linalg.norm(scene.boxes.pose[1, :3] - start))
+            yield Line(subject='friction', case=f'{case}, {name}', what='slides [mm]',
+                       figure=1e3 * way, line=2.0)
+        scene = pushed('thrown', 0.8, 0.0)
+        scene.seconds, scene.boxes.velocity[1, 0] = 1.0, 3.0
+        for _ in runs(scene, FRAMES[name]):
+            pass
+        turned = 2.0 * math.degrees(abs(math.asin(scene.boxes.pose[1, 5])))
+        yield Line(subject='friction', case=f'mass 0.8 m aside, 3 m/s, {name}', what='turns by [°]',
+                   figure=turned, line=1.0)
+
+
+# --- ropes ----------------------------------------------------------------------------------------
+
+def load_on_rope(degrees: float = 5.0, length: float = 20.0) -> Scene:
+    """Return a load of 18 t that swings on a rope of 3 MN/m, damped along itself."""
+    mass, stiffness, angle = 18e3, 3e6, math.radians(degrees)
+    damping, slack = 0.6 * math.sqrt(stiffness * mass), length - mass * GRAVITY / stiffness
+
+    def act(t: float, boxes: Boxes, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        far, pull = np.linalg.norm(pose[0, :3]), np.zeros((1, 6))
+        up = -pose[0, :3] / far
+        pull[0, :3] = (stiffness * (far - slack) - damping * (velocity[0, :3] @ up)) * up
+        return pull
+
+    at = length * math.sin(angle), 0, -length * math.cos(angle)
+    return Scene('18 t on 20 m', Boxes.of([((6.0, 2.4, 2.6), mass, at)]), 600.0, act=act)
+
+
+def ropes(*, quick: bool) -> Iterator[Line]:
+    """Yield how the angle changes by which a load swings, in ten minutes."""
+    for name in ('1/60 s', '1/120 s'):
+        scene, widest = load_on_rope(), 0.0
+        scene.seconds = 60.0 if quick else 600.0
+        for loop in runs(scene, FRAMES[name]):
+            if loop.time > scene.seconds - 10.0:
+                widest = max(widest, abs(loop.boxes.pose[0, 0]))
+        yield Line(subject='rope', case=f'{scene.name}, {name}', what='angle changes by [%]',
+                   figure=100.0 * abs(math.degrees(math.asin(widest / 20.0)) / 5.0 - 1.0), line=1.0)
+
+
 # --- the numbers of the method --------------------------------------------------------------------
 
 TUNING = output.ROOT / 'box_contact_ros/core/src/force/tuning.hpp'
@@ -305,7 +385,8 @@ def tuned_numbers(text: str) -> list[Number]:
 
 SUBJECTS: dict[str, Callable[..., Iterator[Line]]] = {
     'uneven': uneven_steps, 'heavy': heavy_on_light, 'impact': impacts, 'carrier': carriers,
-    'gaps': gaps_of_a_nanometre, 'floor': wide_floors, 'feet': feet, 'tipping': tipping}
+    'gaps': gaps_of_a_nanometre, 'floor': wide_floors, 'feet': feet, 'tipping': tipping,
+    'friction': friction, 'rope': ropes, 'thin': thin_plates}
 """Cases by the name that `--only` takes."""
 
 

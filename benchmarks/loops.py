@@ -251,7 +251,8 @@ class Ours:
         boxes, h = self.boxes, self.lengths[self.tick % len(self.lengths)]
         outside = self.weight
         if self.scene.act:
-            outside = outside + self.scene.act(self.time, boxes, boxes.pose, boxes.velocity)
+            ahead = self.forces.ahead(h, boxes.pose, boxes.velocity)
+            outside = outside + self.scene.act(self.time, boxes, ahead, boxes.velocity)
         if self.scene.drive:
             boxes.velocity[0] = self.scene.drive(self.time + 0.5 * h)
         times = [time.perf_counter()]

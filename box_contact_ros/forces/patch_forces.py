@@ -183,7 +183,8 @@ class Loads(NamedTuple):
     corner_loads: np.ndarray
     """(k, 4) the part of `pressing` at each corner, never below 0 [N]: bilinear about `centre`."""
     too_deep: np.ndarray
-    """(k,) bool, whether the patch is deeper than `most_depth`."""
+    """(k,) bool, whether the patch is deeper than `most_depth`, or, with `set_boxes`, than a tenth
+    of the thinner box."""
 
 
 class PatchForces:
@@ -303,6 +304,21 @@ class PatchForces:
         """
         named = None if changed is None else as_wholes(changed, 'changed')
         return Motion._make(_step(self._native.advance, dt, poses, velocities, wrenches, named))
+
+    def ahead(self, dt: float, poses: ArrayLike, velocities: ArrayLike) -> np.ndarray:
+        """Return the poses (n, 7) at which to take the wrenches of ropes and springs.
+
+        Wrenches are constant over the n sub-steps of an `advance`. At the poses themselves, springs
+        gain energy; at poses later by (n − 1)/2n · dt, they keep it. Nothing changes, so each step
+        of a load on a rope is::
+
+            at = forces.ahead(dt, poses, velocities)
+            poses, velocities, _, _ = forces.advance(dt, poses, velocities, gravity + rope(at))
+
+        ValueError: names field and value.
+        """
+        return self._native.ahead(as_number(dt, 'dt'), _as_rows(poses, 'poses', 7),
+                                  _as_rows(velocities, 'velocities', 6))
 
     def wrenches(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
                  wrenches: ArrayLike | None = None) -> np.ndarray:

@@ -124,6 +124,12 @@ def scene_of(values: Mapping[str, Any]) -> Scene:
     return read_scene(values['scene'])
 
 
+def keep_from_collections() -> None:
+    """Keep what there is: no full collection of garbage (10 ms and more) looks at it any more."""
+    gc.collect()
+    gc.freeze()
+
+
 class ContactNode(GuardedNode, LifecycleNode):
     """Wires parameters, topics, ticks and diagnostics to the states of a lifecycle node.
 
@@ -157,7 +163,7 @@ class ContactNode(GuardedNode, LifecycleNode):
         self._path_check: SceneCheck | None = None  # its own: checks come between its steps
         self.add_on_set_parameters_callback(self._set_live)
         self._checks = PacedService(self, self.counts, 'checks', (Check, '~/check'), self._check,
-                                    check.kind_and_size)
+                                    check.kind_and_size, is_timed=True)
         PacedService(self, self.counts, 'paths', (CheckPath, '~/check_path'), self._check_path,
                      check_path.kind_and_size)
         self._taken: SetBoxes.Request | None = None  # the last request of ~/set_boxes
@@ -203,9 +209,7 @@ class ContactNode(GuardedNode, LifecycleNode):
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer poses. SUCCESS: active."""
         if self.has_process:
-            # What start-up made stays for good. No full collection (10 ms) has to look at it.
-            gc.collect()
-            gc.freeze()
+            keep_from_collections()
         self._monitor.restart(watched_of(self._tick.solver.scene))
         self._tick.active = True
         self._say_ready()
@@ -292,27 +296,29 @@ class ContactNode(GuardedNode, LifecycleNode):
             f'poses{frame} from {", ".join(topics[:NAMED_TOPICS])}'
             f'{f" and {more} more" if more > 0 else ""}')
 
-    def _check(self, request: Check.Request, response: Check.Response) -> Iterable[None]:
+    def _check(self, request: Check.Request, response: Check.Response) -> Iterator[None]:
         """Answer on the node's scene and model; ticks know nothing of it."""
         if self._answerer is None:
             response.message = NOT_CONFIGURED
-            return ()
-        if self._check_answerer is None or self._check_answerer.solver is not self._answerer.solver:
-            self._check_answerer = CheckAnswerer(
+            return
+        checker = self._check_answerer
+        if checker is None or checker.solver is not self._answerer.solver:
+            checker = self._check_answerer = CheckAnswerer(
                 self._answerer.solver, self.model_of(self._values), self._answerer.epoch)
-        self._check_answerer.answer(request, response)
-        return ()
+            yield
+        checker.answer(request, response)
 
     def _check_path(self, request: CheckPath.Request, response: CheckPath.Response,
-                    ) -> Iterable[None]:
+                    ) -> Iterator[None]:
         """Answer on the node's scene; ticks know nothing of it."""
         if self._answerer is None:
             response.message = NOT_CONFIGURED
-            return ()
-        solver = self._answerer.solver
-        if self._path_check is None or self._path_check.solver is not solver:
-            self._path_check = SceneCheck(solver, most_near=0)
-        return check_path.answer(self._path_check, self._answerer.epoch, request, response)
+            return
+        checker, epoch = self._path_check, self._answerer.epoch
+        if checker is None or checker.solver is not self._answerer.solver:
+            checker = self._path_check = SceneCheck(self._answerer.solver, most_near=0)
+            yield
+        yield from check_path.answer(checker, epoch, request, response)
 
     def _get_boxes(self, request: GetBoxes.Request, response: GetBoxes.Response) -> Iterable[None]:
         """Tell some boxes of the scene."""
@@ -351,6 +357,9 @@ class ContactNode(GuardedNode, LifecycleNode):
         response.success, response.revision = True, solver.revision
         yield
         topics.boxes.publish(set_boxes.boxes_message(answerer.epoch, solver, request))
+        if self.has_process and set_boxes.size_of_request(request) > set_boxes.STEP:
+            yield
+            keep_from_collections()
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Forget all poses and stamps: a simulation begins anew."""

@@ -22,6 +22,11 @@ COSTLY = 5e-3
 """Processor time [s] beyond which a request is costly: half a tick at 100 Hz."""
 PAUSE = 5.0
 """Pause after a costly request, divided by its time: ticks have five sixths of the node's time."""
+SLICE = 2e-3
+"""Processor time [s] after which the next step waits for ticks."""
+GAP = 1e-3
+"""Time [s] for the ticks that wait. EventsExecutor serves a timer that is due when it is set twice,
+then four times, and so on: ticks that wait would come behind all the steps."""
 MOST_WAITING = 16
 """Costly requests that wait for the end of a pause."""
 KEPT_TIMES = 4096  # of requests, for a report
@@ -44,20 +49,23 @@ class PacedService:
     def __init__(self, node: GuardedNode, counts: Counter[str], what: str, service: tuple[Any, str],
                  answer: Callable[[Any, Any], Iterable[None]],
                  kind_and_size: Callable[[Any], tuple[Kind, int]], *, in_turn: bool = False,
-                 ) -> None:
+                 is_timed: bool = False) -> None:
         """Serve a service, by its type and name, of a node; `answer` fills in a response in steps.
 
-        what: what `counts` calls the requests. in_turn: whether none overtakes another.
+        what: what `counts` calls the requests. in_turn: whether none overtakes another. is_timed:
+        whether `take_times` is called again and again.
         """
         self._counts, self._what = counts, what
         self._answer, self._kind_and_size, self._in_turn = answer, kind_and_size, in_turn
         self._until = 0.0  # end of the pause, by the steady clock [s]
+        self._due = 0.0  # when to go on, by the same clock [s]
         self._cheap: dict[Kind, int] = {}
         """Size up to which requests are not costly, of the kinds that came last."""
         self._waiting: deque[tuple[float, Any, Any, Send]] = deque()
         """When each came [s], and what `_begin` takes."""
         self._running: Running | None = None
-        self._times: deque[float] = deque(maxlen=KEPT_TIMES)  # from taking to answering [s]
+        # From taking to answering [s].
+        self._times: deque[float] = deque(maxlen=KEPT_TIMES if is_timed else 0)
         self._next_step = node.answered(self._step, service[1])
         self._timer = node.create_timer(LONG, self._go_on, clock=Clock(
             clock_type=ClockType.STEADY_TIME))
@@ -89,9 +97,11 @@ class PacedService:
             send(response)
 
     def _go_on(self) -> None:
-        """Do the next step, or begin with the first request that waits, as its pause is over."""
+        """Do the next steps, or begin with the first request that waits, as its pause is over."""
         self._timer.cancel()
-        if self._running:
+        if time.monotonic() < self._due:  # an executor may serve a timer twice
+            pass
+        elif self._running:
             self._run(self._running)
         elif self._waiting:
             self._begin(*self._waiting.popleft())
@@ -99,9 +109,10 @@ class PacedService:
             self._wait()
 
     def _wait(self) -> None:
-        """Let the timer end now, where ticks that wait are answered before; or with the pause."""
-        pause = 0.0 if self._running else self._until - time.monotonic()
-        self._timer.timer_period_ns = max(1, round(1e9 * pause))
+        """Let the timer end after ticks that wait now; or with the pause."""
+        now = time.monotonic()
+        self._due = now + GAP if self._running else max(now + GAP, self._until)
+        self._timer.timer_period_ns = round(1e9 * (self._due - now))
         self._timer.reset()
 
     def _begin(self, came: float, request: Any, response: Any, send: Send) -> None:
@@ -112,9 +123,11 @@ class PacedService:
             self._wait()
 
     def _run(self, running: Running) -> None:
-        """Do one step of an answer; send it after the last one."""
+        """Do steps of an answer for a SLICE; send it after the last one."""
         began, used = time.monotonic(), time.thread_time()
         response = self._next_step(running.request, running.response)
+        while response is None and time.thread_time() < used + SLICE:
+            response = self._next_step(running.request, running.response)
         if response is not None:
             self._running = None
             running.send(response)

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from time import process_time
 
 import numpy as np
 import pytest
@@ -37,7 +36,6 @@ from benchmarks.stack_scenes import (
     ratio,
     sideways,
     slope,
-    timbers,
     tower,
     turntable,
 )
@@ -97,20 +95,12 @@ def test_a_jittered_tower_hardly_sways_in_steps_of_a_frame() -> None:
     assert run(partial(tower, 20, jitter=0.03), OWN_FRAMES).end_speed < 1e-3
 
 
-def test_loads_that_roll_are_no_impact() -> None:
-    """24 t on timbers take 1.5 times as long a step at 1/60 s as at 1 ms; as impacts, 3 times."""
-    def cost(timing: Timing) -> float:
-        start = process_time()
-        list(steps(replace(timbers(), seconds=1.5), timing))
-        return process_time() - start
-
-    frames, fine = (min(cost(timing) for _ in range(3)) for timing in (TIMINGS[2], TIMINGS[0]))
-    assert frames < 0.13 * fine
-
-
 @pytest.mark.parametrize('make', [card_house, pallet])
 def test_what_sways_comes_to_rest_in_steps_of_a_frame(make: Callable[[], Scene]) -> None:
-    """A card house of 5 storeys and a pallet of ten layers, within a second; no box walks away."""
+    """A card house of 5 storeys and a pallet of ten layers, within a second; no box walks away.
+
+    Where all that rolls is an impact, a card walks by a metre.
+    """
     outcome = run(lambda: replace(make(), seconds=2.0), TIMINGS[2])
     assert outcome.rest < 1.0 and outcome.moved < 20.0
 

@@ -169,6 +169,21 @@ static void check_answers(bc_patch_forces* forces, const bc_pose* poses) {
   check(strstr(bc_error_text(), "velocities[1] has 1e+60") != NULL, "its words");
 }
 
+static void check_ahead(void) {
+  bc_patch_forces* forces;
+  check(bc_patch_forces_create(bodies, 1, NULL, &forces) == BC_OK, "create");
+  const bc_pose pose = {{1.0, 2.0, 3.0}, {0.0, 0.0, 0.0, 1.0}};
+  bc_pose ahead;
+  bc_velocity velocity = {{0.0, 8.0, 0.0}, {0.0, 0.0, 0.0}};
+  check(bc_patch_forces_ahead(forces, 0.001, &pose, &velocity, &ahead) == BC_OK &&
+            fabs(ahead.position[1] - 2.003) < 1e-15,
+        "ahead by 3/8 of a step of four sub-steps");
+  check(bc_patch_forces_ahead(forces, 1.0, &pose, &velocity, &ahead) == BC_BAD_ARGUMENT, "1 s");
+  velocity.angular[2] = NAN;
+  check(bc_patch_forces_ahead(forces, 0.001, &pose, &velocity, &ahead) == BC_BAD_ARGUMENT, "NaN");
+  bc_patch_forces_destroy(forces);
+}
+
 static void check_refusals(void) {
   bc_patch_forces* forces = (bc_patch_forces*)&bodies;
   bc_force_options options = BC_DEFAULT_FORCE_OPTIONS;
@@ -202,6 +217,7 @@ int main(void) {
   drop();
   check_rest();
   check_bodies();
+  check_ahead();
   check_refusals();
   printf("%d failures\n", failures);
   return failures != 0;

@@ -109,6 +109,7 @@ def test_null_pointers(library: CLibrary) -> None:
          [library.forces, (c_double * 7)(1, 1, 1, 1), c_int64(1)], {0, 1}),
         (library.bc_patch_forces_hold, [library.forces, answer, pose], {0, 1}),
         (library.bc_patch_forces_set_boxes, [library.forces, body_box, c_int64(1)], {0, 1}),
+        (library.bc_patch_forces_ahead, [library.forces, step, pose, wrench, pose], {0, 2, 3, 4}),
         (library.bc_patch_forces_advance,
          [library.forces, step, pose, wrench, None, motion], {0, 2, 3, 5}),
         (library.bc_patch_forces_forget,

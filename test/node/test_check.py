@@ -5,10 +5,12 @@
 from __future__ import annotations
 
 import math
+import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import closing
 from functools import partial
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 from unittest.mock import Mock
@@ -32,6 +34,7 @@ from box_contact_ros.node import paced_service
 from box_contact_ros.node.check import MOST_CONTACTS, CheckAnswerer
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.paced_service import PacedService
+from box_contact_ros.node.runtime import GuardedNode
 from box_contact_ros.scene.scene import Box, Frame, Pair, Scene
 from box_contact_ros.scene.scene_check import MOST_BOXES, MOST_PAIRS
 
@@ -379,8 +382,13 @@ class Bench:
                     answered=lambda callback, name: callback)
         self.counts: Counter[str] = Counter()
         self.service = PacedService(node, self.counts, 'checks', (Check, '~/check'), self.answer,
-                                    check_module.kind_and_size, in_turn=in_turn)
-        self.end_of_pause = node.create_timer.call_args.args[1]
+                                    check_module.kind_and_size, in_turn=in_turn, is_timed=True)
+        self._end_of_pause = node.create_timer.call_args.args[1]
+
+    def end_of_pause(self) -> None:
+        """Let the timer end."""
+        self.now += (self.timer.timer_period_ns + 1) * 1e-9
+        self._end_of_pause()
 
     def answer(self, request: Any, response: Check.Response) -> Iterator[None]:
         for _ in range(self.steps - 1):
@@ -410,12 +418,10 @@ def test_a_pause_is_five_times_as_long_as_its_request(monkeypatch: pytest.Monkey
         bench.ask(f'{number}', 80, 0.001)
     bench.ask('one too many', 80, 0.1)
     assert bench.sent.pop() == 'one too many: busy'
-    bench.now = 0.605
     bench.end_of_pause()
     assert bench.sent[3:] == ['one that waits'] and bench.timer.timer_period_ns == round(0.5e9)
     bench.ask('bad', 0, 0.001)
     assert bench.sent.pop() == 'bad: '
-    bench.now += 1.0
     for _ in range(16):
         bench.end_of_pause()
     assert bench.sent[4:] == [f'{number}' for number in range(15)]
@@ -437,10 +443,9 @@ def test_what_one_client_asks_makes_no_other_wait(monkeypatch: pytest.MonkeyPatc
         bench.ask('greedy', 1, 0.04, margin=1000.0)
         bench.ask(f'cheap {number}', 1, 0.001)
     assert bench.sent == ['cheap', 'greedy', *(f'cheap {number}' for number in range(5))]
-    bench.now += 1.0
     for _ in range(4):
         bench.end_of_pause()
-        bench.now += 1.0
+    bench.now += 1.0
     for number in range(300):
         bench.ask('other', 1, 0.001, margin=1.0 + number)
     assert len(bench.service._cheap) == paced_service.KEPT_KINDS
@@ -456,7 +461,6 @@ def test_where_the_order_matters_none_overtakes(monkeypatch: pytest.MonkeyPatch)
     bench.ask('behind it', 1, 0.001)
     assert bench.sent == ['cheap', 'costly', 'alone']
     for _ in range(2):
-        bench.now += 1.0
         bench.end_of_pause()
     assert bench.sent[3:] == ['next costly', 'behind it']
 
@@ -467,13 +471,43 @@ def test_an_answer_is_made_in_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     bench.ask('first', 80, 0.01)
     bench.ask('second', 1, 0.01)
     for _ in range(2):
-        assert not bench.sent and bench.timer.timer_period_ns == 1
+        assert not bench.sent and bench.timer.timer_period_ns == round(1e9 * paced_service.GAP)
         bench.end_of_pause()
     assert bench.sent == ['first']
     assert bench.timer.timer_period_ns == round(1e9 * paced_service.PAUSE * (2 * STEP + 0.01))
     for _ in range(3):
         bench.end_of_pause()
     assert bench.sent == ['first', 'second'] and bench.counts == {'checks answered': 2}
+
+
+@pytest.mark.parametrize('executor_type', [SingleThreadedExecutor, EventsExecutor])
+def test_what_comes_in_a_step_is_served_before_the_next(client: Client, executor_type: Any) -> None:
+    """Each step sends a message to the node itself, and takes 5 ms."""
+    order: list[str] = []
+
+    class Stepper(GuardedNode):
+        def __init__(self, context: Any) -> None:
+            super().__init__('stepper', context=context)
+            self.create_subscription(Header, 'ticks', lambda _: order.append('tick'), 10)
+            self.ticks = self.create_publisher(Header, 'ticks', 10)
+            PacedService(self, Counter(), 'checks', (Check, '~/check'), self.answer,
+                         check_module.kind_and_size)
+
+        def answer(self, _: Any, response: Check.Response) -> Iterator[None]:
+            for _ in range(10):
+                order.append('step')
+                self.ticks.publish(Header())
+                began = time.thread_time()
+                while time.thread_time() < began + 0.005:
+                    pass
+                yield
+            response.success = True
+
+    with serving(Stepper, executor_type) as node:
+        assert client.spin(lambda: node.ticks.get_subscription_count())
+        assert client.call(Check, 'stepper/check', Check.Request()).success
+    in_a_row = sum(pair == ('step', 'step') for pair in pairwise(order))
+    assert order.count('step') == 10 and in_a_row < 4, order
 
 
 @pytest.mark.parametrize('by_topics', [False, True])

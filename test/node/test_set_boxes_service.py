@@ -5,8 +5,10 @@
 from __future__ import annotations
 
 import gc
+import linecache
 import math
 import struct
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import closing
@@ -48,6 +50,8 @@ SERVICE = 'contact_node/set_boxes'
 MOST_TIME = 0.025  # of the node's processor that a tick waits [s]
 CHANGES = 200  # 2,000 were tried
 REQUESTS = 1000  # 10,000 were tried
+LIFTS = 100
+clear_caches = getattr(sys, '_clear_internal_caches', None) or sys._clear_type_cache  # from 3.13 on
 NAMES = [f'c{number}' for number in range(50)]
 YARD = {'frame_id': 'map', 'poses': 'named', 'pairs': 'all',
         'boxes': {'ground': {'size': [200, 200, 1], 'pose': [0, 0, -0.5, 0, 0, 0, 1]},
@@ -169,6 +173,45 @@ def test_bodies_come_and_are_joined(client: YardClient, scene: str) -> None:
             ('cab', 'lorry', False), ('c1', '', True)]
         assert client.set_boxes(absent=['lorry']).message == ''
         assert client.get_boxes().count == 3
+
+
+def test_lifts_leave_nothing_behind(client: YardClient, scene: str) -> None:
+    """The node has as many objects after 100 lifts as before.
+
+    Python caches attributes of messages, up to 4,096 names, and the source of each line that logs.
+    """
+    def count_blocks() -> int:
+        client.changes.clear()
+        client.diagnostics.clear()
+        gc.collect()
+        clear_caches()
+        linecache.clearcache()
+        return sys.getallocatedblocks()
+
+    def lift(number: int) -> None:
+        box = a_box(f'c{number % 10}', (0, 0, -1, 0, 0, 0, 1), CUBE)
+        assert client.set_boxes(bodies=[a_body('spreader', None, box)]).success
+        assert client.set_boxes(fixed=[a_box(box.name, (9, 9, 1, 0, 0, 0, 1), CUBE)]).success
+
+    with serving(ContactNode, scene=scene, pair_topics=False):
+        for number in range(20):
+            lift(number)
+        before = count_blocks()
+        for number in range(LIFTS):
+            lift(number)
+        assert count_blocks() - before < LIFTS / 2
+
+
+def test_collections_pass_over_a_large_change(client: YardClient, scene: str) -> None:
+    """In the node's own process, no full collection of garbage looks at boxes that came."""
+    boxes = [a_box(f'c{number}', AWAY, CUBE) for number in range(500)]
+    with serving(ContactNode, scene=scene, pair_topics=False) as node:
+        before = gc.get_freeze_count()
+        assert client.set_boxes(fixed=boxes[:1]).success and gc.get_freeze_count() <= before
+        node.has_process = True
+        assert client.set_boxes(fixed=boxes).success
+        assert gc.get_freeze_count() > before + len(boxes)
+    gc.unfreeze()
 
 
 def test_a_request_is_made_for_a_scene(client: YardClient, scene: str) -> None:

@@ -175,6 +175,19 @@ inline PyObject* forces_advance(PyObject* self, PyObject* const* args, Py_ssize_
   return pack(&PyTuple_Type, moved, after, wrenches, awake);
 }
 
+inline PyObject* forces_ahead(PyObject* self, PyObject* const* args, Py_ssize_t count) {
+  if (count != 3) fail(PyExc_TypeError, "ahead(dt, poses, velocities)");
+  double dt = PyFloat_AsDouble(args[0]);
+  if (PyErr_Occurred()) return nullptr;
+  npy_intp bodies = body_count(self);
+  auto poses = read<double>(args[1], "poses", {bodies, 7});
+  auto velocities = read<double>(args[2], "velocities", {bodies, 6});
+  auto ahead = make<double>({bodies, 7});
+  check(bc_patch_forces_ahead(forces_of(self), dt, rows_of<bc_pose>(poses),
+                              rows_of<bc_velocity>(velocities), rows_of<bc_pose>(ahead)));
+  return ahead.object.release();
+}
+
 inline PyObject* forces_loads(PyObject* self, PyObject*) {
   std::vector<bc_load> loads(size_t(bc_patch_forces_loads(forces_of(self), nullptr, 0)));
   auto n = npy_intp(loads.size());
@@ -237,6 +250,9 @@ inline PyMethodDef forces_methods[] = {
     {"advance", method<forces_advance<false>>(), METH_FASTCALL,
      "advance(dt, poses, velocities, outside, changed)\n--\n\nReturn poses (n, 7), velocities and wrenches "
      "(n, 6), and who is awake (n,).\n\nReturn None, and change nothing, where one is no plain array."},
+    {"ahead", method<forces_ahead>(), METH_FASTCALL,
+     "ahead(dt, poses, velocities)\n--\n\nReturn the poses (n, 7) at which to take forces that depend on "
+     "poses."},
     {"loads", method<forces_loads>(), METH_NOARGS,
      "loads()\n--\n\nReturn the columns of what each pair carried."},
     {"forget", method<forces_forget>(), METH_O,

@@ -119,7 +119,8 @@ typedef struct bc_load {
                              within 0.1 mm; else it has the moments of the overlap, which at rest is a
                              wedge, and may reach beyond the rim */
   double corner_loads[4]; /* the part of `pressing` at each corner; never below 0 [N] */
-  int is_too_deep;        /* whether the patch is deeper than `most_depth` */
+  int is_too_deep;        /* whether the patch is deeper than `most_depth`, or, with
+                             bc_patch_forces_set_boxes, than a tenth of the thinner box */
 } bc_load;
 
 typedef struct bc_patch_forces bc_patch_forces;
@@ -153,6 +154,12 @@ BC_API void bc_patch_forces_reset(bc_patch_forces* forces);
  * and a pair that comes twice. */
 BC_API bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches* answer,
                                       const bc_pose* poses);
+
+/* Write the poses at which to take the outside wrenches of the next advance, of `dt` seconds, that depend on
+ * poses, as those of ropes and springs: with n sub-steps, `poses` later by (n − 1)/2n · dt. At the poses
+ * themselves, springs gain energy. `ahead` is another array than `poses`. */
+BC_API bc_status bc_patch_forces_ahead(const bc_patch_forces* forces, double dt, const bc_pose* poses,
+                                       const bc_velocity* velocities, bc_pose* ahead);
 
 /* Advance by `dt` seconds: 1e-50 or more, and less than 1. Steps may differ in length. `outside` are
  * the wrenches beside those of contacts, gravity among them, constant over the step; NULL: none.

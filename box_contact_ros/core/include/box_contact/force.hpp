@@ -119,6 +119,13 @@ class PatchForces {
     detail::check(bc_patch_forces_hold(forces_.get(), &plain, poses.data()));
   }
 
+  // Write the poses at which to take the wrenches of ropes and springs for the next advance.
+  void ahead(double dt, Span<const Pose> poses, Span<const Velocity> velocities,
+             Span<Pose> found) const {
+    check_rows(poses, velocities, {});
+    check_count(found.size());
+    detail::check(bc_patch_forces_ahead(forces_.get(), dt, poses.data(), velocities.data(), found.data()));
+  }
   // Move the bodies for `dt` [s]; `outside` are all wrenches but those of contacts, or none. `awake`: a
   // row for each body, 0 for those at rest; or none.
   void advance(double dt, Span<Pose> poses, Span<Velocity> velocities, Span<const Wrench> outside = {},

@@ -10,9 +10,10 @@
 //
 //     pressing  N  along n at c            N ≥ 0
 //     rocking   τ  about the axes 1 and 2  the centre of N in the rectangle and on both faces
-//     friction  f  in the plane at c       |f|² + (m/r)² ≤ (μ·N)²
-//     torsion   m  about n                 r: the radius at which friction resists a spin
+//     friction  f  in the plane at p       |f|² + (m/r)² ≤ (μ·N)²
+//     torsion   m  about n through p       r: the radius at which friction resists a spin
 //
+// Here p is the centre of pressure of the last while: one that followed each iteration would shake piles.
 // Pressing and rocking are solved as one block, friction and torsion as another. Overlaps are pushed
 // out by soft constraints; relaxation removes the speed of pushing out again (Catto, "Solver2D",
 // 2024). Between answers, depth, centroid and tilt follow the bodies.
@@ -109,6 +110,7 @@ struct Arms {
 template <class T>
 struct Reached : Arms<T> {
   T depth;                          // [m]
+  T lever_1, lever_2;               // from the point to where friction acts, along the axes [m]
   Vec<T> normal_sum, friction_sum;  // impulses of the sub-steps
 };
 template <class T>
@@ -175,10 +177,15 @@ template <class T, class Body>
 BC_INLINE void apply_normal(const Rows<T>& block, const Vec<T>& x, Body& a, Body& b) {
   apply<T>(block, x[0] * block.normal, x[1] * block.shape.axis_1 + x[2] * block.shape.axis_2, a, b);
 }
+// The torsion of friction and torsion, about the point instead of the centre of pressure.
+template <class T>
+BC_INLINE T torsion_at_point(const Rows<T>& block, const Vec<T>& x) {
+  return block.shape.radius * x[2] + (block.lever_1 * x[1] - block.lever_2 * x[0]);
+}
 template <class T, class Body>
 BC_INLINE void apply_friction(const Rows<T>& block, const Vec<T>& x, Body& a, Body& b) {
   apply<T>(block, x[0] * block.shape.axis_1 + x[1] * block.shape.axis_2,
-           (block.shape.radius * x[2]) * block.normal, a, b);
+           torsion_at_point(block, x) * block.normal, a, b);
 }
 
 // Add up the impulses that its bodies got since they were counted last.
@@ -192,37 +199,59 @@ BC_INLINE void count(Rows<T>& block, Sums<T>& a, Sums<T>& b) {
   Vec<T> impulse =
       normal[0] * block.normal + (friction[0] * shape.axis_1 + friction[1] * shape.axis_2);
   Vec<T> angular = (normal[1] * shape.axis_1 + normal[2] * shape.axis_2) +
-                   (shape.radius * friction[2]) * block.normal;
+                   torsion_at_point(block, friction) * block.normal;
   a.impulse = a.impulse - impulse;
   a.angular_impulse = a.angular_impulse - (cross(block.arm_a, impulse) + angular);
   b.impulse += impulse;
   b.angular_impulse += cross(block.arm_b, impulse) + angular;
 }
 
-// The impulses of the last window, about the point of this step.
+// The impulses of the last window: what pressed, about the point of this step.
 template <class T>
-BC_INLINE void remember(const Rows<T>& block, Vec<T>& normal, Vec<T>& friction) {
+BC_INLINE Vec<T> remembered_pressing(const Rows<T>& block) {
   const RectangleOf<T>& shape = block.shape;
   T pressing = block.normal_impulse;
   Vec<T> moved = block.impulse_arm - block.arm_a;
   Vec<T> rocking = block.rocking_impulse + cross<T>(moved, pressing * block.normal);
+  return {pressing, bounded<T>(rocking_1(shape), pressing, dot(rocking, shape.axis_1)),
+          bounded<T>(rocking_2(shape), pressing, dot(rocking, shape.axis_2))};
+}
+// What rubbed, about the centre of pressure.
+template <class T>
+BC_INLINE Vec<T> remembered_friction(const Rows<T>& block) {
+  const RectangleOf<T>& shape = block.shape;
+  Vec<T> moved = block.impulse_arm - block.arm_a;
   T torsion = block.torsion_impulse + dot(block.normal, cross(moved, block.friction_impulse));
-  normal = {pressing, bounded<T>(rocking_1(shape), pressing, dot(rocking, shape.axis_1)),
-            bounded<T>(rocking_2(shape), pressing, dot(rocking, shape.axis_2))};
-  friction = {dot(block.friction_impulse, shape.axis_1), dot(block.friction_impulse, shape.axis_2),
-              select<T>(shape.radius > 0.0, torsion / shape.radius, T{})};
-  bound<T>(friction, block.friction * normal[0]);
+  Vec<T> friction{dot(block.friction_impulse, shape.axis_1),
+                  dot(block.friction_impulse, shape.axis_2), T{}};
+  torsion -= torsion_at_point(block, friction);
+  friction[2] = select<T>(shape.radius > 0.0, torsion / shape.radius, T{});
+  bound<T>(friction, block.friction * block.normal_impulse);
+  return friction;
 }
 
 // Give a share of them again.
 template <class T, class Body>
 BC_INLINE void warm_start(const SubSteps& steps, Rows<T>& block, Body& a, Body& b) {
   T share = steps.again(block.window);
-  remember(block, block.normal_impulses, block.friction_impulses);
-  block.normal_impulses = share * block.normal_impulses;
-  block.friction_impulses = share * block.friction_impulses;
+  block.normal_impulses = share * remembered_pressing(block);
+  block.friction_impulses = share * remembered_friction(block);
   apply_normal(block, block.normal_impulses, a, b);
   apply_friction(block, block.friction_impulses, a, b);
+}
+
+// The mean centre of what pressed lately. N·n at x·e1 + y·e2 has the moment N·(y·e1 − x·e2).
+template <class T>
+BC_INLINE void follow_pressure(const SubSteps& steps, Rows<T>& block) {
+  const RectangleOf<T>& shape = block.shape;
+  const Vec<T>& pressed = block.normal_impulses;
+  T before = splat<T>(std::max(0.0, 1.0 - steps.length / pressure_time)) * block.pressure;
+  block.pressure = before + pressed[0];
+  Vec<T> moment = before * (block.pressure_arm - block.arm_a) +
+                  (pressed[1] * shape.axis_2 - pressed[2] * shape.axis_1);
+  Mask<T> has_pressed = block.pressure > 0.0;
+  auto centre = [&](T along) { return select<T>(has_pressed, along / block.pressure, T{}); };
+  block.pressure_arm = block.arm_a + Vec<T>{centre(moment[0]), centre(moment[1]), centre(moment[2])};
 }
 
 // Keep the impulses of this step, and a share of those before.
@@ -235,17 +264,16 @@ BC_INLINE void store(const SubSteps& steps, Rows<T>& block) {
   Vec<T> pressed = block.normal_impulses, rubbed = block.friction_impulses;
   Mask<T> is_kept = kept > 0.0;
   if (any(is_kept)) {
-    Vec<T> normal, friction;
-    remember(block, normal, friction);
-    pressed = select(is_kept, pressed + kept * normal, pressed);
-    rubbed = select(is_kept, rubbed + kept * friction, rubbed);
+    pressed = select(is_kept, pressed + kept * remembered_pressing(block), pressed);
+    rubbed = select(is_kept, rubbed + kept * remembered_friction(block), rubbed);
   }
   const RectangleOf<T>& shape = block.shape;
   block.normal_impulse = pressed[0];
   block.rocking_impulse = pressed[1] * shape.axis_1 + pressed[2] * shape.axis_2;
   block.friction_impulse = rubbed[0] * shape.axis_1 + rubbed[1] * shape.axis_2;
-  block.torsion_impulse = shape.radius * rubbed[2];
+  block.torsion_impulse = torsion_at_point(block, rubbed);
   block.impulse_arm = block.arm_a;
+  follow_pressure(steps, block);
 }
 
 // Velocities of B relative to A: at the point, and angular.
@@ -260,8 +288,9 @@ template <class T, class Body>
 BC_INLINE T solve_friction(Rows<T>& block, Mask<T> due, Body& a, Body& b) {
   const RectangleOf<T>& shape = block.shape;
   Vec<T> slip = speed(block, a, b) + block.surface;
-  Vec<T> v{dot(slip, shape.axis_1), dot(slip, shape.axis_2),
-           shape.radius * dot(b.angular - a.angular, block.normal)};
+  T spin = dot(b.angular - a.angular, block.normal);
+  Vec<T> v{dot(slip, shape.axis_1) - block.lever_2 * spin,
+           dot(slip, shape.axis_2) + block.lever_1 * spin, shape.radius * spin};
   T limit = block.friction * block.normal_impulses[0];
   Vec<T> next = block.friction_impulses - block.friction_mass * v;
   Mask<T> slides = due & (dot(next, next) > limit * limit);

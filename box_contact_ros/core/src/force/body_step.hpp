@@ -31,6 +31,20 @@ struct Given {
   const bc_wrench* outside;  // none: no wrenches
 };
 
+// Where a body is that goes on for a time [s] by its velocity alone.
+inline bc_pose pose_after(double time, const Body& body, const bc_pose& pose,
+                          const bc_velocity& velocity) {
+  if (time == 0.0 || is_still(velocity)) return pose;
+  Placed placed = placed_at(pose, body.centre);
+  placed.position += time * vector(velocity.linear);
+  double turned[4];
+  double scale = 1.0 / std::sqrt(squared_norm(pose.quaternion));
+  for (int i = 0; i < 4; ++i) turned[i] = scale * pose.quaternion[i];
+  Vec<double> angular = vector(velocity.angular);
+  rotate_freely<double>(body.inverse_inertia, body.is_free(), time, turned, placed.axes, angular);
+  return pose_at(placed, turned, body.centre);
+}
+
 class BodyStep {
  public:
   BodyStep(const std::vector<Body>& bodies, const SubSteps& steps, const Given& given,

@@ -1,8 +1,8 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// How much shorter the sub-steps of an island are, so that no patch is pressed deeper than wanted, and for how
-// long it has swayed.
+// How much shorter the sub-steps of an island are, so that no patch is pressed deeper than wanted, or than a
+// tenth of the thinner box; and for how long it has swayed.
 //
 // A patch that bears a force F for long is F·c·w²/f² deep. Here c is what an impulse N alone changes the
 // closing speed by, w is the window, and f is `soft_frequency`. Of boxes alike that is little. Of a heavy
@@ -76,9 +76,15 @@ class FinenessOf {
       if (outside_) total += vector(outside_[moving.body].force);
       lightest = std::max(lightest, moving.inverse_mass);
     });
-    double weight = length(total), push = 0.0;
+    double weight = length(total), push = 0.0, push_by_depth = 0.0, thinnest = place_max;
+    for (size_t k = island.block; k < island.block_end; ++k)
+      thinnest = std::min(thinnest, patches_[size_t(blocks_[k].patch)].most_depth);
+    auto finer = [&](double by_depth) {
+      return steps.window * std::sqrt(by_depth / aimed_depth) / soft_frequency;
+    };
     bool is_uneven = false;
-    bool may_be_heavy = weight * 2.0 * lightest > least_push;
+    double most_push = weight * 2.0 * lightest;
+    bool may_be_heavy = most_push > least_push || finer(most_push / thinnest) > 1.0;
     if (may_be_heavy) hand_down_weights(island, (-1.0 / weight) * total);
     for (size_t k = island.block; k < island.block_end; ++k) {
       Patch& patch = patches_[size_t(blocks_[k].patch)];
@@ -89,11 +95,13 @@ class FinenessOf {
              of_b = moving_[size_t(blocks_[k].b)].inverse_mass;
       double least = min(of_a, of_b), most = max(of_a, of_b);
       is_uneven = is_uneven || (least > 0.0 && most >= uneven_masses * least);
-      push = std::max(push, std::max(patch.lasting, above) * (of_a + of_b));
+      double pushed = std::max(patch.lasting, above) * (of_a + of_b);
+      push = std::max(push, pushed);
+      push_by_depth = std::max(push_by_depth, pushed / patch.most_depth);
     }
-    double ratio = steps.window * std::sqrt(push / (aimed_depth * most_depth_)) / soft_frequency;
+    double ratio = finer(push / most_depth_), thin = finer(push_by_depth);
     double beyond = push / least_push;
-    return is_uneven && beyond > 1.0 ? std::ceil(ratio) : std::min(ratio, beyond);
+    return std::max(thin, is_uneven && beyond > 1.0 ? std::ceil(ratio) : std::min(ratio, beyond));
   }
 
   // Weights from the top: each body hands what it bears to its patches below, in equal parts.

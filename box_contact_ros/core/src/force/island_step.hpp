@@ -231,7 +231,8 @@ class IslandStep {
     loads_[size_t(block.patch)] = {patch.box_a,      patch.box_b,
                                    block.normal_sum, block.friction_sum,
                                    block.normal,     a.placed.position + block.arm_a,
-                                   block.shape,      block.depth > options_.most_depth,
+                                   block.shape,
+                                   block.depth > std::min(options_.most_depth, patch.most_depth),
                                    step_.steps.dt};
   }
   const Options& options_;

@@ -21,6 +21,14 @@ namespace box_contact::BOX_CONTACT_SET::force {
 
 using namespace faces;
 
+// How long a box is along a direction [m].
+inline double extent_along(const Placed& box, const bc_size& size, const Vec<double>& direction) {
+  double sum = 0.0;
+  for (int k = 0; k < 3; ++k)
+    sum += size.extent[k] * std::fabs(dot(column(box.axes, k), direction));
+  return sum;
+}
+
 inline Span span_along(const Face& face, const Vec<double>& axis) {
   double middle = dot(face.centre, axis);
   double half = std::fabs(dot(face.half_1, axis)) + std::fabs(dot(face.half_2, axis));
@@ -51,6 +59,8 @@ struct Kept {
   T normal_impulse, torsion_impulse;         // N [N s], m [N m s]
   Vec<T> friction_impulse, rocking_impulse;  // f [N s], τ [N m s]
   Vec<T> impulse_arm;                        // from A's centre of mass to where they acted [m]
+  T pressure;                                // what pressed lately [N s]
+  Vec<T> pressure_arm;                       // from A's centre of mass to its centre [m]
 };
 
 // The patch of a pair, where it was asked for, and what it gave.
@@ -61,6 +71,7 @@ struct Patch {
   Vec<double> normal, point;
   Rectangle shape;
   FacePair faces;       // without sizes: none
+  double most_depth;    // by the thinner box; without sizes: any [m]
   double depth;         // the lesser of volume / area and −separation; below 0: apart [m]
   double friction;      // μ [1]
   double stiffness;     // [N/m], up to what step and answers bear; 0: that
@@ -97,6 +108,7 @@ struct Patch {
     normal = from_a;
     point = vector_at(at);
     shape = rectangle_of(normal, covariance, box_axes);
+    most_depth = place_max;
     // Of the mere touch on a large floor, whose volume is that of a box pressed in to 1e-9 of the size.
     depth = std::min(volume / (4.0 * shape.half_1 * shape.half_2), -separation);
   }
@@ -105,6 +117,8 @@ struct Patch {
   // tip late, and one whose middle is beyond an edge would stay.
   void end_at_rim(const Placed& box_at_a, const bc_size& size_a, const Placed& box_at_b,
                   const bc_size& size_b) {
+    most_depth = deepest_part * std::min(extent_along(box_at_a, size_a, normal),
+                                         extent_along(box_at_b, size_b, normal));
     Face a = face_along(box_at_a, size_a, point, normal),
          b = face_along(box_at_b, size_b, point, -normal);
     faces = {span_along(a, shape.axis_1).within(span_along(b, shape.axis_1)),

@@ -157,6 +157,20 @@ class PatchForces {
     if (own_.count() == 0) drop([](const Patch&) { return true; });
     return HoldResult::all;
   }
+  // Write the poses at which the next step's forces that depend on poses are to be taken: see SubSteps::ahead.
+  void write_ahead(double dt, const bc_pose* poses, const bc_velocity* velocities,
+                   bc_pose* ahead) const {
+    const SubSteps steps = Clock(state_.clock).begin(dt, options_.substeps);
+    auto write = [&](size_t k, double time) {
+      ahead[k] = pose_after(time, bodies_[k], poses[k], velocities[k]);
+    };
+    for (size_t k = 0; k < bodies_.size(); ++k) write(k, steps.ahead());
+    if (own_.count() == 0) return;
+    for (const Patch& patch : state_.patches)
+      for (auto k : {size_t(patch.a), size_t(patch.b)})
+        if (double factor = ended_[k].fineness.factor; factor > 1.0)
+          write(k, steps.finer(factor).ahead());
+  }
   // Begin an advance, which `advance` ends or `cancel`. What sleeps and is not given as it was wakes. An advance
   // that gives the wrenches alone moves all bodies.
   void begin(const Given& given, const Changed& changed, const bc_motion& motion) {

@@ -114,14 +114,27 @@ BC_INLINE void weigh(const Body& a, const Body& b, const Rows<T>& block, Masses<
   const RectangleOf<T>& shape = block.shape;
   const Vec<T>&arm_a = block.arm_a, &arm_b = block.arm_b, &normal = block.normal;
   Vec<T> about = shape.radius * normal;
+  Vec<T> lever = block.lever_1 * shape.axis_1 + block.lever_2 * shape.axis_2;
+  Vec<T> rubbed_a = arm_a + lever, rubbed_b = arm_b + lever;
   Mat<T> along =
-      compliance<2, T>(a, b, {cross(arm_a, shape.axis_1), cross(arm_a, shape.axis_2), about},
-                       {cross(arm_b, shape.axis_1), cross(arm_b, shape.axis_2), about},
+      compliance<2, T>(a, b, {cross(rubbed_a, shape.axis_1), cross(rubbed_a, shape.axis_2), about},
+                       {cross(rubbed_b, shape.axis_1), cross(rubbed_b, shape.axis_2), about},
                        {shape.axis_1, shape.axis_2});
   masses.across = compliance<1, T>(a, b, {cross(arm_a, normal), shape.axis_1, shape.axis_2},
                                    {cross(arm_b, normal), shape.axis_1, shape.axis_2}, {normal});
   masses.friction_mass = inverse(along);
   masses.least_friction_mass = 1.0 / max(along[2][2], max(along[1][1], along[0][0]));
+}
+
+// Put friction where the patch pressed lately: see store.
+template <class T>
+BC_INLINE void centre_friction(Rows<T>& block) {
+  Vec<T> arm = block.pressure_arm - block.arm_a;
+  auto within = [&](const Vec<T>& axis, const SpanOf<T>& span) __attribute__((always_inline)) {
+    return select<T>(block.pressure > 0.0, max<T>(min<T>(dot(arm, axis), span.high), span.low), T{});
+  };
+  block.lever_1 = within(block.shape.axis_1, block.shape.span_1);
+  block.lever_2 = within(block.shape.axis_2, block.shape.span_2);
 }
 
 // Make the rows of a patch, where its bodies are now.
@@ -132,6 +145,7 @@ BC_INLINE void prepare(const SubSteps& step, const Body& a, const Body& b, const
   auto [arms, depth] = place(a, b, at_a, at_b, step.length, block);
   static_cast<Arms<T>&>(block) = arms;
   block.depth = depth;
+  centre_friction(block);
   weigh<T>(a, b, block, block);
   soften(step, rotated, block);
 }

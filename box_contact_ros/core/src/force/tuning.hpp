@@ -52,6 +52,9 @@ constexpr double most_over_relaxation = 1.3;
 // But not where no rim is faster than this [m/s]: what rests stays solved.
 constexpr double least_over_relaxed = 1e-6;
 
+// Friction acts at the centre of what pressed in this time [s], which of piles shakes from step to step.
+constexpr double pressure_time = 0.05;
+
 // --- impacts ---
 // An impact goes on while an iteration changes a closing speed by more than this [m/s], and at most so often.
 constexpr double impact_change = 0.01;
@@ -77,6 +80,8 @@ constexpr double least_push = 600.0;
 constexpr double uneven_masses = 10.0;
 // The part of the depth that is wanted which is aimed at [1]: depths of a stack add up.
 constexpr double aimed_depth = 0.36;
+// The part of the thinner box, along the normal, that a patch may be deep [1].
+constexpr double deepest_part = 0.1;
 // A factor grows where this share more is needed [1], as each change moves what rests, and by as much more.
 constexpr double growth = 1.25;
 // Sub-steps are shorter by this factor at most.

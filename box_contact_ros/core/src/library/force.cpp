@@ -190,6 +190,23 @@ bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches* answer
   });
 }
 
+bc_status bc_patch_forces_ahead(const bc_patch_forces* forces, double dt, const bc_pose* poses,
+                                const bc_velocity* velocities, bc_pose* ahead) {
+  return guarded([&] {
+    if (!forces) return refuse_null("forces");
+    const PatchForces& self = forces_of(forces);
+    size_t count = self.bodies().size();
+    if (count > 0 && !(poses && velocities && ahead))
+      return refuse_null(!poses ? "poses" : !velocities ? "velocities" : "ahead");
+    if (bc_status status = check_step(dt)) return status;
+    if (bc_status status = check_poses(count, poses)) return status;
+    for (size_t k = 0; k < count; ++k)
+      if (bc_status status = check_velocity(k, velocities[k])) return status;
+    self.write_ahead(dt, poses, velocities, ahead);
+    return BC_OK;
+  });
+}
+
 bc_status bc_patch_forces_advance(bc_patch_forces* forces, double dt, const bc_pose* poses,
                                   const bc_velocity* velocities, const bc_wrench* outside,
                                   const bc_motion* motion) {

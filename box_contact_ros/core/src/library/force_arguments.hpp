@@ -196,14 +196,16 @@ inline bc_status check_changed(const Changed& changed, size_t bodies) {
                   (long long)changed.bodies[k]);
   return BC_OK;
 }
+inline bc_status check_velocity(size_t k, const bc_velocity& velocity) {
+  return check_within("velocities", k, reinterpret_cast<const double*>(&velocity), 6, speed_max);
+}
 // What is given as it was when a body was laid down was checked then.
 inline bc_status check_given(const PatchForces& self, const Given& given) {
-  auto* speeds = reinterpret_cast<const double*>(given.velocities);
   auto* loads = reinterpret_cast<const double*>(given.outside);
   bc_status status = BC_OK;
   self.each_read([&](size_t k) {
     if (!status) status = check_pose(k, given.poses[k]);
-    if (!status) status = check_within("velocities", k, speeds + 6 * k, 6, speed_max);
+    if (!status) status = check_velocity(k, given.velocities[k]);
     if (!status && loads)
       status = check_within("wrenches", k, loads + 6 * k, 6, wrench_max);
   });
