@@ -9,7 +9,7 @@ evaluation it publishes contacts (box_contact_msgs/Contacts), and once a second 
 
 With a scene file: <name>/pose of every box and body that moves, and of every pair
 <pair>/contact/point, <pair>/contact/normal.
-The service ~/check (box_contact_msgs/Check) answers about the boxes of a request, without stamps.
+The services ~/check and ~/check_path answer about the boxes of a request, without stamps.
 ~/set_boxes changes boxes of the scene, ~/get_boxes tells them, and the topic ~/boxes each change.
 The service ~/reset (std_srvs/Trigger) forgets all poses and stamps.
 It is a lifecycle node that configures and activates itself, unless autostart is false. Its
@@ -32,19 +32,20 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
-from box_contact_msgs.srv import Check, GetBoxes, SetBoxes
+from box_contact_msgs.srv import Check, CheckPath, GetBoxes, SetBoxes
 
 from ..arguments import parse_command_line, program_main
 from ..core import LENGTH_MAX
 from ..models.make_model import MODELS, check_model, make_model, most_near
 from ..scene.scene import CONTAINER, Scene, two_boxes
+from ..scene.scene_check import SceneCheck
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import short_repr
 from ..solver.model import NATIVE
 from ..stream.pairing import PAIRINGS, RESETS
 from ..stream.streams import watched_of
-from . import check, get_boxes, set_boxes
+from . import check, check_path, get_boxes, set_boxes
 from .check import CheckAnswerer
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
 from .paced_service import PacedService
@@ -159,9 +160,12 @@ class ContactNode(GuardedNode, LifecycleNode):
         self._topics: SceneTopics | None = None  # from configure to cleanup
         self._answerer: TickAnswerer | None = None  # likewise
         self._check_answerer: CheckAnswerer | None = None  # of the solver's scene and model
+        self._path_check: SceneCheck | None = None  # its own: checks come between its steps
         self.add_on_set_parameters_callback(self._set_live)
         self._checks = PacedService(self, self.counts, 'checks', (Check, '~/check'), self._check,
                                     check.kind_and_size, is_timed=True)
+        PacedService(self, self.counts, 'paths', (CheckPath, '~/check_path'), self._check_path,
+                     check_path.kind_and_size)
         self._taken: SetBoxes.Request | None = None  # the last request of ~/set_boxes
         PacedService(self, self.counts, 'changes', (SetBoxes, '~/set_boxes'), self._set_boxes,
                      set_boxes.kind_and_size, in_turn=True)
@@ -303,6 +307,18 @@ class ContactNode(GuardedNode, LifecycleNode):
                 self._answerer.solver, self.model_of(self._values), self._answerer.epoch)
             yield
         checker.answer(request, response)
+
+    def _check_path(self, request: CheckPath.Request, response: CheckPath.Response,
+                    ) -> Iterator[None]:
+        """Answer on the node's scene; ticks know nothing of it."""
+        if self._answerer is None:
+            response.message = NOT_CONFIGURED
+            return
+        checker, epoch = self._path_check, self._answerer.epoch
+        if checker is None or checker.solver is not self._answerer.solver:
+            checker = self._path_check = SceneCheck(self._answerer.solver, most_near=0)
+            yield
+        yield from check_path.answer(checker, epoch, request, response)
 
     def _get_boxes(self, request: GetBoxes.Request, response: GetBoxes.Response) -> Iterable[None]:
         """Tell some boxes of the scene."""

@@ -9,6 +9,7 @@ that matter, as rides.py has them; `time_of_impact` and `least_distance` answer 
 from __future__ import annotations
 
 import math
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -30,6 +31,8 @@ PARTING_ANGLE = 0.02
 """Turn [rad] after which boxes that begin within the clearance are looked at once more."""
 MOST_RIDES = 1000
 """That a search for the least distance takes at first."""
+SOLVED = 2048
+"""Rides that one step solves: in some milliseconds."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,6 +53,12 @@ class PathCheck:
     scene: Scene
     revision: int = 0  # of the scene, as of `SceneSolver.set_boxes`
 
+    @classmethod
+    def of(cls, found: Found, scene: Scene, revision: int) -> PathCheck:
+        """Return what was found in a scene."""
+        pair, least = (found.least_pair[0], found.least[0]) if len(found.least) else (None, None)
+        return cls(*found[:3], pair, least, scene, revision)
+
     @property
     def is_free(self) -> bool:
         """Return whether nothing comes within the clearance, but what was so at the start."""
@@ -67,28 +76,30 @@ class Found(NamedTuple):
     pairs: np.ndarray
     impacts: Approaches
     at_start: np.ndarray
-    least_pair: np.ndarray | None
-    least: Approach | None
+    least_pair: np.ndarray  # (1, 2), or (0, 2)
+    least: Approaches  # likewise
 
 
-def as_path(value: Any, names: tuple[str, ...]) -> np.ndarray:
-    """Return poses (m, n, 7) of what moves; ValueError for what is not a path."""
-    path = as_floats(value, 'poses', f'poses (m, {len(names)}, 7): at each of m times, those of '
-                     f'what moves, {", ".join(names) or "which is nothing"}',
-                     (None, len(names), 7))
+def as_path(value: Any, names: Sequence[str], what: str = 'poses') -> np.ndarray:
+    """Return poses (m, n, 7) of what moves; ValueError for what is not a path.
+
+    names: of what moves. what: what a refusal calls the path.
+    """
+    path = as_floats(value, what, f'poses (m, {len(names)}, 7): at each of m times, those of what '
+                     f'moves, {", ".join(names) or "which is nothing"}', (None, len(names), 7))
     if len(path) < 2:
-        raise ValueError(f'poses must be those of 2 times or more, not {len(path)}')
+        raise ValueError(f'{what} must be those of 2 times or more, not {len(path)}')
     absent = absent_poses(path.reshape(-1, 7)).reshape(path.shape[:2])
     for k, row in np.argwhere(absent != absent[0])[:1]:
-        raise ValueError(f'poses[{k}] of {names[row]}: it is there at some times alone; seven NaN '
+        raise ValueError(f'{what}[{k}] of {names[row]}: it is there at some times alone; seven NaN '
                          'at all of them leave it out')
     bad = native.pose_faults(np.ascontiguousarray(path.reshape(-1, 7))) != 0
     for k, row in np.argwhere(bad.reshape(absent.shape) & ~absent)[:1]:
-        raise ValueError(f'poses[{k}] of {names[row]}: {pose_fault(path[k, row])}')
+        raise ValueError(f'{what}[{k}] of {names[row]}: {pose_fault(path[k, row])}')
     half_turns = turns_between(path)[1] > math.pi - 2.0 * LEAST_COSINE
     for k, row in np.argwhere(half_turns)[:1]:
-        raise ValueError(f'poses[{k}] to poses[{k + 1}] of {names[row]}: a turn by 180 degrees has '
-                         'two ways: give a pose between')
+        raise ValueError(f'{what}[{k}] to {what}[{k + 1}] of {names[row]}: a turn by 180 degrees '
+                         'has two ways: give a pose between')
     return path
 
 
@@ -102,52 +113,75 @@ def course_of(scene: Scene, standing: np.ndarray, path: np.ndarray, around: Surr
     """
     is_here = ~absent_poses(path[0])
     rows = np.array([scene.row_of[name] for name in scene.moving], np.int64)[is_here]
-    path = path[:, is_here]
+    group, allowed = scene.groups
+    return Course(scene.sizes, np.where(scene.is_fixed[:, None], standing, np.nan),
+                  *moved_boxes(scene, rows, path[:, is_here]), scene.rigid, scene.rows, group,
+                  allowed, around, np.flatnonzero(scene.is_fixed))
+
+
+def moved_boxes(scene: Scene, rows: np.ndarray, path: np.ndarray,
+                ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the boxes (l,) that move, their poses (m, l, 7) and centres of turning (l, 3).
+
+    rows: (k,) of boxes and bodies, by `scene.row_of`. path: their poses (m, k, 7).
+    """
     count = len(scene.boxes)
     column = np.full(count + len(scene.bodies), -1)
     column[rows] = np.arange(len(rows))
     of_box = np.where(scene.body_of < 0, np.arange(count), count + scene.body_of)
-    movers = np.flatnonzero(column[of_box] >= 0)
+    boxes = np.flatnonzero(column[of_box] >= 0)
     body_rows, local = scene.placement
-    of_body = body_rows[movers] >= 0
-    local, base = local[movers], path[:, column[of_box[movers]]]
-    poses, centres = base.copy(), np.zeros((len(movers), 3))
+    of_body = body_rows[boxes] >= 0
+    poses, centres = path[:, column[of_box[boxes]]], np.zeros((len(boxes), 3))
     if of_body.any():
         # Boxes of all times behind one another, and then their bodies.
-        parts, bases = local[of_body], base[:, of_body].reshape(-1, 7)
+        parts, bases = local[boxes[of_body]], poses[:, of_body].reshape(-1, 7)
         places = np.concatenate((np.empty_like(bases), bases))
-        native.place_boxes(places, len(bases) + np.arange(len(bases)),
+        native.place_boxes(places, np.arange(len(bases), 2 * len(bases)),
                            np.tile(parts, (len(path), 1)))
         poses[:, of_body] = places[:len(bases)].reshape(len(path), -1, 7)
         centres[of_body] = -np.einsum('nji,nj->ni', rotation_matrix(parts[:, 3:]), parts[:, :3])
-    fixed = np.where(scene.is_fixed[:, None], standing, np.nan)
-    group, allowed = scene.groups
-    return Course(scene.sizes, fixed, movers, poses, centres, scene.rigid, scene.rows, group,
-                  allowed, around, np.flatnonzero(scene.is_fixed))
+    return boxes, poses, centres
 
 
-def check_course(course: Course, clearance: float) -> Found:
-    """Return what comes within a clearance [m], and how near all else comes."""
+def check_course(course: Course, clearance: float) -> Generator[None, None, Found]:
+    """Return what comes within a clearance [m], and how near all else comes.
+
+    A generator, so that a node can answer ticks between its steps.
+    """
     rides = Rides(course)
     radius = as_margin(clearance, 'clearance') + TOLERANCE
-    near, _ = rides.within(radius)
+    near, _ = yield from rides.within(radius)
     pairs = near[near[:, 0] == 0, 1:]
     held = pairs[rides.at_first(pairs).distance <= radius]
     near = near[~rides.are_of(near, held)]
     rides.leave_out(held)
-    impacts = rides.solve(near, clearance)
+    impacts = yield from _solved(rides, near, clearance)
+    touches = impacts
     if clearance and len(near):
-        touches = rides.solve(near, 0.0)
+        touches = yield from _solved(rides, near, 0.0)
+    if (rows := _first_rows(near, touches)[:1]).size:
+        least_pair, least = near[rows, 1:], touches[rows]
     else:
-        touches = impacts
-    rows = _first_rows(near, touches)
-    least_pair, least = ((near[rows[0], 1:], touches[int(rows[0])]) if rows.size else
-                         _least(rides, near, radius))
-    parts = [(near, impacts), *(_after_parting(rides, pair, clearance) for pair in held)]
+        least_pair, least = yield from _least(rides, near, radius)
+    parts = [(near, impacts)]
+    for pair in held:
+        parts.append(_after_parting(rides, pair, clearance))
+        yield
     near = np.concatenate([part for part, _ in parts])
     impacts = _joined([found for _, found in parts])
     rows = _first_rows(near, impacts)
     return Found(near[rows, 1:], impacts[rows], held, least_pair, least)
+
+
+def _solved(rides: Rides, near: np.ndarray, clearance: float,
+            ) -> Generator[None, None, Approaches]:
+    """Return the first times of rides within a clearance [m], in steps."""
+    parts = []
+    for first in range(0, max(1, len(near)), SOLVED):
+        parts.append(rides.solve(near[first:first + SOLVED], clearance))
+        yield
+    return _joined(parts)
 
 
 def _first_rows(rides: np.ndarray, found: Approaches) -> np.ndarray:
@@ -171,7 +205,7 @@ def _joined(parts: list[Approaches]) -> Approaches:
 
 def _after_parting(rides: Rides, pair: np.ndarray, clearance: float,
                    ) -> tuple[np.ndarray, Approaches]:
-    """Return the rides of a pair from where it is first apart, and their first times.
+    """Return the ride on which a pair first meets, from where it is first apart, and when.
 
     Apart is farther than the clearance and two tolerances: what is as near as that may be answered.
     """
@@ -187,17 +221,19 @@ def _after_parting(rides: Rides, pair: np.ndarray, clearance: float,
     share = float(shares[begin - 1]) % 1.0 if apart.size else 0.0  # 1: the next segment begins
     later = np.arange(segments[begin - 1] + (share == 0.0), rides.segments)[:, None]
     near = np.hstack((later, np.broadcast_to(pair, (len(later), 2))))
-    return near, rides.solve(near, clearance, first_from=share)
+    found = rides.solve(near, clearance, first_from=share)
+    rows = _first_rows(near, found)
+    return near[rows], found[rows]
 
 
 def _least(rides: Rides, near: np.ndarray, radius: float,
-           ) -> tuple[np.ndarray | None, Approach | None]:
-    """Return the pair that comes nearest, and how near, of boxes that do not touch.
+           ) -> Generator[None, None, tuple[np.ndarray, Approaches]]:
+    """Return the pair (1, 2) that comes nearest, and how near, of boxes that do not touch.
 
     near: the rides whose bounding boxes are within a radius [m]. The radius grows
     until a ride is found, and then to its distance: nothing beyond it is nearer.
     """
-    best: tuple[np.ndarray | None, Approach | None] = None, None
+    best = near[:0, 1:], rides.solve(near[:0], None)
     bound, most, is_all = np.inf, MOST_RIDES, True
     while True:
         gaps = rides.gaps(near)
@@ -212,10 +248,12 @@ def _least(rides: Rides, near: np.ndarray, radius: float,
                 found = rides.solve(asked, None)
                 row = int(np.argmin(found.nearest.distance))
                 if found.nearest.distance[row] < bound:
-                    bound, best = found.nearest.distance[row], (asked[row, 1:], found[row])
-            first, size = first + size, 4 * size
+                    bound, best = found.nearest.distance[row], (
+                        asked[row:row + 1, 1:], found[row:row + 1])
+            first, size = first + size, min(4 * size, SOLVED)
+            yield
         if is_all and (bound - TOLERANCE <= radius or radius > rides.farthest):
             return best
         most *= 1 if is_all else 4
         radius = min(bound - TOLERANCE, max(4.0 * radius, rides.step))
-        near, is_all = rides.within(radius, most)
+        near, is_all = yield from rides.within(radius, most)

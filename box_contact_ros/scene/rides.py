@@ -8,6 +8,7 @@ Segment k goes from pose k to pose k + 1. A ride is a row (k, a, b) of an array:
 from __future__ import annotations
 
 import sys
+from collections.abc import Generator
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -180,10 +181,11 @@ class Rides:
         apart = np.abs(self._middles[a] - self._middles[b]) - (self._halves[a] + self._halves[b])
         return np.linalg.norm(np.maximum(apart, 0.0), axis=1)
 
-    def within(self, radius: float, most: int = sys.maxsize) -> tuple[np.ndarray, bool]:
+    def within(self, radius: float, most: int = sys.maxsize,
+               ) -> Generator[None, None, tuple[np.ndarray, bool]]:
         """Return the rides whose bounding boxes are within a radius [m], and whether these are all.
 
-        Of more than about `most`, some are left out.
+        Of more than about `most`, some are left out. A generator, with a step for each of many.
         """
         found, is_all = self._near_standing(radius, most)
         parts = [found]
@@ -193,6 +195,7 @@ class Rides:
             rides = np.column_stack((np.repeat(segments, len(self._dense)),
                                      np.tile(self._dense, (len(segments), 1))))
             parts.append(rides[self.gaps(rides) <= radius])
+            yield
         return np.concatenate(parts), is_all
 
     def _near_standing(self, radius: float, most: int) -> tuple[np.ndarray, bool]:

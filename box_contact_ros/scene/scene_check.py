@@ -9,8 +9,8 @@ absent.
 """
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import lru_cache
+from collections.abc import Generator, Sequence
+from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
@@ -26,6 +26,9 @@ from ..solver.checks import (
 )
 from ..solver.contact_solver import ContactSolver
 from ..solver.contacts_of import Found, touching_and_near
+from .path import Found as PathFound
+from .path import as_path, check_course, moved_boxes
+from .rides import Course
 from .scene_solver import SceneSolver
 
 MOST_BOXES = 256
@@ -67,17 +70,21 @@ class SceneCheck:
             return self._by_margin[margin]
         if len(self._by_margin) == KEPT_MARGINS:
             self._by_margin.pop(next(iter(self._by_margin)))
+        made = self._by_margin[margin] = (
+            native.BroadPhase(self._sizes, self._is_fixed, margin, self._scene.rows + MOST_BOXES,
+                              *self._groups, self._body_of),
+            ContactSolver(model=self.solver.model, margin=margin))
+        return made
+
+    @cached_property
+    def _groups(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the group of each row, and which groups meet, as `Scene.groups`."""
         group, allowed = self._scene.groups
         count = max(1, len(allowed))
         meets = np.zeros((count + 1, count + 1), np.uint8)
         meets[0] = 1  # guests come first, and meet everything
         meets[1:1 + len(allowed), 1:1 + len(allowed)] = allowed
-        groups = np.concatenate((np.zeros(MOST_BOXES), group + 1)).astype(np.int32)
-        made = self._by_margin[margin] = (
-            native.BroadPhase(self._sizes, self._is_fixed, margin, self._scene.rows + MOST_BOXES,
-                              groups, meets, self._body_of),
-            ContactSolver(model=self.solver.model, margin=margin))
-        return made
+        return np.concatenate((np.zeros(MOST_BOXES), group + 1)).astype(np.int32), meets
 
     def __call__(self, names: Sequence[str], poses: Sequence[Row], sizes: Sequence[Row],
                  pairs: Sequence[tuple[str, str]] = (), margin: float = 0.0,
@@ -112,6 +119,39 @@ class SceneCheck:
             native.write_poses(self._rows, moving, [None] * len(moving))
             self._place_bodies()
         return found, areas
+
+    def path(self, names: Sequence[str], path: np.ndarray, sizes: Sequence[Row],
+             pairs: Sequence[tuple[str, str]] = (), clearance: float = 0.0,
+             ) -> Generator[None, None, PathFound]:
+        """Return, in steps, what the boxes, bodies and guests of a question meet on a path.
+
+        No other question comes between. path: poses (m, n, 7) by names. sizes, pairs: as of a
+        question without a path. What is fixed cannot be named.
+        Raises ValueError, with field and value, for what is refused.
+        """
+        scene = self._scene
+        path = as_path(path, names, 'waypoints')
+        for number, name in enumerate(names):
+            if self._fixed_pose(name) is not None:
+                raise ValueError(f'boxes[{number}] {short_repr(name)} is fixed in the scene')
+        rows, moving = self._take(names, path[0].tolist(), sizes)
+        try:
+            listed = self._places(rows, pairs) if pairs else scene.rows + MOST_BOXES
+        finally:
+            native.write_poses(self._rows, moving, [None] * len(moving))
+        known = np.array([name in scene.row_of for name in names])
+        placed = np.array(list(rows.values()))
+        boxes, poses, centres = moved_boxes(scene, placed[known] - MOST_BOXES, path[:, known])
+        group, meets = self._groups
+        guests = placed[~known]
+        return (yield from check_course(Course(
+            self._sizes, np.where(self._is_fixed[:, None], self._poses, np.nan),
+            np.concatenate((guests, MOST_BOXES + boxes)),
+            np.concatenate((path[:, ~known], poses), axis=1),
+            np.concatenate((np.zeros((len(guests), 3)), centres)),
+            np.concatenate((-1 - np.arange(MOST_BOXES), scene.rigid)), listed, group,
+            meets[:0, :0] if pairs else meets, self.solver.around,
+            MOST_BOXES + np.flatnonzero(scene.is_fixed)), clearance))
 
     def names_of(self, a: int, b: int) -> tuple[str, str, str]:
         """Return the name of a pair of the last answer, and those of its boxes."""

@@ -229,7 +229,7 @@ class SceneSolver:
         """
         at = self._at
         course = course_of(at.scene, at.poses, as_path(poses, self.moving), self.around)
-        return PathCheck(*check_course(course, clearance), at.scene, at.number)
+        return PathCheck.of(finished(check_course(course, clearance)), at.scene, at.number)
 
     @property
     def around(self) -> Surroundings:

@@ -14,7 +14,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from box_contact_ros import ContactSolver, inspect_plan, read_plan
+from box_contact_ros import (
+    ContactSolver,
+    SceneSolver,
+    inspect_plan,
+    read_plan,
+    read_scene,
+)
 from box_contact_ros.extras import expect_extras
 from box_contact_ros.solver.pose import rotation_matrix
 
@@ -141,13 +147,33 @@ def first_contact(folder: Path) -> None:
         example['main']()
 
 
-def plan_descent(folder: Path) -> None:
-    """Draw plan_descent.png by the example."""
-    example = runpy.run_path(str(Path(__file__).parents[1] / 'examples' / 'plan_descent.py'))
-    beside = example['stacks']()
-    ways = {'straight down': example['descend'](beside, 0.0),
-            'pushed off': example['descend'](beside, example['CLEARANCE'])}
-    example['draw'](ways, beside, str(folder / 'plan_descent.png'))
+def lift(folder: Path) -> None:
+    """Draw lift.png: the distance of a load on two paths over a bay, and the first touch."""
+    scene = read_scene(Path(__file__).parents[2] / 'config' / 'scenes' / 'yard_bay.yaml')
+    solver, by_tick = SceneSolver(scene), SceneSolver(scene, margin=30.0)
+    figure, axes = plt.subplots(figsize=(6.4, 2.8), dpi=110, layout='constrained')
+    for top, colour in ((14.0, CORNER), (15.0, LOAD)):
+        way = np.array([(8.514, 9.0685), (8.514, top), (19.866, top), (19.866, 9.3)])
+        pose = np.zeros((len(way), 1, 7))
+        pose[:, 0, 1:3], pose[:, 0, 6] = way, 1.0
+        answer = solver.check_path(pose)
+        below = answer.at_start[0, 1]
+        times = np.linspace(0.0, 3.0, 601)
+        distances = []
+        for y, z in zip(*(np.interp(times, range(4), column) for column in way.T)):
+            tick = by_tick([(0, y, z, 0, 0, 0, 1)])
+            near = tick.near.distance[tick.near_pairs[:, 1] != below]
+            touches = tick.pairs[tick.pairs[:, 1] != below].size
+            distances.append(0.0 if touches else near.min())
+        axes.plot(times, distances, color=colour, label=f'path up to {top:g} m')
+        axes.plot(answer.least.time, answer.least.nearest.distance, 'o', color=colour)
+        for pair, impact in answer.named()[:1]:
+            axes.annotate(f'touches {pair.b}', (impact.time, 0.0), xytext=(12, 26),
+                          textcoords='offset points', arrowprops={'arrowstyle': '->'})
+    axes.set(xlabel='time of the path', ylabel='distance [m]', xlim=(0.0, 3.0),
+             ylim=(0.0, 2.6))
+    axes.legend(loc='upper center', ncols=2)
+    figure.savefig(folder / 'lift.png', metadata={'Software': None})
 
 
 def faces(axes: Axes3D, turn: np.ndarray, centre: np.ndarray, sign: float, colour: str) -> None:
@@ -231,7 +257,7 @@ def main() -> None:
     sketch(axes['other way'], math.radians(-7.0))
     slide(axes['graph'])
     first_contact(folder)
-    plan_descent(folder)
+    lift(folder)
     pallets(folder)
     trihedron(folder)
     # No version and no date in the file: the same figure is the same bytes.

@@ -27,7 +27,7 @@ from sensor_msgs.msg import MultiDOFJointState
 from typed_messages import a_box, a_pair, joint_state, make_contacts, pose_array
 
 from box_contact_msgs.msg import Body, Boxes
-from box_contact_msgs.srv import Check, GetBoxes, SetBoxes
+from box_contact_msgs.srv import Check, CheckPath, GetBoxes, SetBoxes
 from box_contact_ros.core import LENGTH_MAX, QUATERNION_MAX
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
@@ -42,11 +42,11 @@ DOCUMENT = yaml.safe_load((FOLDER / 'asyncapi.yaml').read_text(encoding='utf-8')
 SCHEMAS = {path.name: json.loads(path.read_text('utf-8')) for path in sorted(FOLDER.glob('*.json'))}
 REGISTRY = Registry().with_resources(
     (name, Resource.from_contents(schema)) for name, schema in SCHEMAS.items())
-SERVICES = ('answerCheck', 'answerSetBoxes', 'answerGetBoxes')
+SERVICES = ('answerCheck', 'answerCheckPath', 'answerSetBoxes', 'answerGetBoxes')
 OPERATIONS = {name: operation for name, operation in DOCUMENT['operations'].items()
               if name not in SERVICES}  # on topics
 ADDRESSES = {name: channel['address'] for name, channel in DOCUMENT['channels'].items()
-             if name not in ('check', 'reset', 'setBoxes', 'getBoxes')}
+             if name not in ('check', 'checkPath', 'reset', 'setBoxes', 'getBoxes')}
 ORIGIN = (0, 0, 0, 0, 0, 0, 1)
 TOUCHING = (0.5, 0.25, 1.875, 0.1, 0.2, 0, 1)
 CLOSE = (0.5, 0.25, 2.0625, 0, 0, 0, 1)
@@ -256,6 +256,30 @@ def test_requests_and_responses_validate(node, client, boxes, success):
     assert len(answer.contacts.contacts) == len(answer.contacts.near) == success
     answer.success = not success
     assert not response.is_valid(plain(answer))
+
+
+@pytest.mark.parametrize('names, end, success', [
+    (('box_a', 'p'), TOUCHING, True), (('box_a', 'p'), APART, True), (('p',), APART, True),
+    (('box_a', 'q'), APART, False)])
+def test_paths_validate(node, client, names, end, success):
+    """Those of ~/check_path: with an impact, without one, of a box alone, of an unknown one."""
+    channel = DOCUMENT['channels']['checkPath']
+    request, response = (validator_of(follow(message['$ref']))
+                         for message in channel['messages'].values())
+    sizes = {'p': (2, 2, 2)}
+    asked = CheckPath.Request(
+        boxes=[a_box(name, ORIGIN, sizes.get(name, (0, 0, 0))) for name in names],
+        waypoints=[joint_state(dict(zip(names, (ORIGIN, place)[-len(names):])), '', 0)
+                   for place in (APART, end)])
+    answer = client.call(CheckPath, channel['address'], asked)
+    assert answer.success == success and request.is_valid(plain(asked)), answer.message
+    assert not [error.message for error in response.iter_errors(plain(answer))]
+    assert [entry.near.pair for entry in answer.impacts] == ['p_box_a'] * (end == TOUCHING)
+    assert answer.least.near.box_a == ('p' if success and len(names) == 2 else '')
+    answer.success = not success
+    assert not response.is_valid(plain(answer))
+    assert int(client.diagnostic(f'paths {"answered" if success else "refused"}')) > 0
+    assert validator_at('diagnostics').is_valid(plain(client.diagnostics[-1]))
 
 
 @pytest.mark.parametrize('size, absent, success', [
