@@ -237,6 +237,18 @@ def test_a_late_answer_may_tell_of_boxes_that_were_joined_since() -> None:
         forces.hold(np.array([(1, 1), (0, 1)]), contacts, poses)
 
 
+def test_contacts_of_the_reversed_pair_are_refused() -> None:
+    """A cube lies on a plate; reversed, the plate would be pushed up into it, without a word."""
+    size = np.array([(1.0, 1, 1), (4, 4, 1)])
+    poses = np.array([[0, 0, 0.9999, 0, 0, 0, 1.0], [0, 0, 0, 0, 0, 0, 1]])
+    contacts = ContactSolver().batch(poses, sizes=size, pairs=[(0, 1)])
+    forces = PatchForces([Body.of_box(each, 5.0) for each in size])
+    forces.set_boxes(size)
+    with pytest.raises(ValueError, match=r'^pairs\[0\] is \(1, 0\), but normal\[0\] \(0, 0, -1\)'):
+        forces.hold([(1, 0)], contacts, poses)
+    forces.hold([(0, 1)], contacts, poses)
+
+
 def test_a_body_of_boxes_has_their_moments() -> None:
     """A container of eight octants, one turned by a right angle, is one box of the same density."""
     whole, size = Body.of_box(CONTAINER, 20_000.0), 0.5 * np.array(CONTAINER)

@@ -16,7 +16,9 @@
 namespace box_contact::detail {
 
 using force::Body;
+using BOX_CONTACT_SET::box_at;
 using force::Changed;
+using force::extent_along;
 using force::Given;
 using force::PatchForces;
 
@@ -100,7 +102,29 @@ inline bc_status check_patch(const bc_patches& answer, size_t k) {
   return BC_OK;
 }
 
-inline bc_status check_row(const bc_patches& answer, size_t k, const PatchForces& self) {
+// Refuse a normal from box b to box a: along it the boxes would lie in each other more than twice as deep as
+// against it.
+inline bc_status check_side(const bc_patches& answer, size_t k, const PatchForces& self,
+                            const bc_pose* poses) {
+  const int64_t* pair = answer.pairs + 2 * k;
+  const Vec<double> normal = vector_at(answer.normal + 3 * k);
+  double way = 0.0, both = 0.0;  // from a to b, and half of both boxes, along the normal [m]
+  for (int side = 0; side < 2; ++side) {
+    const bc_body_box& of = self.boxes()[size_t(pair[side])];
+    const auto box = box_at(force::in_common_frame(poses[of.body], of.box.pose));
+    way += (side == 0 ? -1.0 : 1.0) * dot(box.position, normal);
+    both += 0.5 * extent_along(box, of.box.size, normal);
+  }
+  if (both - way <= 2.0 * (both + way)) return BC_OK;
+  return fail(BC_BAD_ARGUMENT,
+              "pairs[%zu] is (%lld, %lld), but normal[%zu] (%g, %g, %g) leads from box %lld to box "
+              "%lld: the contact may be of the pair (%lld, %lld)",
+              k, (long long)pair[0], (long long)pair[1], k, normal[0], normal[1], normal[2],
+              (long long)pair[1], (long long)pair[0], (long long)pair[1], (long long)pair[0]);
+}
+
+inline bc_status check_row(const bc_patches& answer, size_t k, const PatchForces& self,
+                           const bc_pose* poses) {
   const int64_t* boxes = answer.pairs + 2 * k;
   for (int side = 0; side < 2; ++side)
     if (boxes[side] < 0 || boxes[side] >= self.box_count())
@@ -122,7 +146,9 @@ inline bc_status check_row(const bc_patches& answer, size_t k, const PatchForces
       return status;
   if (!answer.separation) return BC_OK;
   bool is_left_out = answer.separation[k] != answer.separation[k] || answer.volume[k] == 0.0;
-  return is_left_out ? BC_OK : check_patch(answer, k);
+  if (is_left_out) return BC_OK;
+  if (bc_status status = check_patch(answer, k)) return status;
+  return self.boxes().empty() ? BC_OK : check_side(answer, k, self, poses);
 }
 
 inline bc_status check_options(const bc_force_options& all) {
@@ -156,7 +182,7 @@ inline bc_status check_answer(const bc_patches& all, const PatchForces& self,
   if (all.separation)
     if (bc_status status = check_poses(self.bodies().size(), poses)) return status;
   for (size_t k = 0; k < size_t(all.count); ++k)
-    if (bc_status status = check_row(all, k, self)) return status;
+    if (bc_status status = check_row(all, k, self, poses)) return status;
   return BC_OK;
 }
 
