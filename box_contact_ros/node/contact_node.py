@@ -292,16 +292,17 @@ class ContactNode(GuardedNode, LifecycleNode):
             f'poses{frame} from {", ".join(topics[:NAMED_TOPICS])}'
             f'{f" and {more} more" if more > 0 else ""}')
 
-    def _check(self, request: Check.Request, response: Check.Response) -> Iterable[None]:
+    def _check(self, request: Check.Request, response: Check.Response) -> Iterator[None]:
         """Answer on the node's scene and model; ticks know nothing of it."""
         if self._answerer is None:
             response.message = NOT_CONFIGURED
-            return ()
-        if self._check_answerer is None or self._check_answerer.solver is not self._answerer.solver:
-            self._check_answerer = CheckAnswerer(
+            return
+        checker = self._check_answerer
+        if checker is None or checker.solver is not self._answerer.solver:
+            checker = self._check_answerer = CheckAnswerer(
                 self._answerer.solver, self.model_of(self._values), self._answerer.epoch)
-        self._check_answerer.answer(request, response)
-        return ()
+            yield
+        checker.answer(request, response)
 
     def _get_boxes(self, request: GetBoxes.Request, response: GetBoxes.Response) -> Iterable[None]:
         """Tell some boxes of the scene."""
