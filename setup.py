@@ -76,7 +76,9 @@ class BuildCore(build_ext):
         # A new folder for what CMake does not look at once it has configured one.
         compiler = subprocess.run([*COMPILER, '--version'], stdout=subprocess.PIPE).stdout
         settings = repr((sources, compiler, COMPILER, os.environ.get('CXXFLAGS')))
-        folder = Path(self.build_temp, hashlib.sha256(settings.encode()).hexdigest()[:8]).absolute()
+        # pip's own folder for builds is new each time; `-e` again, for an extra, has nothing to compile.
+        base = HERE / 'build' if self.editable_mode else Path(self.build_temp)
+        folder = (base / hashlib.sha256(settings.encode()).hexdigest()[:8]).absolute()
         includes = f'{sysconfig.get_path("include")};{numpy.get_include()}'
         prefix = folder / 'prefix'
         shutil.rmtree(prefix, ignore_errors=True)  # a header that was deleted since
