@@ -106,7 +106,9 @@ class Crane(Node):
                 pairs = [(boxes.index(a), boxes.index(b)) for _, a, b in answer.names]
                 self.forces.hold(np.reshape(pairs, (-1, 2)), answer.contacts, self.poses,
                                  period=STEPS * STEP)
-            way = np.array([0, self.trolley, TOP]) - self.poses[1, :3]
+            # A rope keeps its energy by the forces of the poses ahead.
+            ahead = self.forces.ahead(STEP, self.poses, self.velocities)
+            way = np.array([0, self.trolley, TOP]) - ahead[1, :3]
             length = np.linalg.norm(way)
             pull = STIFFNESS * (length - self.rope) - DAMPING * (
                 way @ self.velocities[1, :3] / length)
