@@ -91,7 +91,8 @@ static inline bc_query bc_default_query(void) {
 typedef struct bc_contact {
   double separation;       /* [m]; negative: depth along the normal; positive: largest SAT gap */
   double normal[3];        /* unit vector from A to B; NaN where separation exceeds the margin */
-  double point[3];         /* centroid of the overlap [m]; NaN without contact */
+  double point[3];         /* centroid of the overlap [m]; NaN without contact. At rest it may be metres from
+                              where a load presses: see bc_load.centre */
   double volume;           /* of the overlap [m³]; 0 without contact; NaN where not asked for */
   double covariance[3][3]; /* second central moments by the volume [m²]; NaN likewise, or apart */
   int32_t axis;            /* winning axis: 0–2 faces of A, 3–5 of B, 6 + 3 i + j for a_i × b_j */
