@@ -287,14 +287,16 @@ def quoted_messages() -> list[str]:
     found = [one or other for heading in re.findall(r'^[*]{2}(.+?)[*]{2}', troubles, re.M | re.S)
              for one, other in re.findall('`([^`]+)`|"([^"]+)"', heading)]
     lines = (ROOT / 'docs' / 'reference' / 'diagnostics.md').read_text('utf-8')
-    found += re.findall('^- `([^`]+)`', lines.partition('## What the log says')[2], re.M)
+    said, keys, _ = lines.partition('The status also has values, by key:')
+    assert keys
+    found += re.findall('^- `([^`]+)`', said, re.M)
     return sorted(set(found) - FOREIGN)
 
 
 @pytest.mark.parametrize('message', quoted_messages())
 def test_quoted_messages_exist(message):
     """Each part between its values is in the source, so no page explains what nobody can see."""
-    parts = re.split(r"…|\b[A-Z]+\b|\b(?:box_)?[ab]\b|'[\w/]+'|(?<= )/\w+|\b\d+ s\b", message)
+    parts = re.split(r"…|; |: |\b[A-Z]+\b|\b(?:box_)?[ab]\b|'[\w/]+'|(?<= )/\w+|\b\d+ s\b", message)
     parts = [part.strip() for part in parts if len(part.strip(' ,')) > 2]
     assert parts and all(part in sources() for part in parts), parts
 
