@@ -18,7 +18,7 @@ namespace {
 // The rows of what rests, and is not named, are neither read nor written. One that is named wakes.
 int count_faults_at_rest() {
   const Size size{1.0, 1.0, 1.0};
-  const Body bodies[] = {{1000.0, {170.0, 170.0, 170.0}}, {0.0, {0.0, 0.0, 0.0}}};
+  const Body bodies[] = {Body::of_box(size, 1000.0), Body::of_box(size, 0.0)};
   const BodyBox boxes[] = {{0, {{{0, 0, 0}, {0, 0, 0, 1}}, size}},
                            {1, {{{0, 0, 0}, {0, 0, 0, 1}}, size}}};
   const std::int64_t pair[] = {0, 1}, named[] = {0, 0}, unknown[] = {2};
@@ -99,6 +99,12 @@ int count_faults_of_waking() {
   return faults + (allocations != before || !awake[1] || !awake[2 * half]);
 }
 
+int count_faults_of_a_body() {
+  const Body body = Body::of_box({1.0, 2.0, 3.0}, 12.0);
+  return body.mass != 12.0 || body.inertia[0] != 13.0 || body.inertia[1] != 10.0 ||
+         body.inertia[2] != 5.0;
+}
+
 }  // namespace
 
 int main() {
@@ -112,7 +118,7 @@ int main() {
   Wrench outside[2] = {{{0.0, 0.0, -9.81 * 20000.0}, {}}, {}}, wrenches[2];
   Contact contact{};
   const std::int64_t pair[2] = {0, 1};
-  int failures = count_faults_at_rest() + count_faults_of_waking();
+  int failures = count_faults_of_a_body() + count_faults_at_rest() + count_faults_of_waking();
   for (int step = 0; step < 2000; ++step) {
     long before = allocations;
     if (step % 5 == 0) {

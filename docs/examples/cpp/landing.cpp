@@ -22,13 +22,9 @@ const double step = 0.001, gravity = 9.81, mass = 20000;  // [s], [m/s²], [kg]
 const Size container{12.192, 2.438, 2.591};                // [m]
 
 int main() {
-  const auto [x, y, z] = container.extent;
-  const Body load{
-      mass,
-      {mass * (y * y + z * z) / 12, mass * (z * z + x * x) / 12, mass * (x * x + y * y) / 12}};
-  const std::vector<Body> bodies{load, {0, {0, 0, 0}}};  // body 1, the stack, is fixed
+  const std::vector<Body> bodies{Body::of_box(container, mass), Body::of_box(container, 0)};
   const Pose here{{0, 0, 0}, {0, 0, 0, 1}};
-  std::vector<Pose> poses{{{0.5, 0.1, z + 0.15}, {0.005, 0.01, 0, 1}}, here};
+  std::vector<Pose> poses{{{0.5, 0.1, container.extent[2] + 0.15}, {0.005, 0.01, 0, 1}}, here};
   std::vector<Velocity> velocities(2);
   velocities[0].linear[2] = -0.3;
   std::vector<Wrench> weights(2);

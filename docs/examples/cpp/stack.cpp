@@ -19,12 +19,6 @@ const std::vector<double> masses{0, 9000, 4000, 1000};  // [kg]
 const Size ground_size{20, 20, 1};
 const Pose ground{{0, 0, -0.5}, {0, 0, 0, 1}};
 
-Body solid_box(double mass, const Size& size) {
-  const auto [x, y, z] = size.extent;
-  return {mass,
-          {mass * (y * y + z * z) / 12, mass * (z * z + x * x) / 12, mass * (x * x + y * y) / 12}};
-}
-
 int main() {
   // Body 0 is the ground, which no force moves.
   std::vector<Body> bodies{{0, {0, 0, 0}}};
@@ -34,7 +28,7 @@ int main() {
   const std::size_t count = poses.size();
   std::vector<Wrench> weights(count), wrenches(count);
   for (std::size_t i = 1; i < count; ++i) {
-    bodies.push_back(solid_box(masses[i], sizes[i]));
+    bodies.push_back(Body::of_box(sizes[i], masses[i]));
     weights[i].force[2] = -gravity * masses[i];
   }
   std::vector<Velocity> velocities(count);

@@ -53,6 +53,12 @@ struct Body {
   double mass;        // [kg]; 0: no force moves it
   double inertia[3];  // about the body's own axes, through the centre of mass [kg m²]
   double centre[3] = {0.0, 0.0, 0.0};  // of mass, in the body's own frame [m]
+
+  // The body of a box of one density; of mass 0, one that no force moves.
+  static Body of_box(const Size& size, double mass) {
+    double x = size.extent[0], y = size.extent[1], z = size.extent[2], share = mass / 12.0;
+    return {mass, {share * (y * y + z * z), share * (z * z + x * x), share * (x * x + y * y)}};
+  }
 };
 
 // The forces of patches on all bodies. A copy has the same patches and impulses.
