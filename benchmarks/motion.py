@@ -8,11 +8,13 @@ writes motion.md and motion.csv. The status is 1 if an answer is late, early, to
 """
 from __future__ import annotations
 
+import importlib.util
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,10 +23,11 @@ import numpy as np
 from box_contact_ros.extras import require
 
 from . import native_calls, output
-from .engines import add_leave_out, may_miss
+from .engines import DYNAMICS, add_leave_out, may_miss
 from .motions import EVERYDAY, KINDS, TOLERANCE, Motions, draw
 from .output import markdown_table, number
 from .pose_sets import quaternion_multiply
+from .rivals import MADE
 from .timing import pinned, usable_cores
 
 MOTIONS, TIMED, RIVALED = 52_632, 2_000, 400  # of a kind: a million in all
@@ -51,11 +54,16 @@ def compiled(folder: Path) -> Path:
     return folder / 'motion'
 
 
+def write_motions(file: Path, found: Motions) -> None:
+    """Write motions as motion_calls/rows.hpp has them."""
+    np.hstack([part.reshape(len(found.clearance), -1) for part in found]).tofile(file)
+
+
 def judged(program: Path, found: Motions, timed: int, sampled: int) -> Answers:
     """Return the answers to all motions, and what the judge says of them."""
     count = len(found.clearance)
     given, answers = program.with_name('motions'), program.with_name('answers')
-    np.hstack([part.reshape(count, -1) for part in found]).tofile(given)
+    write_motions(given, found)
     done = subprocess.run([program, given, repr(TOLERANCE), str(timed), str(sampled), answers],
                           capture_output=True, text=True)
     if done.returncode:
@@ -118,11 +126,42 @@ def costs_table(found: Mapping[str, Answers]) -> str:
     return markdown_table(head, [*rows, row('**all**', every, '', '')])
 
 
-Asker = Callable[[Motions, int], tuple[float, float]]
-"""One motion by an engine: its time, NaN for never, and the seconds of the call."""
+Times = tuple[np.ndarray, np.ndarray]
+"""Of motions: times (n,), NaN for never, and nanoseconds of a call (n,)."""
 
 
-def rapier_asker() -> Asker:
+class Rival(NamedTuple):
+    """Another engine: what answers, what it was made from, and which kinds it can answer."""
+
+    ask: Callable[[Motions], Times]
+    source: str
+    kinds: Sequence[str] = RIVALED_KINDS
+
+
+def program_rival(program: Path) -> Rival:
+    """Return an engine whose program is made of motion_calls/rival.hpp."""
+    def ask(found: Motions) -> Times:
+        with tempfile.TemporaryDirectory() as made:
+            given, answers = Path(made, 'motions'), Path(made, 'answers')
+            write_motions(given, found)
+            subprocess.run([program, given, answers], check=True)
+            times, nanoseconds = np.fromfile(answers).reshape(-1, 2).T
+        return times, nanoseconds
+
+    source = subprocess.run([program], capture_output=True, text=True, check=True).stdout
+    return Rival(ask, source.strip())
+
+
+def compiled_fcl(folder: Path) -> Path | None:
+    """Compile FCL's program into a folder; None where FCL is not installed with its headers."""
+    flags = native_calls.package_flags('fcl')
+    if flags is None:
+        return None
+    native_calls.run_compiler('-O2', CALLS_FOLDER / 'fcl.cpp', '-o', folder / 'fcl', *flags)
+    return folder / 'fcl'
+
+
+def rapier_rival() -> Rival:
     """Return Rapier's nonlinear shape cast, at a box that stands."""
     import rapier3d as rapier
 
@@ -130,7 +169,7 @@ def rapier_asker() -> Asker:
         return rapier.Isometry3(tuple(pose[:3]), rapier.Rotation3.from_scaled_axis(
             tuple(rotation_vectors(pose[None, 3:])[0])))
 
-    def ask(found: Motions, row: int) -> tuple[float, float]:
+    def ask_one(found: Motions, row: int) -> tuple[float, float]:
         stands, start, end = found.start_a[row], found.start_b[row], found.end_b[row]
         world = rapier.PhysicsWorld(gravity=(0.0, 0.0, 0.0))
         world.add_body(rapier.RigidBody.fixed().translation(tuple(stands[:3])).rotation(
@@ -147,9 +186,13 @@ def rapier_asker() -> Asker:
         hit = world.query_pipeline.cast_shape_nonlinear(motion, shape, options, start_time=0.0,
                                                         end_time=1.0)
         seconds = time.perf_counter() - begin
-        return (np.nan if hit is None else hit[1].time_of_impact), seconds
+        return (np.nan if hit is None else hit[1].time_of_impact), 1e9 * seconds
 
-    return ask
+    def ask(found: Motions) -> Times:
+        times, nanoseconds = np.array([ask_one(found, row) for row in range(len(found[0]))]).T
+        return times, nanoseconds
+
+    return Rival(ask, f'rapier3d {metadata.version("rapier3d")}', STANDING)
 
 
 def rotation_vectors(quaternions: np.ndarray) -> np.ndarray:
@@ -172,29 +215,40 @@ def compared(kind: str, name: str, times: np.ndarray, true: np.ndarray, microsec
             'us': microseconds}
 
 
-def engines(leave_out: Sequence[str]) -> tuple[dict[str, Asker], list[str]]:
-    """Return the engines that are installed, by name, and what is missing."""
-    try:
-        return ({} if 'rapier' in leave_out else {'Rapier': rapier_asker()}), []
-    except ImportError:
-        return {}, ['rapier']
+def engines(folder: Path) -> tuple[dict[str, Rival], list[str]]:
+    """Return the engines that are here, by name, and a line about each that is not.
+
+    folder: for programs that are compiled now.
+    """
+    found, missing = {}, []
+    if importlib.util.find_spec('rapier3d'):
+        found['Rapier'] = rapier_rival()
+    else:
+        missing.append(f'rapier is not installed ({DYNAMICS["rapier"]})')
+    box3d, fcl = MADE / 'box3d_motions', compiled_fcl(folder)
+    if box3d.exists():
+        found['Box3D'] = program_rival(box3d)
+    else:
+        missing.append(f'box3d is not here ({DYNAMICS["box3d"]})')
+    if fcl:
+        found['FCL'] = program_rival(fcl)
+    else:
+        missing.append(f'fcl is not installed with its headers ({native_calls.BRINGS["fcl"]})')
+    return found, missing
 
 
-def rivals(answers: Mapping[str, Answers], seed: int, count: int, asked: Mapping[str, Asker],
+def rivals(answers: Mapping[str, Answers], seed: int, count: int, asked: Mapping[str, Rival],
            ) -> Iterator[dict[str, object]]:
     """Yield a row per kind and engine."""
     for kind in RIVALED_KINDS:
         one = answers[kind]
-        drawn, true = draw(kind, seed, len(one['time'])), one['time'][:count]
-        for name, times, took in (
-                ('box_contact', true, one['time_ns'][:count]),
-                ('1 mm', one['sampled'][:count], one['sampled_ns'][:count])):
-            yield compared(kind, name, times, true, float(np.median(took)) / 1e3)
-        for name, ask in asked.items():
-            if kind not in STANDING:
-                continue
-            times, seconds = np.array([ask(drawn, row) for row in range(count)]).T
-            yield compared(kind, name, times, true, 1e6 * float(np.median(seconds)))
+        some = draw(kind, seed, len(one['time'])).rows(slice(count))
+        true = one['time'][:count]
+        found = {'box_contact': (true, one['time_ns'][:count]),
+                 '1 mm': (one['sampled'][:count], one['sampled_ns'][:count]),
+                 **{name: rival.ask(some) for name, rival in asked.items() if kind in rival.kinds}}
+        for name, (times, nanoseconds) in found.items():
+            yield compared(kind, name, times, true, float(np.median(nanoseconds)) / 1e3)
 
 
 def rivals_table(rows: Sequence[Mapping[str, object]]) -> str:
@@ -252,15 +306,15 @@ def main(args: Sequence[str] | None = None) -> int:
     require('report')
     count, timed, rivaled = ((QUICK_MOTIONS, QUICK_TIMED, QUICK_RIVALED) if options.quick
                              else (MOTIONS, TIMED, RIVALED))
-    asked, missing = engines(options.leave_out)
-    if missing and not (options.quick or may_miss('motion', missing, options.leave_out)):
-        return 2
     found: dict[str, Answers] = {}
     with tempfile.TemporaryDirectory() as made, pinned({usable_cores()[-1]}):
         try:
             program = compiled(Path(made))
+            asked, missing = engines(Path(made))
         except RuntimeError as error:
             print(f'motion: {error}', file=sys.stderr)
+            return 2
+        if not (options.quick or may_miss('motion', missing, options.leave_out)):
             return 2
         for kind in tqdm(KINDS, unit='kind'):
             found[kind] = judged(program, draw(kind, options.seed, count), timed,
@@ -271,7 +325,8 @@ def main(args: Sequence[str] | None = None) -> int:
     output.write_page(
         folder, 'motion', args, machine=output.machine(), count=count, kinds=len(KINDS),
         verdicts=verdicts, costs=costs_table(found), unit=float(np.median(every[every > 0.0])),
-        rivals=rivals_table(others))
+        sources=', '.join(rival.source for rival in asked.values()),
+        rivals=rivals_table(others), missing=''.join(f'\n\nLeft out: {line}.' for line in missing))
     output.write_csv(folder / 'motion.csv', csv_rows(found, others), about=output.machine())
     print(verdicts, costs_table(found), rivals_table(others), sep='\n\n')
     print(*missed_goals(found), sep='\n')

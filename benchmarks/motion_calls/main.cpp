@@ -4,25 +4,17 @@
 // Times of impact and least distances of libbox_contact: how many distances each takes, its time, and
 // what a judge says of it.
 //
-// motion MOTIONS TOLERANCE TIMED SAMPLED ANSWERS: MOTIONS has 41 numbers a row, as below. ANSWERS gets
+// motion MOTIONS TOLERANCE TIMED SAMPLED ANSWERS: MOTIONS has rows of `Row`. ANSWERS gets
 // `Answer`, a row each. The first TIMED motions are timed. The first SAMPLED are also checked each mm.
-#include <chrono>
-#include <cstdio>
-#include <cstdlib>
 #include <limits>
 
 #include "judge.hpp"
 #include "motion/least_distance.hpp"
+#include "rows.hpp"
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
 namespace motion = box_contact::BOX_CONTACT_SET::motion;
-
-struct Row {
-  double start_a[7], end_a[7], start_b[7], end_b[7], size_a[3], size_b[3], centre_a[3], centre_b[3];
-  double clearance;
-};
 
 struct Answer {
   double time, time_distances, late, early;  // late: 1 refuted, 0.5 in doubt
@@ -40,10 +32,6 @@ bc_sweep sweep(const double* start, const double* end, const double* size, const
   return found;
 }
 
-[[noreturn]] void fail(const char* why) {
-  std::fprintf(stderr, "motion: %s\n", why);
-  std::exit(1);
-}
 void check(bc_status status) {
   if (status != BC_OK) fail(bc_error_text());
 }
@@ -67,20 +55,6 @@ motion::Motion motion_of(const Row& row) {
                 {row.start_b, row.end_b, row.size_b, row.centre_b}) >= 0)
     fail("a turn has two ways");
   return found;
-}
-
-// The least time of some calls [ns], less the clock's own.
-template <class Call>
-double nanoseconds(Call call) {
-  double least = 1e300, own = 1e300;
-  for (int k = 0; k < 5; ++k) {
-    auto first = Clock::now(), second = Clock::now();
-    call();
-    auto third = Clock::now();
-    own = std::min(own, std::chrono::duration<double, std::nano>(second - first).count());
-    least = std::min(least, std::chrono::duration<double, std::nano>(third - second).count());
-  }
-  return least - own;
 }
 
 // The verdict each millimetre: what a planner without a time of impact does.
