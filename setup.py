@@ -76,7 +76,7 @@ class BuildCore(build_ext):
         # A new folder for what CMake does not look at once it has configured one.
         compiler = subprocess.run([*COMPILER, '--version'], stdout=subprocess.PIPE).stdout
         settings = repr((sources, compiler, COMPILER, os.environ.get('CXXFLAGS')))
-        # pip's own folder for builds is new each time; `-e` again, for an extra, has nothing to compile.
+        # pip's own folder is new each time. In build/, `-e` again has nothing to compile.
         base = HERE / 'build' if self.editable_mode else Path(self.build_temp)
         folder = (base / hashlib.sha256(settings.encode()).hexdigest()[:8]).absolute()
         includes = f'{sysconfig.get_path("include")};{numpy.get_include()}'
