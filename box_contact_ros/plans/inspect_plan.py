@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import compress
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,9 +21,9 @@ from .bearings import Bearings, on_corners, on_faces
 from .crowd import most_near
 from .inspection import OVER, Inspection
 from .judged import faults_of
-from .plan import Plan
+from .plan import Fault, Plan
 from .standing import across_of, base_areas, heights, hull_margins, needs, standing
-from .statics import Beds, Bodies, Rest, settle
+from .statics import LEVEL, Beds, Bodies, Rest, settle
 
 BESIDE = np.sqrt(0.5)
 """Cosine between gravity and a normal below which two boxes are beside each other: that of 45°."""
@@ -212,7 +214,7 @@ def _loads(plan: Plan, meet: _Meetings, bodies: Bodies, friction: float) -> _Loa
         np.ascontiguousarray((patches.polygon - patches.centre[:, None]) @ plane),
         patches.corner_count, np.einsum('ki,kij->kj', centre - patches.centre, plane))
     presses = rest.load > 0.0
-    return _Loads(rest, centre, np.where(presses, rest.load, 0.0) * np.where(presses, unit, 0.0))
+    return _Loads(rest, centre, np.where(presses, rest.load * unit, 0.0 * rest.load))
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,6 +222,7 @@ class _Verdict:
     """Which of the b bodies stand, and why others do not."""
 
     stands: np.ndarray  # bool
+    unknown: np.ndarray  # bool: it stands if those stand whose loads take too much
     cause: np.ndarray
     goes_with: np.ndarray  # the body with which one falls; −1: none
     hangs: np.ndarray  # bool
@@ -233,16 +236,25 @@ def _verdict(plan: Plan, meet: _Meetings, bodies: Bodies, loads: _Loads | None) 
     hull = meet.bearings.hull[meet.carries] @ meet.frame[:2].T
     margin = hull_margins(hull, upper, bodies.centre[:, :2])
     hangs = np.bincount(body[meet.met[meet.on_top, 1]], minlength=count) == 0
-    slides = np.zeros(count, bool)
+    slides, unknown = np.zeros((2, count), bool)
     if loads is None:
         loaded = np.full(count, np.nan)
         stands = standing(lower, upper, margin > bodies.need, fixed)
     else:
         loaded, missing = loads.rest.margin, np.abs(loads.rest.missing)
         slides = np.hypot(missing[:, 0], missing[:, 1]) > missing[:, 2:].max(axis=1)
-        beside = body[meet.pairs[~meet.carries & (loads.rest.load > 0.0)]]
-        stands = _resting(np.vstack((np.stack((lower, upper), axis=1), beside, beside[:, ::-1])),
-                          ~loads.rest.falls, fixed)
+        beside = body[meet.pairs[~meet.carries & ~(loads.rest.load <= 0.0)]]
+        carried_by = np.vstack((np.stack((lower, upper), axis=1), beside, beside[:, ::-1]))
+        unknown = np.isnan(missing).any(axis=1)
+        # Whatever the loads are, a box falls that nothing carries, or that carries nothing and is
+        # level, with its centre outside.
+        tilted = upper[(meet.normal @ meet.frame[2])[meet.carries] <= 1.0 - LEVEL]
+        is_in = partial(np.isin, np.arange(count))
+        surely = ~is_in(carried_by[:, 1]) | (margin <= bodies.need) & ~(
+            is_in(carried_by[:, 0]) | is_in(tilted))
+        holds = ~loads.rest.falls & ~(unknown & surely)
+        stands = _resting(carried_by, holds, fixed)
+        unknown = stands & ~_resting(carried_by, holds & ~unknown, fixed)
     falling = np.flatnonzero(~stands[lower])
     goes = np.bincount(upper[falling], minlength=count) > 0
     cause = np.select(
@@ -256,7 +268,8 @@ def _verdict(plan: Plan, meet: _Meetings, bodies: Bodies, loads: _Loads | None) 
     for _ in range(count.bit_length()):
         goes_with = goes_with[goes_with]
     goes_with[(cause != 'goes with what falls') | (cause[goes_with] == cause)] = -1
-    return _Verdict(stands, cause, goes_with, hangs & ~stands, np.where(fixed, np.inf, margin),
+    return _Verdict(stands & ~unknown, unknown, cause, goes_with, hangs & ~stands,
+                    np.where(fixed, np.inf, margin),
                     np.where(fixed & (loads is not None), np.inf, loaded))
 
 
@@ -276,6 +289,10 @@ def _judged(plan: Plan, meet: _Meetings, bodies: Bodies, loads: _Loads | None, t
             ) -> Inspection:
     count, body, up = len(plan), plan.body, meet.frame[2]
     verdict = _verdict(plan, meet, bodies, loads)
+    if verdict.unknown.any():
+        plan = replace(plan, faults=(*plan.faults, Fault(
+            'support', tuple(compress(plan.names, verdict.unknown[body])),
+            'not judged: too many boxes bear on each other', lacks='judgement')))
     lower, upper = meet.pairs[meet.carries].T
     area = (meet.patches.area * (meet.normal @ up))[meet.carries]
     share = np.bincount(upper, area, count) / base_areas(plan.sizes, plan.poses, up)
@@ -288,7 +305,8 @@ def _judged(plan: Plan, meet: _Meetings, bodies: Bodies, loads: _Loads | None, t
         load = np.bincount(lower, pressing[meet.carries], count)
         if not meet.by_corners:
             pressure = np.zeros(count)
-            np.maximum.at(pressure, lower, loads.pressure[meet.carries])
+            with np.errstate(invalid='ignore'):  # what is not known stays so
+                np.maximum.at(pressure, lower, loads.pressure[meet.carries])
         shares = corner_shares(meet.patches.rectangle, loads.centre)
     most = np.linalg.norm(meet.felt) * plan.limits
     cause = verdict.cause[body]

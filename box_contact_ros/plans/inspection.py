@@ -111,8 +111,12 @@ class Inspection:
 
     @property
     def verdicts(self) -> np.ndarray:
-        """Return a word (n,) for each box: 'ground', else 'overlap', its cause, or 'sound'."""
-        words = np.where(self.cause == '', 'sound', self.cause).astype('U24')
+        """Return a word (n,) for each box: 'ground', else 'overlap', its cause, or 'sound'.
+
+        'not judged': whether it stands is not known.
+        """
+        words = np.where(self.cause == '', np.where(self.stands, 'sound', 'not judged'),
+                         self.cause).astype('U24')
         words[self.overlaps.ravel()] = 'overlap'
         words[self.plan.ground] = 'ground'
         return words

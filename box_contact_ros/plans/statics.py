@@ -64,8 +64,12 @@ MOST_GRIPPING = 200
 """Bodies of a group that friction is asked for: a second's work."""
 PRECISION = 1e-8
 """Of the solver: residuals and gap of duality."""
-BATCH = 500
-"""Bodies of groups that are solved at a time."""
+BATCH = 300
+"""Patches of groups that are solved at a time."""
+MOST_ENTRIES = 2_000_000
+"""Of a programme's matrix: 300 bytes each."""
+MOST_WORK, STEPS = 3e9, 30
+"""Work of all programmes, 2 to 6 ns each, and steps that a programme is expected to take."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +117,7 @@ class Rest:
     centre: np.ndarray
     """(k, 3) of pressure; of the patch where nothing presses [m]."""
     missing: np.ndarray
-    """(n, 6) force and torque that nothing gives [of the weight]."""
+    """(n, 6) force and torque that nothing gives [of the weight]; NaN, as the loads: too much."""
     margin: np.ndarray
     """(n,) how far the centre of pressure is inside the hull of what carries a body [m]; −infinity:
     nothing presses."""
@@ -128,8 +132,10 @@ def settle(bodies: Bodies, beds: Beds, friction: float,
            report: Callable[[int], None] = lambda count: None) -> Rest:
     """Return what the patches carry.
 
+    Small groups come first. Those that would take more than MOST_WORK then are not solved.
     report: is called with the number of bodies that were solved since.
     """
+    work = _Work(MOST_WORK)
     load, centre = np.zeros(len(beds.pairs)), beds.centre.copy()
     own = bodies.centre
     bodies, added = add_up(bodies, beds, friction, load, centre)
@@ -140,6 +146,7 @@ def settle(bodies: Bodies, beds: Beds, friction: float,
     free = np.flatnonzero(group >= 0)
     missing[free, 2] = 1.0  # what nothing carries
     size = np.bincount(group[free], minlength=1)
+    patches = np.bincount(of_patch[of_patch >= 0], minlength=len(size))
 
     def any_of(bodies_or_patches: np.ndarray, of: np.ndarray) -> np.ndarray:
         return np.asarray(np.bincount(of[bodies_or_patches], minlength=len(size)) > 0)
@@ -151,11 +158,15 @@ def settle(bodies: Bodies, beds: Beds, friction: float,
 
     def solve(groups: np.ndarray, way: str) -> None:
         for flat in (True, False):
-            for some in _batches(np.flatnonzero(groups & (is_level == flat)), size):
+            for some in _batches(np.flatnonzero(groups & (is_level == flat)), patches,
+                                 BATCH if flat and way != GRIPPING else 1):
                 rows, members = left[np.isin(of_patch, some)], np.flatnonzero(np.isin(group, some))
-                part = _Programme(bodies, beds, members, rows, flat and way != GRIPPING,
-                                  is_tight | (way == GRIPPING))
-                load[rows], centre[rows], missing[members] = part.settle(friction, way)
+                try:
+                    part = _Programme(bodies, beds, members, rows, flat and way != GRIPPING,
+                                      is_tight | (way == GRIPPING), work)
+                    load[rows], centre[rows], missing[members] = part.settle(friction, way)
+                except _TooMuch:
+                    load[rows] = missing[members] = np.nan
 
     inside = hull_margins(beds.bearings.hull[left, :, :2], beds.pairs[left, 1],
                           bodies.centre[:, :2])
@@ -187,16 +198,18 @@ def settle(bodies: Bodies, beds: Beds, friction: float,
 def pressed_margins(beds: Beds, load: np.ndarray, centre: np.ndarray, count: int) -> np.ndarray:
     """Return how far the centres of pressure of bodies are inside the hulls of what carries them.
 
-    −infinity (n,) where nothing presses [m].
+    −infinity (n,) where nothing presses, NaN where loads are not known [m].
     """
-    rows = beds.carries & (load > 0.0)
+    rows = beds.carries & ~(load <= 0.0)
     upper, pressing = beds.pairs[rows, 1], load[rows]
     total = np.bincount(upper, pressing, count)
     at = np.stack([np.bincount(upper, pressing * column, count)
                    for column in centre[rows, :2].T], axis=1)
-    return np.where(total > 0.0, hull_margins(
+    presses = total > 0.0
+    return np.where(presses, hull_margins(
         beds.bearings.hull[beds.carries][:, :, :2], beds.pairs[beds.carries, 1],
-        at / np.where(total > 0.0, total, 1.0)[:, None]), -np.inf)
+        np.where(presses[:, None], at, 0.0) / np.where(presses, total, 1.0)[:, None]),
+        np.where(np.isnan(total), np.nan, -np.inf))
 
 
 def _have_rings(bodies: Bodies, beds: Beds, left: np.ndarray, of_patch: np.ndarray,
@@ -230,10 +243,11 @@ def groups_of(bodies: Bodies, pairs: np.ndarray, done: np.ndarray) -> tuple[np.n
     return group, group[pairs].max(axis=1, initial=-1)
 
 
-def _batches(groups: np.ndarray, size: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield groups so that BATCH bodies or few more come together."""
+def _batches(groups: np.ndarray, size: np.ndarray, most: int) -> Iterator[np.ndarray]:
+    """Yield groups, the smallest first, so that their sizes add up to `most` or a little more."""
     if len(groups):
-        number = np.cumsum(size[groups]) // BATCH
+        groups = groups[np.argsort(size[groups], kind='stable')]
+        number = np.cumsum(size[groups]) // most
         yield from np.split(groups, np.flatnonzero(np.diff(number)) + 1)
 
 
@@ -278,6 +292,18 @@ def add_up(bodies: Bodies, beds: Beds, friction: float, load: np.ndarray, centre
             np.concatenate((*added, np.zeros(0, int))))
 
 
+class _TooMuch(Exception):
+    """Groups take more memory or time than is left."""
+
+
+@dataclass
+class _Work:
+    """What the programmes may still take."""
+
+    left: float
+    """Of a step: the entries of its matrix and factors, to the power of 1.25, as measured."""
+
+
 class _Programme:
     """The quadratic programmes of some groups.
 
@@ -286,14 +312,17 @@ class _Programme:
     """
 
     def __init__(self, bodies: Bodies, beds: Beds, members: np.ndarray, rows: np.ndarray,
-                 flat: bool, is_tight: np.ndarray) -> None:
+                 flat: bool, is_tight: np.ndarray, work: _Work) -> None:
         self.flat, self.members, self.rows, self.beds = flat, members, rows, beds
+        self.work = work
         self.unit = bodies.weight[members].mean()
         self.weight = bodies.weight[members] / self.unit
         place = np.full(len(bodies.weight), -1)
         place[members] = np.arange(len(members))
         stiffness, area = beds.bearings.stiffness[rows], beds.area[rows]
         self.patch, column = np.nonzero(stiffness > NEGLIGIBLE * area[:, None])
+        if 3 * len(self.patch) > MOST_ENTRIES:  # a point presses a body at least
+            raise _TooMuch
         self.point = beds.bearings.point[rows[self.patch], column]
         self.spans = np.flatnonzero(column < beds.bearings.hull.shape[1])
         # A patch as large as the mean one has a stiffness of 1.
@@ -369,17 +398,20 @@ class _Programme:
             some = rubs.of(self.spans)
             _, soft = _least(
                 hstack((self.pressing[:, self.spans], some.wrenches), format='csc'), self.wanted,
-                SOFTNESS * np.append(cost[self.spans], some.cost), metric, some)
+                SOFTNESS * np.append(cost[self.spans], some.cost), metric, some,
+                self.work)
             missing = np.where(np.abs(soft) < DOUBTFUL, 0.0, soft)
         given = hstack((self.pressing, rubs.wrenches), format='csc')
         cost = np.append(cost, rubs.cost)
-        force, more = _least(given, self.wanted - missing, cost, STIFFNESS * metric, rubs)
+        force, more = _least(given, self.wanted - missing, cost, STIFFNESS * metric, rubs,
+                             self.work)
         each = (-1, len(self.keep))
         fell = ((np.abs(more) > FALLS).reshape(each).any(axis=1)
                 & (np.abs(soft) > FELL).reshape(each).any(axis=1))
         if fell.any():  # so that the others need not lack what these do
             missing = np.where(np.repeat(fell, each[1]), soft, missing)
-            force, more = _least(given, self.wanted - missing, cost, STIFFNESS * metric, rubs)
+            force, more = _least(given, self.wanted - missing, cost, STIFFNESS * metric, rubs,
+                             self.work)
         if sure and not self.flat and np.abs(more).max() > FALLS:
             return self._solve(rubs, sure=False)
         return force[:len(self.patch)], (missing + more).reshape(each)
@@ -505,10 +537,11 @@ def pulled_in(points: np.ndarray, start: np.ndarray, inward: np.ndarray, need: f
 
 
 def _least(given: Any, wanted: np.ndarray, cost: np.ndarray, metric: np.ndarray, rubs: _Friction,
-           ) -> tuple[np.ndarray, np.ndarray]:
+           work: _Work) -> tuple[np.ndarray, np.ndarray]:
     """Return f (m,) and what is missing (e,), with the least cost·f² + metric·missing².
 
     given·f + missing = wanted. The last f are those of friction. The others are not negative.
+    Raises _TooMuch.
     """
     import clarabel
     from scipy.sparse import csc_matrix, diags, hstack, identity, vstack
@@ -531,13 +564,23 @@ def _least(given: Any, wanted: np.ndarray, cost: np.ndarray, metric: np.ndarray,
     right = np.zeros(rows.shape[0])
     right[:equations] = wanted
     right[equations + pressing + cone[:, 0]] = rubs.limit
+    if rows.nnz > MOST_ENTRIES:
+        raise _TooMuch
     settings = clarabel.DefaultSettings()
     settings.verbose = False
+    # On groups of 1,000 boxes the other ones take two to four times as much processor time.
+    settings.direct_solve_method = 'qdldl'
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = PRECISION
-    solution = clarabel.DefaultSolver(
+    solver = clarabel.DefaultSolver(
         diags(np.concatenate((cost, metric)), format='csc'), np.zeros(forces + equations), rows,
         right, [clarabel.ZeroConeT(equations), clarabel.NonnegativeConeT(pressing),
-                *[clarabel.SecondOrderConeT(width + 1)] * count], settings).solve()
+                *[clarabel.SecondOrderConeT(width + 1)] * count], settings)
+    factors = solver.get_info().linsolver
+    step = (factors.nnzL + factors.nnzA)**1.25
+    if STEPS * step > work.left:
+        raise _TooMuch
+    solution = solver.solve()
+    work.left -= (solution.iterations + 1) * step
     force = np.array(solution.x[:forces])
     force[:pressing] = np.maximum(force[:pressing], 0.0)
     # From the forces, so that what the solver leaves undone is missing, too.

@@ -16,7 +16,7 @@ from box_contact_ros.plans.inspect_files import STATUSES
 
 pytest.importorskip('clarabel')
 
-from test_read_plan import A, baplie, body, collision, mjcf, model, sheet, world, written
+from test_read_plan import A, baplie, body, collision, document, mjcf, model, sheet, world, written
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = ROOT / 'docs' / 'examples' / 'files'
@@ -182,6 +182,44 @@ LINK = collision() + collision(more='<pose>1 0 0 0 0 0</pose>').replace('"c"', '
 def test_what_is_not_judged_is_not_sound(judge, name, text, status, words):
     """And what is judged and told is."""
     found, lines = judge(name, text)
+    assert found == status and words in '\n'.join(lines), lines
+
+
+FIXED = '<static>1</static>' + collision()
+KILOS = '{0} 22G1 MEA+WT++{1}'
+LOADED = ('pallet,1,1,1,0,0,0.5,25,', 'low,1,1,1,0,0,1.5,20,9')
+
+
+@pytest.mark.parametrize(('name', 'text', 'options', 'status', 'words'), [
+    ('hang_mesh.sdf', world(model('hall', '<static>1</static>' + collision(
+        '<geometry><mesh><uri>hall.dae</uri></mesh></geometry>')), model('crate', collision(), 5)),
+     [], 3, 'taken as fixed, and not judged'),
+    ('static_overlap.sdf', world(model('a', FIXED), model('b', FIXED, 0.8)), [], 0,
+     '700.0 mm deep'),
+    ('kg_unit.edi', baplie(*(KILOS.format(slot, 'KG:10000') for slot in ('0010102', '0010104'))),
+     ['--limit', '5000'], 1, 'overloaded            0010102  10000 kg on top'),
+    ('weight_thousands.edi', baplie(KILOS.format('0010102', 'KGM:24.500')), [], 3,
+     '1 has a doubtful weight'),
+    ('six_digits_all.edi', baplie('010102 22G1', '010104 22G1'), [], 0, '2 boxes, 40 t'),
+    ('quote_note.csv', sheet(f'{PAIR[0]},"19 inch', 'd,1,1,1,0,0,7.5,1,ok', more=',mass,note'), [],
+     2, 'line 3: it is not CSV'),
+    ('cut.csv', sheet(*LOADED, 'high,1,1,1,0,0,2.5,1', more=',mass,limit')[:-1], [], 3,
+     '1 box was not placed'),
+    ('whole.csv', sheet(*LOADED, 'high,1,1,1,0,0,2.5,18,', more=',mass,limit'), [], 1,
+     'overloaded            low  18 kg on top'),
+    ('dup2.json', document().replace('"z": 0.5', '"z": 7, "z": 0.5'), [], 2,
+     "the key 'z' comes twice"),
+    ('heavy_unread.csv', sheet('pallet,1,1,1,0,0,0.5,25,30', 'high,1,1,1,0,0,1.5,1800 kg,',
+                               more=',mass,limit'), [], 3, "row 2: mass is '1800 kg'"),
+    ('leftout_same.csv', sheet(PAIR[0], *(5 * ['a,1,1,-1,0,0,0.5,1']), more=',mass'), [], 3,
+     '5 boxes were not placed'),
+    ('hide.sdf', world('<x><![CDATA[<!--]]></x>', model('floating', collision(), 9),
+                       '<x><![CDATA[-->]]></x>'), [], 1, '8500.0 mm above what is below'),
+    ('incl.sdf', '<sdf><world name="w"><include><uri>file:///etc/passwd</uri></include></world>'
+     '</sdf>', [], 3, '1 part of the file was not read')])
+def test_traps(judge, name, text, options, status, words):
+    """Files that hide what is wrong."""
+    found, lines = judge(name, text, *options)
     assert found == status and words in '\n'.join(lines), lines
 
 

@@ -362,7 +362,7 @@ def test_each_box_has_a_verdict_and_each_verdict_a_colour():
     boxes = [box(0, 1), box(0.9, 1), box(5, 6), box(-5, 0.4)]  # the last one is in the floor
     found = inspect_plan(plan_of(boxes, [1] * 4))
     assert found.verdicts.tolist() == ['ground', 'overlap', 'overlap', 'hangs', 'overlap']
-    assert {*CAUSES, 'overlap', 'ground', 'sound'} == set(COLOURS)
+    assert {*CAUSES, 'overlap', 'ground', 'sound', 'not judged'} == set(COLOURS)
 
 
 def test_the_picture_has_the_legend_of_what_it_shows():
@@ -386,3 +386,23 @@ def test_a_box_that_hangs_and_carries_is_among_those_that_fall():
     found = inspect_plan(plan_of([box(-1, 0.5, PAD), box(1, 0.6, (0.2, 1, 0.8)),
                                   box(0, 1.05, PLANK)], [1, 1, 12]))
     assert found.cause.tolist() == ['', '', 'hangs', 'goes with what falls']
+
+
+def test_what_takes_too_much_is_not_judged(monkeypatch):
+    """A bridge, its pads and what stands on it; the tower beside them is judged."""
+    monkeypatch.setattr('box_contact_ros.plans.statics.MOST_WORK', 0.0)
+    bridge = [box(-1, 0.5, PAD), box(1, 0.5, PAD), box(0, 1.05, PLANK), box(0, 1.6)]
+    plan = plan_of([*bridge, box(9, 0.5), box(9, 1.5)], 6 * [10.0])
+    found = inspect_plan(plan)
+    assert found.stands.tolist() == [True, *4 * [False], True, True]
+    assert found.verdicts.tolist() == ['ground', *4 * ['not judged'], 'sound', 'sound']
+    assert found.verdict == 'not all judged' and found.summary().endswith(
+        'not all judged; what was read is sound, but 4 were not judged')
+    assert np.isnan(found.load[1:3]).all() and found.load[5] == pytest.approx(10 * G)
+    assert np.isnan([found.loaded_margin[3], found.pressure[1], *found.corner_loads[0]]).all()
+    (fault,) = found.plan.faults
+    assert fault.names == ('1', '2', '3', '4')
+    # Certain, whatever the loads are: what nothing carries, and a top box that is off its base.
+    found = inspect_plan(plan_of([*bridge[:3], box(2.2, 1.6, (1.5, 1, 1)), box(0, 9)], 5 * [10.0]))
+    assert found.cause.tolist() == [*4 * [''], 'unsupported', 'hangs']
+    assert found.verdict == 'not sound'

@@ -4,6 +4,7 @@
 """What a file may cost: nothing is waited for, and little memory and time is taken."""
 from __future__ import annotations
 
+import json
 import os
 import resource
 import subprocess
@@ -16,10 +17,12 @@ from box_contact_ros.plans import inspect_files
 
 pytest.importorskip('clarabel')
 
-from test_read_plan import A, body, mjcf, model, sheet, world, written
+from test_read_plan import FILES, A, body, mjcf, model, sheet, world, written
 
 MEMORY, SECONDS = 300 * 2**20, 2.0
 """That the program may take, with all its imports [bytes, s of the processor]."""
+MOST_MEMORY, MOST_SECONDS = 2**30, 20.0
+"""The same for any file of 1 MB."""
 
 
 def judged(path: Path, *options: str) -> tuple[int, str, float, int]:
@@ -116,3 +119,39 @@ def test_the_bound_on_pairs_keeps_the_answer(tmp_path, monkeypatch, capsys):
             path = written(tmp_path, name, text)
             assert inspect_files.main([str(path), *options]) == status
             assert 'too many' in capsys.readouterr().out
+
+
+def slats(count):
+    """Return two layers of slats, each of which crosses all of the other layer."""
+    long, places = count / 50, [n / 50 + 0.01 for n in range(count)]
+    return sheet(*(f'a{n},{long},.01,.1,{long / 2},{at},.05,1' for n, at in enumerate(places)),
+                 *(f'b{n},.01,{long},.1,{at},{long / 2},.15,1' for n, at in enumerate(places)),
+                 more=',mass')
+
+
+def pyramid(side, *others):
+    """Return bricks that stand on four each, and other rows."""
+    rows = [f'{z}/{x}/{y},.2,.1,.1,{.2 * x + .1 * z},{.1 * y + .05 * z},{.1 * z + .05},1'
+            for z in range(side) for x in range(side - z) for y in range(side - z)]
+    return sheet(*rows, *others, more=',mass')
+
+
+@pytest.mark.parametrize('text, status, line', [
+    (slats(440), 3, 'what was read is sound, but 880 were not judged'),
+    (pyramid(44), 3, 'what was read is sound, but 29,370 were not judged'),
+    (pyramid(27), 3, 'what was read is sound, but 6,930 were not judged'),
+    (pyramid(27, 'a,.1,.1,.1,0,0,9,1'), 1, 'not sound; 6,930 were not judged')])
+def test_loads_that_take_too_much_are_not_judged(text, status, line, tmp_path):
+    """880 slats took 2 GB, 29,370 bricks 1.6 GB, and 4,000 bricks 122 s."""
+    found, printed, seconds, peak = judged(written(tmp_path, 'p.csv', text))
+    assert found == status and line in printed
+    assert 'not judged: too many boxes bear on each other' in printed
+    assert seconds < MOST_SECONDS and peak < MOST_MEMORY
+
+
+def test_real_pallets_are_judged_whatever_their_number(tmp_path):
+    orders = json.loads((FILES.parent / 'pallets/packing_plans.json').read_bytes())
+    copies = {f'{name}/{n}': items for n in range(27) for name, items in orders.items()}
+    found, printed, seconds, peak = judged(written(tmp_path, 'p.json', json.dumps(copies)))
+    assert found == 1 and '5,103 boxes' in printed and 'not judged' not in printed
+    assert seconds < MOST_SECONDS and peak < MOST_MEMORY
