@@ -411,7 +411,7 @@ class _Programme:
         if fell.any():  # so that the others need not lack what these do
             missing = np.where(np.repeat(fell, each[1]), soft, missing)
             force, more = _least(given, self.wanted - missing, cost, STIFFNESS * metric, rubs,
-                             self.work)
+                                 self.work)
         if sure and not self.flat and np.abs(more).max() > FALLS:
             return self._solve(rubs, sure=False)
         return force[:len(self.patch)], (missing + more).reshape(each)

@@ -15,6 +15,8 @@ from benchmarks import fuzz, judge
 from benchmarks.pose_sets import Pairs
 from box_contact_ros import ContactSolver
 
+pytestmark = pytest.mark.reports
+
 SEED = 20260
 
 

@@ -227,6 +227,7 @@ def example(program: Path) -> list[str]:
     return run(program).splitlines()
 
 
+@pytest.mark.builds
 def test_by_the_compiler_alone(tmp_path: Path) -> None:
     """Without a warning, and with C++20."""
     for standard in ('c++17', 'c++20'):
@@ -257,6 +258,7 @@ def configure(source: Path, folder: Path, *options: str, **environment: str) -> 
     run(tool('cmake'), '--build', folder, '--parallel', **environment)
 
 
+@pytest.mark.builds
 def test_by_find_package(tmp_path: Path) -> None:
     """No option is needed where the environment is active; and a version that there is not."""
     active = f'{PREFIX / "bin"}:{os.environ["PATH"]}'
@@ -280,6 +282,7 @@ def test_by_find_package(tmp_path: Path) -> None:
     run(tool('cmake'), '-S', tmp_path, '-B', tmp_path / 'versions', PATH=active)
 
 
+@pytest.mark.builds
 def test_by_pkg_config(tmp_path: Path) -> None:
     found = run(tool('pkg-config'), '--cflags', '--libs', 'box_contact',
                 PKG_CONFIG_PATH=str(PREFIX / 'lib' / 'pkgconfig'))

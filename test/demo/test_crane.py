@@ -18,6 +18,8 @@ from box_contact_ros.forces.patch_forces import GRAVITY
 from box_contact_ros.scene.scene import CONTAINER
 from box_contact_ros.solver.pose import rotation_matrix
 
+pytestmark = pytest.mark.reports
+
 LENGTH, WIDTH, HEIGHT = CONTAINER
 
 # Hangs still and level over the stack: what a test varies stands out.

@@ -21,6 +21,8 @@ from children import children
 
 from box_contact_ros.demo import demo
 
+pytestmark = pytest.mark.reports
+
 
 def test_an_unknown_model_ends_the_demo_before_it_starts(capsys):
     with pytest.raises(SystemExit, match='2'):

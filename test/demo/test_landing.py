@@ -23,6 +23,8 @@ from box_contact_ros.demo.landing import (
 )
 from box_contact_ros.forces.patch_forces import GRAVITY
 
+pytestmark = pytest.mark.reports
+
 HARD = CraneScenario(rope_angle=3.0, rope_heading=100.0, pitch=2.0, roll=-2.0, yaw=1.0,
                      offset=(0.2, 0.4))
 """A landing at the ends of what is asked for."""

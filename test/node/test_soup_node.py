@@ -90,7 +90,7 @@ def test_its_topics_are_the_documents(client, soup_node):
     """Those of the contact node, with soup/ before what is sent; the same QoS."""
     document = yaml.safe_load(resource_path('msg_schemas', 'asyncapi.yaml').read_text('utf-8'))
     services = {f'contact_node/{name}' for name in (
-        'boxes', 'check', 'get_boxes', 'reset', 'set_boxes')}
+        'boxes', 'check', 'check_path', 'get_boxes', 'reset', 'set_boxes')}
     addresses = {channel['address'] for channel in document['channels'].values()} - services
     inputs = {'box_a/pose', 'box_b/pose', '/diagnostics'}
     expected = {f'/{name.lstrip("/")}' if name in inputs else f'/soup/{name}'

@@ -149,6 +149,7 @@ def test_loads_that_take_too_much_are_not_judged(text, status, line, tmp_path):
     assert seconds < MOST_SECONDS and peak < MOST_MEMORY
 
 
+@pytest.mark.reports
 def test_real_pallets_are_judged_whatever_their_number(tmp_path):
     orders = json.loads((FILES.parent / 'pallets/packing_plans.json').read_bytes())
     copies = {f'{name}/{n}': items for n in range(27) for name, items in orders.items()}

@@ -30,6 +30,8 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.core import DEPTH_FLOOR
 from box_contact_ros.solver.contact import Contacts
 
+pytestmark = pytest.mark.reports
+
 UNIT = (1.0, 1.0, 1.0)
 
 K = 1.0
