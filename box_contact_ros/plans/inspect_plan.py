@@ -47,7 +47,8 @@ def inspect_plan(plan: Plan, *, tolerance: float | None = None, friction: float 
     on the ground, and on corner castings of the box below.
     sides: whether boxes beside each other carry by friction.
 
-    Loads need the extra `plans`. A plan without masses does without it.
+    Loads need the extra `plans`; a plan without masses does not. Boxes whose loads would take
+    more than 1 GB or about 20 s are not judged, the largest groups first.
     Raises ValueError, with field and value, for bad input, and for too many boxes in one place.
     """
     if not isinstance(plan, Plan):

@@ -125,13 +125,15 @@ def compiled_plan(path: Path) -> Plan:
     mujoco.set_mju_user_warning(lambda text: None)  # else it writes a file in this folder
     with warnings.catch_warnings(action='ignore'):
         model, meshes = _compiled(path)
+    meshes += [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, n) or f'flex {n}'
+               for n in range(model.nflex)]
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     if model.ngeom > MOST_GEOMS:
         raise ValueError(f'it has {model.ngeom:,} shapes, more than {MOST_GEOMS:,}')
     tops = _tops(model)
-    faults = [Fault('shape', tuple(meshes), f'{len(meshes)} mesh, height field or SDF: no box, so '
-                                            'left out', **({} if any(tops) else UNMOVED))
+    faults = [Fault('shape', tuple(meshes), f'{len(meshes)} mesh, height field, flex or SDF: no '
+                                            'box, so left out', **({} if any(tops) else UNMOVED))
               ] if meshes else []
     solids = []
     for geom in range(model.ngeom):

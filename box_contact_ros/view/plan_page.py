@@ -117,7 +117,8 @@ def lines_of(found: Inspection, box: int) -> list[str]:
     """Return what is known of a box: its rows, or that nothing is wrong, mass, and load on top."""
     plan = found.plan
     name = plan.names[box]
-    lines = [str(row) for row in found.rows() if name in row.names] or [f'{name}: sound']
+    word = 'not judged' if found.verdicts[box] == 'not judged' else 'sound'
+    lines = [str(row) for row in found.rows() if name in row.names] or [f'{name}: {word}']
     if plan.masses is not None:
         lines.append(f'{plan.masses[box]:,.0f} kg')
     on_top = found.load[box] / np.linalg.norm(found.acceleration)

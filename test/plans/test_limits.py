@@ -7,13 +7,16 @@ from __future__ import annotations
 import json
 import os
 import resource
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 
 from box_contact_ros.plans import inspect_files
+from box_contact_ros.plans import mjcf as mjcf_reader
 
 pytest.importorskip('clarabel')
 
@@ -91,6 +94,33 @@ def test_a_model_that_needs_much_is_refused(text, tmp_path):
     assert seconds < SECONDS and peak < MEMORY
 
 
+def test_a_model_that_takes_long_is_refused(tmp_path, monkeypatch):
+    """27 million boxes, by three lines: the subprocess is ended, and its end is told."""
+    pytest.importorskip('mujoco')
+    some = '<geom type="box" size=".1 .1 .1"/>'
+    for axis in '1 0 0', '0 1 0', '0 0 1':
+        some = f'<replicate count="300" offset="{axis}">{some}</replicate>'
+    path = written(tmp_path, 'p.xml', mjcf(some))
+    done = subprocess.run([sys.executable, '-c', (
+        'import sys\nfrom box_contact_ros.plans import mjcf\nmjcf.MOST_SECONDS = 1\nmjcf.main()'),
+        str(path)], capture_output=True, timeout=PATIENCE)
+    assert done.returncode == -signal.SIGXCPU
+    ended = tmp_path / 'ended'
+    ended.write_text('#!/bin/sh\nkill -XCPU $$\n', 'utf-8')
+    ended.chmod(0o700)
+    monkeypatch.setattr(mjcf_reader.sys, 'executable', str(ended))
+    with pytest.raises(ValueError, match='MuJoCo takes more than 8 s to read it'):
+        mjcf_reader.read_mjcf(path)
+
+
+def test_a_model_of_many_shapes_is_refused(tmp_path, monkeypatch):
+    pytest.importorskip('mujoco')
+    monkeypatch.setattr(mjcf_reader, 'MOST_GEOMS', 2)
+    path = written(tmp_path, 'p.xml', mjcf(body('a', 0.5), body('b', 1.5)))
+    with pytest.raises(ValueError, match='it has 3 shapes, more than 2'):
+        mjcf_reader.compiled_plan(path)
+
+
 IN_ONE_PLACE = {
     'p.csv': sheet(*(f'{n},1,1,1,0,0,0.5' for n in range(2000))),
     'p.sdf': world(*(A.replace('"a"', f'"{n}"') for n in range(2000)))}
@@ -138,6 +168,7 @@ def pyramid(side, *others):
 
 @pytest.mark.parametrize('text, status, line', [
     (slats(440), 3, 'what was read is sound, but 880 were not judged'),
+    (slats(250), 3, 'what was read is sound, but 500 were not judged'),
     (pyramid(44), 3, 'what was read is sound, but 29,370 were not judged'),
     (pyramid(27), 3, 'what was read is sound, but 6,930 were not judged'),
     (pyramid(27, 'a,.1,.1,.1,0,0,9,1'), 1, 'not sound; 6,930 were not judged')])

@@ -226,6 +226,9 @@ FAULTS = {
     'mesh file': ('p.xml', mjcf(body('a', .5), '<geom name="m" type="mesh" mesh="m"/>',
                                 more='<asset><mesh name="m" file="m.obj"/></asset>'), 'shape', 'm',
                   '1 mesh'),
+    'flex': ('p.xml', mjcf(body('a', .5), '<flexcomp name="cloth" type="grid" count="4 4 1" '
+                           'spacing=".5 .5 .1" pos="0 0 1" dim="2" mass="1"/>'), 'shape', 'cloth',
+             '1 mesh, height field, flex'),
     'robot': ('p.urdf', '<robot name="r"><link name="l"><collision><geometry><sphere radius="1"/>'
               '</geometry></collision></link></robot>', 'shape', 'geom 0', '1 sphere'),
     'scene': ('p.yaml', 'boxes: {a: {size: [1, 1, 1]}, b: {size: [1, 1, 1], pose: [0, 0, 0, 0, 0, '

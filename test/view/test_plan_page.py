@@ -20,7 +20,7 @@ pytest.importorskip('clarabel')
 
 from browser import chromium, open_page
 
-from box_contact_ros import inspect_plan, read_plan
+from box_contact_ros import Plan, inspect_plan, read_plan
 from box_contact_ros.solver.pose import rotation_matrix
 from box_contact_ros.view.plan_page import CLICK_HINT, PlanPage, hit_by, lines_of, table
 
@@ -37,6 +37,8 @@ def test_what_is_known_of_a_box(found):
     assert lines_of(found, found.plan.names.index('0100304'))[0].startswith('unsupported')
     lines = lines_of(found, found.plan.names.index('0090102'))
     assert lines[:2] == ['0090102: sound', '21,000 kg'] and lines[-1] == '6.058 × 2.438 × 2.591 m'
+    afloat = inspect_plan(Plan((1, 1, 1), [[0, 0, 0, 0, 0, 0, 1]], names=['a']))  # nothing is fixed
+    assert lines_of(afloat, 0)[0] == 'a: not judged'
 
 
 def test_a_page_bears_any_name_of_a_file(found):
