@@ -249,6 +249,20 @@ def test_a_pair_that_parts_and_meets_on_one_segment():
 # --- what a tick has: bodies, absent boxes, revisions ---------------------------------------------
 
 
+def test_the_next_corner_of_a_long_load_that_turns_beside_a_wall_is_an_impact():
+    """Its first corner is at the wall. It is away from it for 0.6 rad of a turn by 2.9 rad."""
+    half = np.arctan(0.3)
+    reach, closest = np.hypot(1.0, 0.3), 1e-3  # [m]; each corner would be so deep in the wall
+    scene = Scene({'load': Box((2.0, 0.6, 1.0)),
+                   'wall': Box((0.2, 10.0, 10.0), at(reach - closest + 0.1, 0, 0))},
+                  patterns=(('*', '*'),), poses='array')
+    path = [[at(0, 0, 0, turn=yaw(angle))] for angle in (-half, 2.9 - half)]
+    answer = SceneSolver(scene).check_path(path)
+    assert len(answer.at_start) == len(answer.pairs) == 1
+    touch = (2.0 * half - np.arccos(1.0 - closest / reach)) / 2.9
+    assert answer.impacts.time[0] == pytest.approx(touch, abs=1e-5)
+
+
 def test_a_box_of_a_body_goes_on_an_arc():
     """A boom of 4 m turns by a right angle past a post that is nearer than the chord."""
     boxes = {'tip': Box((0.2, 0.2, 0.2), at(4, 0, 0), body='boom'),
