@@ -52,7 +52,7 @@ constexpr double most_over_relaxation = 1.3;
 // But not where no rim is faster than this [m/s]: what rests stays solved.
 constexpr double least_over_relaxed = 1e-6;
 
-// Friction acts at the centre of what pressed in this time [s], which of piles shakes from step to step.
+// Friction acts at the mean centre of what pressed in this time [s]: in piles that of one sub-step shakes.
 constexpr double pressure_time = 0.05;
 
 // --- impacts ---
