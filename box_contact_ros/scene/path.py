@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,6 +29,8 @@ LEAST_COSINE = 1e-9
 """Of half the turn on a segment: below, it has two ways. That of core/src/motion/turn.hpp."""
 PARTING_ANGLE = 0.02
 """Turn [rad] after which boxes that begin within the clearance are looked at once more."""
+DEEPER = 1e-4
+"""How deep boxes that begin within the clearance may get into each other, or deeper [m]."""
 MOST_RIDES = 1000
 """That a search for the least distance takes at first."""
 SOLVED = 2048
@@ -44,10 +46,11 @@ class PathCheck:
     impacts: Approaches
     """(k,) their first times: `time`, `closing_speed` [m per unit of time], `nearest`."""
     at_start: np.ndarray
-    """(l, 2) pairs within the clearance at the first pose. Each is judged from where it is apart:
-    at a pose, or after a turn by 0.02 rad on the way there."""
+    """(l, 2) pairs within the clearance at the first pose. Until one is apart by it, at a pose or
+    after a turn by 0.02 rad on the way there, it is an impact to get into each other, or deeper
+    than at first, by 0.1 mm."""
     least_pair: np.ndarray | None
-    """(2,) the pair that comes nearest, of those not in `at_start`; None: there is none."""
+    """(2,) the pair that comes nearest, of those never in `at_start`; None: there is none."""
     least: Approach | None
     """When, and how near it comes; where boxes touch, the first of these times."""
     scene: Scene
@@ -61,7 +64,7 @@ class PathCheck:
 
     @property
     def is_free(self) -> bool:
-        """Return whether nothing comes within the clearance, but what was so at the start."""
+        """Return whether there is no impact."""
         return not len(self.pairs)
 
     def named(self) -> list[tuple[Pair, Approach]]:
@@ -165,8 +168,8 @@ def check_course(course: Course, clearance: float) -> Generator[None, None, Foun
     else:
         least_pair, least = yield from _least(rides, near, radius)
     parts = [(near, impacts)]
-    for pair in held:
-        parts.append(_after_parting(rides, pair, clearance))
+    for pair, depth in zip(held, rides.depths_at_first(held).tolist()):
+        parts += _after_parting(rides, pair, clearance), _pressed(rides, pair, depth)
         yield
     near = np.concatenate([part for part, _ in parts])
     impacts = _joined([found for _, found in parts])
@@ -224,6 +227,21 @@ def _after_parting(rides: Rides, pair: np.ndarray, clearance: float,
     found = rides.solve(near, clearance, first_from=share)
     rows = _first_rows(near, found)
     return near[rows], found[rows]
+
+
+def _pressed(rides: Rides, pair: np.ndarray, depth: float) -> tuple[np.ndarray, Approaches]:
+    """Return the ride on which a pair first gets into each other, and when.
+
+    depth: of the pair at the first pose [m]. Boxes that are smaller by so much, and by DEEPER, are
+    apart there.
+    """
+    near = np.column_stack((np.arange(rides.segments), np.tile(pair, (rides.segments, 1))))
+    found = rides.solve(near, 0.0, smaller=depth + DEEPER)
+    rows = _first_rows(near, found)
+    near, found = near[rows], found[rows]
+    places = (rides.poses_at(int(box), near[:, 0], found.time - near[:, 0]) for box in pair)
+    return near, replace(found, nearest=ContactSolver(*rides.course.sizes[pair]).distance_batch(
+        *places))
 
 
 def _least(rides: Rides, near: np.ndarray, radius: float,

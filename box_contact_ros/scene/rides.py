@@ -23,6 +23,8 @@ from ..solver.pose import rotation_matrix
 
 ROUNDING = 64 * 2.0**-52
 """Of a bounding box, as a share of the largest coordinate."""
+LEAST_PART = 1e-3
+"""Of an extent, that is left of a box."""
 DENSE_RIDES = 1 << 16
 """Rides of pairs without a broad phase that are looked at together."""
 
@@ -245,11 +247,14 @@ class Rides:
         return np.hstack((place - rotation_matrix(turn) @ centre, turn))
 
     def solve(self, rides: np.ndarray, clearance: float | None, *, first_from: float = 0.0,
-              ) -> Approaches:
+              smaller: float = 0.0) -> Approaches:
         """Return the first times of rides within a clearance [m]; None: their least distances.
 
         first_from: the share of its segment at which the first ride begins.
+        smaller: by how much all extents of the boxes are [m]; of thinner ones LEAST_PART is left.
         """
+        sizes = (np.maximum(self._sizes - smaller, LEAST_PART * self._sizes) if smaller else
+                 self._sizes)
         ask = (self._solver.least_distance_batch if clearance is None else
                partial(self._solver.time_of_impact_batch, clearance=clearance))
         rows, starts, shares = self._rows(rides), self._starts, np.zeros(len(rides))
@@ -258,12 +263,20 @@ class Rides:
             starts = starts.copy()
             for box, row in zip(rides[0, 1:].tolist(), rows[0]):
                 starts[row] = self.poses_at(box, rides[:1, 0], shares[:1])[0]
-        found = ask(starts, self._ends, sizes=self._sizes, centres=self._centres, pairs=rows)
+        found = ask(starts, self._ends, sizes=sizes, centres=self._centres, pairs=rows)
         return replace(found, time=rides[:, 0] + shares + (1.0 - shares) * found.time,
                        closing_speed=found.closing_speed / (1.0 - shares))
 
     def at_first(self, pairs: np.ndarray) -> Nearests:
         """Return the nearest points of pairs (k, 2) at the first pose."""
-        rides = np.column_stack((np.zeros(len(pairs), np.int64), pairs))
         return self._solver.distance_batch(self._starts, sizes=self._sizes,
-                                           pairs=self._rows(rides))
+                                           pairs=self._rows_at_first(pairs))
+
+    def depths_at_first(self, pairs: np.ndarray) -> np.ndarray:
+        """Return the depths (k,) of pairs (k, 2) at the first pose [m]; 0 of pairs apart."""
+        rows = self._rows_at_first(pairs)
+        return np.maximum(0.0, -self._solver.batch(
+            self._starts, sizes=self._sizes, pairs=rows, patch=False).separation)
+
+    def _rows_at_first(self, pairs: np.ndarray) -> np.ndarray:
+        return self._rows(np.column_stack((np.zeros(len(pairs), np.int64), pairs)))

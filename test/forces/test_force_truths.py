@@ -115,15 +115,17 @@ def test_a_step_that_is_refused_makes_no_island_finer() -> None:
     assert world.poses.tobytes() == twin.poses.tobytes()
 
 
-def test_threads_change_no_bit() -> None:
+@pytest.mark.parametrize('threads, seconds', [
+    (5, 0.05), *(pytest.param(threads, 0.1, marks=pytest.mark.reports) for threads in (2, 5))])
+def test_threads_change_no_bit(threads: int, seconds: float) -> None:
     places = [(k % 20 - 10, k // 20 % 30 - 15, 0.26 + 0.52 * (k // 600)) for k in range(1200)]
     rows = [FLOOR, *(((0.5, 0.5, 0.5), 50.0, place, turned((1, 1, 0), 0.01 * (k % 7)))
                      for k, place in enumerate(places))]
     found = []
-    for threads in (1, 5):
-        world = World(*rows, threads=threads)
+    for count in (1, threads):
+        world = World(*rows, threads=count)
         world.forces.hold([(0, k) for k in range(1, 601)] + [(k, k + 600) for k in range(1, 601)])
-        found.append(world.run(0.05).poses.tobytes())
+        found.append(world.run(seconds).poses.tobytes())
     assert len(set(found)) == 1
 
 

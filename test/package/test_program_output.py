@@ -52,7 +52,9 @@ def test_help_into_a_closed_pipe_and_a_full_device(module, closed_pipe):
             NOT_WRITTEN, 'No space left on device\n')
 
 
-@pytest.mark.parametrize('options', [('--json',), (str(SHIP),)])
+@pytest.mark.parametrize('options', [
+    ('--json',), (str(SHIP),), pytest.param((), marks=pytest.mark.reports),
+    pytest.param(('--csv',), marks=pytest.mark.reports)])
 def test_answers_into_a_closed_pipe_and_a_full_device(options, closed_pipe):
     skip_without('plans.inspect_files')
     for unbuffered in '', '1':

@@ -43,6 +43,7 @@ class Wanted:
         held = self.judge(self.pairs, ways)
         for pair in held:
             self.judge_lift(pair, *(ways[box] for box in pair))
+            self.judge_depth(pair, *(ways[box] for box in pair))
 
     def way(self, box):
         """Return the poses (m, 7) of a box, and its centre of turning (3,)."""
@@ -103,6 +104,22 @@ class Wanted:
             if np.isfinite(impact.time) and share < 1.0:
                 self.first[pair] = (k + share + (1 - share) * impact.time,
                                     impact.closing_speed / (1 - share))
+                return
+
+    def judge_depth(self, pair, a, b):
+        """Set the time at which such a pair gets 0.1 mm deeper than it was, if that is the first.
+
+        Smaller boxes then touch, of which next to nothing is left where they are too thin.
+        """
+        sizes = self.scene.sizes[list(pair)]
+        depth = max(0.0, -ContactSolver(*sizes)(a[0][0], b[0][0]).separation)
+        solver = ContactSolver(*np.maximum(sizes - depth - 1e-4, 1e-3 * sizes))
+        for k in range(len(self.path) - 1):
+            impact = solver.time_of_impact(a[0][k], a[0][k + 1], b[0][k], b[0][k + 1],
+                                           centre_a=a[1], centre_b=b[1])
+            if np.isfinite(impact.time):
+                self.first[pair] = min(self.first.get(pair, (np.inf, 0.0)),
+                                       (k + impact.time, impact.closing_speed))
                 return
 
     def assert_is(self, answer):
@@ -230,6 +247,24 @@ def test_a_load_that_is_put_back_lands():
     assert answer.impacts.time[0] == pytest.approx(1 + 0.25 / 0.35, abs=1e-5)
     rests = solver.check_path(carried((0, 0, 1.5), (0.2, 0, 1.5), (0.1, 0, 1.5)))
     assert rests.is_free and 'load_low' in names_of(rests, rests.at_start)
+
+
+@pytest.mark.parametrize('clearance', [0.0, 0.2])
+@pytest.mark.parametrize('way, time', [
+    ([(1.1, 0, 0), (0.5, 0, 0)], 0.1 / 0.6), ([(1.1, 0, 0), (-3, 0, 0)], 0.1 / 4.1),
+    ([(0, 0, 1), (0, 0, 0)], 0.0), ([(0, 0, 1), (0, 0, 1.1), (0, 0, 0.8)], 1 + 0.1 / 0.3),
+    ([(0, 0, 0.9), (0, 0, 0.8)], 0.0), ([(0, 0, 1), (0, 0, 3)], None),
+    ([(0, 0, 0.9), (0, 0, 3)], None), ([(0, 0, 1), (0.3, 0, 1)], None),
+    ([(0, 0, 0.99995), (0, 0, 0.9999)], None)])
+def test_what_begins_within_the_clearance_must_not_get_into_each_other(way, time, clearance):
+    """Towards a cube, through it, into it from its top, and away; by 0.1 mm it may get deeper."""
+    scene = Scene({'cube': Box(UNIT, at(0, 0, 0)), 'load': Box(UNIT)}, patterns=(('*', '*'),),
+                  poses='array')
+    answer = SceneSolver(scene).check_path([[at(*place)] for place in way], clearance=clearance)
+    assert answer.is_free == (time is None)
+    if time is not None:
+        assert answer.impacts.time[0] == pytest.approx(time, abs=2e-3)
+        assert answer.impacts.nearest.distance[0] <= TOLERANCE
 
 
 def test_a_pair_that_parts_and_meets_on_one_segment():
