@@ -48,7 +48,7 @@ class PathCheck:
     at_start: np.ndarray
     """(l, 2) pairs within the clearance at the first pose. Until one is apart by it, at a pose or
     after a turn by 0.02 rad on the way there, it is an impact to get into each other, or deeper
-    than at first, by 0.1 mm."""
+    than at first, by 0.1 mm. Deeper than a box is thick, this is not judged."""
     least_pair: np.ndarray | None
     """(2,) the pair that comes nearest, of those never in `at_start`; None: there is none."""
     least: Approach | None
@@ -233,11 +233,12 @@ def _pressed(rides: Rides, pair: np.ndarray, depth: float) -> tuple[np.ndarray, 
     """Return the ride on which a pair first gets into each other, and when.
 
     depth: of the pair at the first pose [m]. Boxes that are smaller by so much, and by DEEPER, are
-    apart there.
+    apart there. Where one is not as thick as that, it is not known what is deeper.
     """
     near = np.column_stack((np.arange(rides.segments), np.tile(pair, (rides.segments, 1))))
     found = rides.solve(near, 0.0, smaller=depth + DEEPER)
     rows = _first_rows(near, found)
+    rows = rows[found.time[rows] > 0.0]
     near, found = near[rows], found[rows]
     places = (rides.poses_at(int(box), near[:, 0], found.time - near[:, 0]) for box in pair)
     return near, replace(found, nearest=ContactSolver(*rides.course.sizes[pair]).distance_batch(

@@ -109,7 +109,7 @@ class Wanted:
     def judge_depth(self, pair, a, b):
         """Set the time at which such a pair gets 0.1 mm deeper than it was, if that is the first.
 
-        Smaller boxes then touch, of which next to nothing is left where they are too thin.
+        Smaller boxes then touch. Where these touch from the start, no depth is judged.
         """
         sizes = self.scene.sizes[list(pair)]
         depth = max(0.0, -ContactSolver(*sizes)(a[0][0], b[0][0]).separation)
@@ -117,6 +117,8 @@ class Wanted:
         for k in range(len(self.path) - 1):
             impact = solver.time_of_impact(a[0][k], a[0][k + 1], b[0][k], b[0][k + 1],
                                            centre_a=a[1], centre_b=b[1])
+            if k + impact.time == 0.0:
+                return
             if np.isfinite(impact.time):
                 self.first[pair] = min(self.first.get(pair, (np.inf, 0.0)),
                                        (k + impact.time, impact.closing_speed))
@@ -255,7 +257,7 @@ def test_a_load_that_is_put_back_lands():
     ([(0, 0, 1), (0, 0, 0)], 0.0), ([(0, 0, 1), (0, 0, 1.1), (0, 0, 0.8)], 1 + 0.1 / 0.3),
     ([(0, 0, 0.9), (0, 0, 0.8)], 0.0), ([(0, 0, 1), (0, 0, 3)], None),
     ([(0, 0, 0.9), (0, 0, 3)], None), ([(0, 0, 1), (0.3, 0, 1)], None),
-    ([(0, 0, 0.99995), (0, 0, 0.9999)], None)])
+    ([(0, 0, 0.99995), (0, 0, 0.9999)], None), ([(0, 0, 0), (0, 0, 0)], None)])
 def test_what_begins_within_the_clearance_must_not_get_into_each_other(way, time, clearance):
     """Towards a cube, through it, into it from its top, and away; by 0.1 mm it may get deeper."""
     scene = Scene({'cube': Box(UNIT, at(0, 0, 0)), 'load': Box(UNIT)}, patterns=(('*', '*'),),
