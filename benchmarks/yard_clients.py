@@ -121,7 +121,8 @@ class Yard:
     def now(self) -> Scene:
         """Return the scene as a new one, with boxes in the order in which they came first."""
         boxes = {name: self.boxes[name] for name in self._first if name in self.boxes}
-        return Scene(boxes, self.scene.pairs, FRAME, 'named', self.scene.patterns, self.bodies)
+        return Scene(boxes, self.scene.pairs, FRAME, 'named', self.scene.patterns,
+                     dict(self.bodies))
 
 
 def random_pose(rng: np.random.Generator) -> tuple[float, ...]:
