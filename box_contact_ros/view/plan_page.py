@@ -222,7 +222,7 @@ def main(args: Sequence[str] | None = None) -> int:
     except (OSError, ValueError, MissingExtra) as error:
         print(one_line(error), file=sys.stderr)
         return NOT_READ
-    print(f'view: {page.url}', flush=True)
+    print(f'view: open {page.url}', flush=True)
     ended.wait()
     page.close()
     return 0

@@ -86,7 +86,7 @@ def test_a_ray_hits_the_first_box():
 
 def test_the_program(program, tmp_path):
     running = program('view', str(SHIP), '--port', '8460')
-    running.wait_for_output('view: http://127.0.0.1:')
+    running.wait_for_output('view: open http://127.0.0.1:')
     running.process.send_signal(signal.SIGTERM)
     assert running.process.wait(PATIENCE) == 0
     done = subprocess.run([sys.executable, '-m', 'box_contact_ros.view.view', str(tmp_path / 'no')],

@@ -64,7 +64,7 @@ class ViewNode(Listener):
             self._page = Page(host, self.values['port'], self.rows)
         except OSError as error:
             raise ValueError(f'host {host}: {error.strerror}') from error
-        print(f'view: {self._page.url}', flush=True)
+        print(f'view: open {self._page.url}', flush=True)
         self.create_timer(FRAME_PERIOD, self._draw)
 
     def destroy_node(self) -> None:
