@@ -73,8 +73,8 @@ CALLS = {'exact': ('exact', 'exact', 0), 'mlp': ('mlp', 'mlp', 12),
          'Drake hydroelastic': ('Drake', 'Drake', 0)}
 BATCHES = {'exact': ('exact', 'exact', 0), 'mlp-16-16': ('mlp, 16-16', 'mlp', 2),
            'mlp': ('32-32', 'mlp', -8),
-           'mlp, linear': ('linear map', 'other', 5),
-           'mlp, idle': ('last layer zeroed', 'other', 0),
+           'mlp, linear': ('linear, no bends', 'other', 5),
+           'mlp, idle': ('no network', 'other', 0),
            'paper': ('paper', 'paper', 0)}
 """Contestant: its name in a picture, whose colour it has, and how far it is raised [pt]."""
 PANELS = {'Goods at rest': ('settled', 'settled cubes'),
@@ -95,9 +95,9 @@ class Picture(NamedTuple):
 
 PICTURES = {
     'frontier': Picture('call_p50',
-                        'A call from Python: exact has no error, and is about the fastest',
+                        'A call from Python: distance from the point of exact, the reference',
                         'time of a call from Python [µs]', 1e-3, (0.1, 1e5), CALLS),
-    'frontier_batches': Picture('batch_p50', 'A batch: the network buys time at rest alone',
+    'frontier_batches': Picture('batch_p50', 'A batch: the network saves time at rest, and errs',
                                 'time of a pair in a batch [ns]', 1.0, (40.0, 1e3), BATCHES)}
 ERRORS = (1e-1, 3e2)
 """Errors that are drawn to scale [%]; 0 has a band of its own below."""

@@ -237,10 +237,12 @@ def main(args: Sequence[str] | None = None) -> int:
     output.write_csv(folder / 'landing.csv', map(csv_row, outcomes),
                      about=output.machine(PACKAGES))
     patches = [outcome for outcome in outcomes if outcome.way in PATCHES]
+    good = ', '.join(f'{sum(outcome.as_expected for outcome in patches if outcome.way == way)} of '
+                     f'{sum(outcome.way == way for outcome in patches)} by `{way}`'
+                     for way in dict.fromkeys(outcome.way for outcome in patches))
     output.write_page(
-        folder, 'landing', args, machine=output.machine(PACKAGES), all=len(patches),
-        good=sum(outcome.as_expected for outcome in patches), grid=grid_table(outcomes),
-        added=added_table(outcomes))
+        folder, 'landing', args, machine=output.machine(PACKAGES), good=good,
+        grid=grid_table(outcomes), added=added_table(outcomes))
     print(f'{grid_table(outcomes)}\n\n{added_table(outcomes)}')
     missed = [outcome for outcome in patches if not outcome.as_expected]
     for way, timing, landing, _ in missed:

@@ -13,6 +13,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, TypeVar
 
 from .models.make_model import check_model
@@ -75,8 +76,17 @@ def one_line(error: BaseException) -> str:
 
 def program_parser(program: str, doc: str | None, **options: Any) -> argparse.ArgumentParser:
     """Return the parser of a program, whose help begins with `doc`."""
-    return argparse.ArgumentParser(prog=program, description=doc, **options,
+    return argparse.ArgumentParser(prog=_as_typed(program), description=doc, **options,
                                    formatter_class=argparse.RawDescriptionHelpFormatter)
+
+
+def _as_typed(program: str) -> str:
+    """Return what starts a program: pip's name, or that of colcon, which ros2 run takes."""
+    started = Path(sys.argv[0])
+    if started.name == f'box_contact_{program}':
+        return started.name
+    is_colcons = (started.parent.name, started.name) == ('box_contact_ros', program)
+    return f'ros2 run box_contact_ros {program}' if is_colcons else program
 
 
 def model_name(text: str) -> str:
@@ -112,7 +122,7 @@ def parse_command_line(program: str, doc: str | None, settings: Mapping[str, Any
     lines = [f'  {name:<{width}}  {setting.description} (default: {default_text(setting.default)})'
              for name, setting in settings.items()]
     parser = program_parser(
-        program, doc, usage=f'{program} [-h] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ...]',
+        program, doc, usage='%(prog)s [-h] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ...]',
         epilog='parameters (--ros-args -p NAME:=VALUE):\n' + '\n'.join(lines))
     unknown = parser.parse_known_args(outside_ros_args(sys.argv[1:] if args is None else args))[1]
     if unknown:

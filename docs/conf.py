@@ -61,7 +61,7 @@ def contents(app: Sphinx, page: str, source: list[str]) -> None:
 def front(app: Sphinx, page: str, source: list[str]) -> None:
     """Put the first screen of the repository's README on top of the front page."""
     if page == 'README':
-        screen = (ROOT / 'README.md').read_text('utf-8').partition('\n## Use it from Python')[0]
+        screen = (ROOT / 'README.md').read_text('utf-8').partition('\n## Begin')[0]
         screen = re.sub(r'\]\((?!\w+:|docs/)', '](../', screen).replace('](docs/', '](')
         source[0] = screen + source[0].partition('\n')[2]
 

@@ -37,20 +37,20 @@ class Choice(NamedTuple):
 
     name: str
     contestant: str  # of frontier.csv
-    native: str = ''  # of native.csv, without `, single`
+    native: tuple[str, ...] = ()  # of native.csv, without `, single`; the second: with the patch
     rest: str = 'settled'  # set of goods at rest in frontier.csv
 
 
 CHOICES = (
-    Choice('`exact`', 'exact', 'exact volume'),
-    Choice('MuJoCo', 'MuJoCo mj_collision', 'mjc_BoxBox'),
-    Choice('PyBullet', 'PyBullet getContactPoints'),
+    Choice('`exact`', 'exact', ('exact volume', 'exact covariance')),
+    Choice('`mlp`', 'mlp', ('mlp volume', 'mlp covariance')),
+    Choice("the paper's network", 'paper', ('paper',), rest='settled cubes'),
+    Choice('MuJoCo', 'MuJoCo mj_collision', ('mjc_BoxBox',)),
+    Choice('PyBullet', 'PyBullet getContactPoints', ('Bullet btBoxBoxDetector',)),
+    Choice('Coal', 'Coal ComputeCollision', ('Coal ComputeCollision',)),
     Choice('Drake, hydroelastic', 'Drake hydroelastic'),
-    Choice('`mlp`', 'mlp', 'mlp volume'),
-    Choice("the paper's network", 'paper', 'paper', rest='settled cubes'),
-    Choice('polygon soup', 'soup-8'),
 )
-"""This package's default, the engines, and networks and soup as the source paper compares them."""
+"""This package's models, the network of the source paper, and the engines."""
 SHOWN = {'avx512': 'AVX-512', 'avx2': 'AVX2'}
 """Instruction sets as native.csv and frontier.csv call them, the README's first."""
 AT_REST, SWAY = 'settled by PatchForces', 'containers'  # sets of native.csv
@@ -92,20 +92,33 @@ def fastest(found: list[Row], column: str = 'instruction_set') -> Row | None:
                  if row[column] == name), found[0] if found else None)
 
 
-def point_error(choice: Choice, of_set: str) -> str:
-    """Return within what 99 % of the points are [% of the edge], by the best way to make one."""
+def error_rows(choice: Choice) -> list[Row]:
+    """Return the rows of a contestant's point at rest and landing: of its ways, the nearest one."""
     if choice.contestant == 'exact':
-        return 'reference'
-    p99 = [float(row['point_p99']) for row in rows(
+        return []
+    at_rest, landing = ({row['point']: row for row in rows(
         'frontier.csv', contestant=choice.contestant, set=of_set, **{'class': 'all'})
-        if row['point_p99']]
-    return number(float(f'{min(p99):.2g}'), 2) if p99 else '–'
+        if row['point_p99'] and row['instruction_set'] == SHOWN['avx2']}
+        for of_set in (choice.rest, 'landings'))
+    nearest = min(at_rest, key=lambda point: [sum(
+        float(of_set[point][column]) for of_set in (at_rest, landing))
+        for column in ('point_p99', 'point_p50')])
+    return [at_rest[nearest], landing[nearest]]
 
 
-def from_c(choice: Choice, way: str, of_set: str) -> str:
-    """Return the median time of a pair from C [ns]."""
-    row = fastest(rows('native.csv', set=of_set, contestant=f'{choice.native}, {way}'))
-    return cell(row, 'p50_ns', digits=3) if row else '–'
+def from_c(choice: Choice, of_set: str) -> str:
+    """Return the median times of a pair from C [ns]: alone, and with the patch's size."""
+    found = [fastest(rows('native.csv', set=of_set, contestant=f'{name}, single'))
+             for name in choice.native]
+    times = [cell(row, 'p50_ns', digits=3) for row in found if row]
+    return f'{times[0]} ({times[1]})' if len(times) > 1 else ''.join(times) or '–'
+
+
+def by_exact(contestant: str, of_set: str, what: str) -> str:
+    """Return the time of a call, or of a pair of a batch, divided by that of `exact`."""
+    row = fastest(rows('frontier.csv', contestant=contestant, set=of_set, **{'class': 'all'}))
+    assert row
+    return cell(row, f'{what}_by_exact', digits=2)
 
 
 def with_version(name: str, row: Row) -> str:
@@ -124,37 +137,40 @@ def models() -> str:
         call = fastest(rows('frontier.csv', contestant=choice.contestant, set=choice.rest,
                             **{'class': 'all'}))
         assert call
+        errors = [f'{cell(row, "point_p50", digits=2)}, {cell(row, "point_p99", digits=2)}'
+                  for row in error_rows(choice)] or ['reference'] * 2
+        share = float(call['contacts']) / float(call['judged'])
         body.append([with_version(choice.name, call), cell(call, 'call_p50', 1e3),
-                     *(from_c(choice, 'single', of_set) for of_set in (AT_REST, SWAY)),
-                     *(point_error(choice, of_set) for of_set in (choice.rest, 'landings'))])
+                     from_c(choice, AT_REST), from_c(choice, SWAY), *errors, f'{100 * share:.0f}'])
     table = markdown_table(
         ['one pair, one call', 'Python, at rest [µs]', 'C, at rest [ns]', 'C, moving [ns]',
-         'point error, at rest [%]', 'point error, landing [%]'], body)
+         'point off, at rest [%]', 'point off, landing [%]', 'answered, at rest [%]'], body)
     where = fastest(rows('native.csv', set=SWAY, contestant='exact volume, single'))
     assert where
-    return (f'{table}\n\nMedians on one core, {SHOWN[where["instruction_set"]]}, '
-            f'{where["processor"]}. Errors: the 99th percentile of distances, in % of the smaller '
-            "box's longest edge. At rest: goods that have settled; moving: swaying containers; "
-            'landing: containers that touch down. In Python, not in C, `exact` and `mlp` include '
-            "the patch's size. MuJoCo's time is of `mj_kinematics` and `mj_collision`, in C of its "
-            'box test. A dash: not measured.')
+    batches = [by_exact('mlp', of_set, 'batch') for of_set in ('settled', 'landings', SWAY)]
+    return (f'{table}\n\nMedian times on one core, {SHOWN[where["instruction_set"]]}, '
+            f'{where["processor"]}; in C those in brackets are with the size of the patch, which '
+            "Python includes. Off: median and 99th percentile of distances from `exact`'s point, "
+            "in % of the smaller box's longest edge. Of the ways in which an engine's points make "
+            'one, the nearest is taken. PyBullet needs five detections at a new pose. At rest: '
+            'goods that have settled; moving: swaying containers; landing: containers that touch '
+            'down. A dash: not measured.\n\n'
+            f'`exact` is the default. In batches from Python `mlp` takes {batches[0]} of its time '
+            f'at rest, {batches[1]} landing and {batches[2]} moving; for one pair it takes longer. '
+            f"The paper's network takes {by_exact('paper', 'landings', 'call')} landing.")
 
 
 def bench() -> str:
     """Return what the node's answers take beside an echo's, by the reports of the bench."""
-    found = {model: RATIOS.search((RESULTS / f'bench_{model}.md').read_text('utf-8'))
-             for model in ('exact', 'mlp')}
-    of_exact = (RESULTS / 'bench_exact.md').read_text('utf-8')
-    median, rate, machine = (each.search(of_exact) for each in (MEDIAN, RATE, MACHINE))
-    assert median and rate and machine and all(found.values())
-    exact, mlp = (line and line[1] for line in found.values())
-    soup = str(exact).partition('soup / contact ')[2].partition(' ')[0]
-    of_mlp = str(mlp).removeprefix('contact / echo ').partition(',')[0].partition(' ')[0]
-    ratio, _, rest = str(exact).removeprefix('contact / echo ').partition(' ')
+    text = (RESULTS / 'bench_exact.md').read_text('utf-8')
+    ratios, median, rate, machine = (each.search(text) for each in (RATIOS, MEDIAN, RATE, MACHINE))
+    assert ratios and median and rate and machine
+    soup = ratios[1].partition('soup / contact ')[2].partition(' ')[0]
+    ratio, _, rest = ratios[1].removeprefix('contact / echo ').partition(' ')
     return (f'Over ROS, an answer takes {ratio} times as long as that of an echo node, which sends '
-            f'each pose back and computes nothing (95 % interval {rest.partition("]")[0]}]; with '
-            f'`mlp` {of_mlp}; {machine[1]}). The median answer at {rate[1]} Hz takes {median[1]} '
-            f'ms, and that of the soup node {soup} times as long. See [the '
+            f'each pose back and computes nothing (95 % interval {rest.partition("]")[0]}]; '
+            f'{machine[1]}): which model answers is not felt. The median answer at {rate[1]} Hz '
+            f'takes {median[1]} ms, and that of the soup node {soup} times as long. See [the '
             'report](docs/results/bench_exact.md).')
 
 

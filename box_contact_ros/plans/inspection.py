@@ -215,12 +215,12 @@ class Inspection:
                 yield one if counts[lack] == 1 else more.format(counts[lack])
 
     def plot(self) -> Figure:
-        """Return a figure of the plan, coloured by verdict, with the load on each box in kN.
+        """Return a figure of the plan, coloured by verdict; the worst boxes have their names.
 
         It needs Matplotlib, the extra `report`.
         """
         from .plot import plot
-        return plot(self.plan, self.verdicts, self.load, self.summary())
+        return plot(self)
 
 
 def _side(margin: float) -> str:

@@ -213,6 +213,7 @@ class Scene:
     poses: str = 'topics'
     """How the poses of what moves come: one of POSES."""
     patterns: tuple[Pattern, ...] = ()
+    """Pairs of patterns of names of boxes or bodies, such as (('load', '*'), ('crane*', 'c?'))."""
     bodies: Mapping[str, Frame] = field(default_factory=dict)
     """Bodies by name; each box names the one that it is a part of."""
 

@@ -32,20 +32,20 @@ def add_light(scene: Any) -> None:
                                position=(0.0, 0.0, 1.0))
 
 
-def add_cubes(scene: Any, colours: np.ndarray, opacity: float) -> tuple[Any, Any]:
+def add_cubes(scene: Any, colours: np.ndarray, opacity: float, path: str = '') -> tuple[Any, Any]:
     """Return the faces and the edges of boxes, for a tick to move; colours (n, 3) from 0 to 255.
 
-    Boxes are instances of one cube, which move together.
+    Boxes are instances of one cube, which move together. path: of both, where there are others.
     """
     count = len(colours)
     no_turn, nothing = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.zeros((count, 3))
 
-    def add(path: str, corners: np.ndarray, triangles: np.ndarray, shades: np.ndarray,
+    def add(name: str, corners: np.ndarray, triangles: np.ndarray, shades: np.ndarray,
             **look: Any) -> Any:
         # viser takes the colours of single instances as light.
         light = (255.0 * (shades / 255.0) ** GAMMA).astype(np.uint8)
         return scene.add_batched_meshes_simple(
-            path, corners, triangles, no_turn, nothing, batched_scales=nothing,
+            path + name, corners, triangles, no_turn, nothing, batched_scales=nothing,
             batched_colors=light, lod='off', cast_shadow=False, receive_shadow=False, **look)
 
     # The steps of toons would cross a face, dark on one side.

@@ -4,6 +4,7 @@
 """A page in the browser that shows the plan of a file, and what is wrong with it.
 
 Boxes have the colour of their verdict. A click on a box shows its row, its mass and what is on it.
+A click on the name of a fault goes to its box. A switch hides what is sound.
 """
 from __future__ import annotations
 
@@ -26,6 +27,7 @@ from ..plans.inspect_plan import inspect_plan
 from ..plans.inspection import Inspection
 from ..plans.plot import COLOURS
 from ..plans.read_plan import read_any
+from ..solver.checks import printable
 from ..solver.pose import rotation_matrix
 from .style import unit_poses
 
@@ -33,6 +35,10 @@ OPACITY = 0.9
 PANEL_WIDTH, MOST_ROWS = 420, 200
 """Width of the panel [pixels], and rows that it shows."""
 CLICK_HINT = 'Click on a box to see its row.'
+MOST_NAMES = 40
+"""Boxes with a button to go there: the worst."""
+AWAY = 3.0
+"""How far the camera goes from a box [of half its diagonal], with what is around it in view."""
 
 
 class PlanPage:
@@ -51,6 +57,8 @@ class PlanPage:
         gui.main_panel.set_width(PANEL_WIDTH)
         self._clicked = gui.add_html(_section('clicked', CLICK_HINT), order=0.0)
         gui.add_html(table(title, found), order=1.0)
+        self._middle = np.zeros(3)  # of what is drawn [m]
+        self._shown = np.ones(len(found.plan), bool)
         self._draw()
 
     def close(self) -> None:
@@ -80,23 +88,68 @@ class PlanPage:
         seen = free if len(free) else np.arange(len(plan))
         low = (poses[seen, :3] - half[seen]).min(axis=0)
         high = (poses[seen, :3] + half[seen]).max(axis=0)
-        middle, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
-        meshes = add_cubes(scene, colours, OPACITY)
-        for mesh in meshes:
-            mesh.batched_positions = poses[:, :3] - middle
-            mesh.batched_wxyzs = np.roll(poses[:, 3:], 1, axis=1)
-            mesh.batched_scales = plan.sizes
-
-        @meshes[0].on_click
-        def _(event: Any) -> None:
-            box = hit_by(plan.sizes, poses, np.array(event.ray_origin) + middle,
-                         np.array(event.ray_direction))
-            if box is not None:
-                self.select(box)
-
+        self._middle, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+        sound = self.found.verdicts == 'sound'
+        quiet: list[Any] = []
+        for name, boxes in (('/sound', np.flatnonzero(sound)), ('/faults', np.flatnonzero(~sound))):
+            if not len(boxes):
+                continue
+            meshes = add_cubes(scene, colours[boxes], OPACITY, name)
+            for mesh in meshes:
+                mesh.batched_positions = poses[boxes, :3] - self._middle
+                mesh.batched_wxyzs = np.roll(poses[boxes, 3:], 1, axis=1)
+                mesh.batched_scales = plan.sizes[boxes]
+            quiet += meshes if name == '/sound' else ()
+            meshes[0].on_click(self._hit)
+        self._add_controls(quiet)
         camera = self._server.initial_camera
         camera.position = camera_position(radius, camera.fov, NARROW)
         camera.look_at = np.zeros(3)
+
+    def _hit(self, event: Any) -> None:
+        """Select the box that a click hits."""
+        plan, shown = self.found.plan, np.flatnonzero(self._shown)
+        hit = hit_by(plan.sizes[shown], unit_poses(plan.poses[shown]),
+                     np.array(event.ray_origin) + self._middle, np.array(event.ray_direction))
+        if hit is not None:
+            self.select(int(shown[hit]))
+
+    def _add_controls(self, quiet: list[Any]) -> None:
+        """Add a switch that hides what is sound, and a button for each of the worst boxes."""
+        gui = self._server.gui
+        if worst := worst_boxes(self.found):
+            buttons = gui.add_button_group('go to', list(worst), order=0.5)
+
+            @buttons.on_click
+            def _(event: Any) -> None:
+                self.go_to(worst[buttons.value], event.client)
+        if quiet:
+            switch = gui.add_checkbox('hide what is sound', False, order=0.6)
+
+            @switch.on_update
+            def _(_: Any) -> None:
+                self._shown = (self.found.verdicts != 'sound') | (not switch.value)
+                for mesh in quiet:
+                    mesh.visible = not switch.value
+
+    def go_to(self, box: int, client: Any) -> None:
+        """Select a box, by index, and move a client's camera there."""
+        from .drawing import NARROW, camera_position
+
+        self.select(box)
+        plan, camera = self.found.plan, client.camera
+        place = plan.poses[box, :3] - self._middle
+        radius = AWAY * 0.5 * float(np.linalg.norm(plan.sizes[box]))
+        with client.atomic():
+            camera.position = place + camera_position(radius, camera.fov, NARROW)
+            camera.look_at = place
+
+
+def worst_boxes(found: Inspection) -> dict[str, int]:
+    """Return the boxes with a fault, the worst first, at most MOST_NAMES: names to indices."""
+    index = {name: box for box, name in enumerate(found.plan.names)}
+    names = dict.fromkeys(name for row in found.rows() for name in row.names if name in index)
+    return {printable(name): index[name] for name in list(names)[:MOST_NAMES]}
 
 
 def hit_by(sizes: np.ndarray, poses: np.ndarray, origin: np.ndarray, direction: np.ndarray,
@@ -169,7 +222,7 @@ def main(args: Sequence[str] | None = None) -> int:
     except (OSError, ValueError, MissingExtra) as error:
         print(one_line(error), file=sys.stderr)
         return NOT_READ
-    print(f'view: {page.url}', flush=True)
+    print(f'view: open {page.url}', flush=True)
     ended.wait()
     page.close()
     return 0

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 
 from ..arguments import outside_ros_args, program_main
+from ..extras import MissingExtra, require
 
 
 @program_main
@@ -17,6 +18,10 @@ def main(args: Sequence[str] | None = None) -> int:
     if any(not arg.startswith('-') for arg in outside_ros_args(args)):
         from . import plan_page
         return plan_page.main(args)
+    try:
+        require('ros')
+    except MissingExtra as error:
+        raise MissingExtra(f'{error}; or name a FILE to see its plan', name=error.name) from None
     from .live import view_node
     return view_node.main(args)
 

@@ -5,7 +5,7 @@
 
 It needs Matplotlib, and writes first_contact.png. It prints:
 
-    point [1.     0.25   1.2905]
+    point [1.     0.     1.2905]
 """
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from matplotlib import pyplot as plt
 from box_contact_ros import ContactSolver
 
 CONTAINER = (12.192, 2.438, 2.591)  # [m]
-LOAD, STACK = (2, 0.5, 2.581, 0, 0, 0, 1), (0, 0, 0, 0, 0, 0, 1)
+LOAD, STACK = (2, 0, 2.581, 0, 0, 0, 1), (0, 0, 0, 0, 0, 0, 1)
 
 
 def main() -> None:

@@ -3,8 +3,9 @@
 
 """Draw how data go through the package: `python docs/figures/make_architecture.py`.
 
-It writes `architecture.svg` next to this file, or into the folder of `--out`. An arrow carries what
-stands beside it, from what comes in above to what goes out below.
+It writes `architecture.svg`, and `ros.svg` of the contact node, next to this file or into the
+folder of `--out`. An arrow carries what stands beside it, from what comes in above to what goes
+out below.
 """
 from __future__ import annotations
 
@@ -38,13 +39,22 @@ FLOWS = [  # from, to, and what goes there
     ('forces', 'program out', 'wrenches or poses, loads'),
     ('inspect', 'verdict', 'causes, loads'),
 ]
+NODE = {
+    'poses': (0, 0, 'your simulator', 'two boxes, or a yard'),
+    'node': (0, 1, 'contact_node', 'exact, or SAT and mlp'),
+    'contacts': (0, 2, 'your controller', 'or RViz, ros2 bag'),
+}
+TOPICS = [('poses', 'node', 'box_a/pose, box_b/pose'),
+          ('node', 'contacts', 'contact/point, contact/normal')]
+"""The same of `ros.svg`."""
 WIDTH, HEIGHT, COLUMN, ROW = 190, 50, 290, 100
 
 
-def drawing() -> str:
+def drawing(places: dict[str, tuple[int, int, str, str]], flows: list[tuple[str, str, str]],
+            ) -> str:
     """Return the SVG."""
     middle = {key: (20 + WIDTH / 2 + COLUMN * column, 20 + HEIGHT / 2 + ROW * row)
-              for key, (column, row, *_) in PLACES.items()}
+              for key, (column, row, *_) in places.items()}
     width = max(x for x, _ in middle.values()) + WIDTH / 2 + 20
     height = max(y for _, y in middle.values()) + HEIGHT / 2 + 20
     lines = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" '
@@ -52,7 +62,7 @@ def drawing() -> str:
              '<defs><marker id="head" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="8" '
              'markerHeight="8" orient="auto"><path d="M0,0 L10,5 L0,10 z" fill="#555"/></marker>'
              '</defs>', f'<rect width="{width:g}" height="{height:g}" fill="white"/>']
-    for start, end, what in FLOWS:
+    for start, end, what in flows:
         (x1, y1), (x2, y2) = middle[start], middle[end]
         aside = (x2 > x1) - (x2 < x1)
         x1, x2, y1, y2 = (x1 + 0.3 * aside * WIDTH, x2 - 0.3 * aside * WIDTH,
@@ -63,8 +73,9 @@ def drawing() -> str:
                   f'<text x="{x:g}" y="{y:g}" font-size="12" fill="#333" stroke="white" '
                   f'stroke-width="5" paint-order="stroke">{what}</text>']
     for key, (x, y) in middle.items():
-        name, what = PLACES[key][2:]
-        fill, line = ('#e8eef5', '#4477aa') if '/' in name else ('white', '#999')
+        name, what = places[key][2:]
+        is_ours = '/' in name or name.endswith('_node')
+        fill, line = ('#e8eef5', '#4477aa') if is_ours else ('white', '#999')
         lines += [f'<rect x="{x - WIDTH / 2:g}" y="{y - HEIGHT / 2:g}" width="{WIDTH}" '
                   f'height="{HEIGHT}" rx="6" fill="{fill}" stroke="{line}"/>',
                   f'<text x="{x:g}" y="{y - 4:g}" font-weight="bold">{name}</text>',
@@ -76,13 +87,14 @@ def main() -> None:
     """Write the drawing; a folder that it names must be there."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--out', type=Path, default=Path(__file__).parent,
-                        help='folder for architecture.svg (default: that of this program)')
+                        help='folder for both (default: that of this program)')
     folder = parser.parse_args().out
     for _, _, name, _ in PLACES.values():
         for part in name.split(', '):
             if part.endswith('/') and not (PACKAGE / part).is_dir():
                 raise FileNotFoundError(f'the package has no folder {part}')
-    (folder / 'architecture.svg').write_text(drawing(), 'utf-8')
+    (folder / 'architecture.svg').write_text(drawing(PLACES, FLOWS), 'utf-8')
+    (folder / 'ros.svg').write_text(drawing(NODE, TOPICS), 'utf-8')
 
 
 if __name__ == '__main__':

@@ -16,6 +16,7 @@ import numpy as np
 
 from box_contact_ros import (
     ContactSolver,
+    Plan,
     SceneSolver,
     inspect_plan,
     read_plan,
@@ -46,6 +47,7 @@ CONTAINER = (12.192, 2.438, 2.591)
 DEPTHS = {0.05: '#222222', 0.5e-3: '#777777', 0.03e-3: '#aaaaaa'}
 """Depths of the lowest corner in the graph [m], from a hard landing to rest, and their colours."""
 RIVAL_DEPTH = 0.5e-3  # at which MuJoCo's point is drawn [m]
+ORDER = '00100003/'  # of BED-BPP
 LEAST_TILT = 1e-4  # up to which the axis is linear [°]
 
 
@@ -238,11 +240,18 @@ def trihedron(folder: Path) -> None:
 
 
 def pallets(folder: Path) -> None:
-    """Draw pallets.png: five real orders, coloured by cause."""
-    orders = Path(__file__).parents[1] / 'examples' / 'pallets' / 'packing_plans.json'
-    figure = inspect_plan(read_plan(orders)).plot()
-    figure.set_size_inches(9, 5)
-    figure.savefig(folder / 'pallets.png', dpi=80, metadata={'Software': None})
+    """Draw pallets.png, a real order, and pallet.png, a file of the docs, coloured by cause."""
+    examples = Path(__file__).parents[1] / 'examples'
+    orders = read_plan(examples / 'pallets' / 'packing_plans.json')
+    kept = [n for n, name in enumerate(orders.names)
+            if name.startswith(ORDER) or n in orders.ground]
+    order = Plan(orders.sizes[kept], orders.poses[kept], orders.masses[kept],
+                 ground=len(kept) - 1, names=[orders.names[n].removeprefix(ORDER) for n in kept])
+    for name, plan, size in (('pallets', order, (6.6, 6.0)),
+                             ('pallet', read_plan(examples / 'files' / 'pallet.csv'), (7.0, 4.0))):
+        figure = inspect_plan(plan).plot()
+        figure.set_size_inches(*size)
+        figure.savefig(folder / f'{name}.png', dpi=80, metadata={'Software': None})
 
 
 def main() -> None:

@@ -128,7 +128,7 @@ def test_a_run_writes_table_and_rows(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(landing, 'DRAWN', dict([*landing.DRAWN.items()][1::2]))  # for the time
     assert landing.main(['--quick', '--ways', 'exact', 'manifold', '--out', str(tmp_path)]) == 0
     page = (tmp_path / 'landing.md').read_text()
-    assert '**2 of 2** landings by patches' in page
+    assert '2 of 2 by `exact` did' in page
     assert '| exact | 200 | 2 | 1/1 | 1/1 |' in page
     with (tmp_path / 'landing.csv').open() as file:
         rows = list(csv.DictReader(file))
@@ -221,6 +221,6 @@ def test_what_is_not_as_expected_is_named(tmp_path, monkeypatch, capsys):
     told = capsys.readouterr().err
     for way in ('exact', 'mlp'):
         assert f'{way} at 200 Hz and 2 ms, grid 17: not as expected' in told
-    assert '**0 of 2** landings by patches' in (tmp_path / 'landing.md').read_text()
+    assert '0 of 1 by `exact`, 0 of 1 by `mlp` did' in (tmp_path / 'landing.md').read_text()
     monkeypatch.setattr(landing, 'GATED', 'manifold')
     assert landing.main(['--quick', '--ways', 'exact', '--out', str(tmp_path)]) == 0

@@ -65,3 +65,10 @@ def test_each_module_of_an_extra_is_known() -> None:
     """A module that our programs import, but that no table has, would end in a traceback."""
     assert extras.EXTRA_OF.keys() >= ABSENT - {
         'catkin_pkg', 'coal', 'hypothesis', 'pybullet', 'rosbags'}
+
+
+def test_view_without_ros_asks_for_a_file() -> None:
+    done = alone('box_contact_ros.view.view')
+    assert (done.returncode, done.stderr.count('\n')) == (1, 1)
+    assert done.stderr.endswith('; or name a FILE to see its plan\n') and '.[ros]' in done.stderr
+    assert 'view FILE' in alone('box_contact_ros.view.view', '--help').stdout

@@ -21,6 +21,7 @@ from patience import PATIENCE
 
 import box_contact_ros
 from box_contact_ros import resources
+from box_contact_ros.arguments import program_parser
 from box_contact_ros.resources import resource_path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -142,7 +143,7 @@ def test_help_of_each_program(program: str, module: str, capsys: pytest.CaptureF
     monkeypatch.setattr(sys, 'argv', [f'bin/box_contact_{program}', '--help'])
     with pytest.raises(SystemExit, match='0'):
         main()
-    assert capsys.readouterr().out.startswith(f'usage: {program}')
+    assert capsys.readouterr().out.startswith(f'usage: box_contact_{program}')
 
 
 # --- metadata -------------------------------------------------------------------------------------
@@ -246,3 +247,12 @@ def test_a_build_without_a_compiler_names_it() -> None:
     assert done.stderr.splitlines()[-1] == (
         'error: box_contact_ros is built with /no/such/compiler, which is not here '
         '(Debian, Ubuntu: apt install g++)')
+
+
+@pytest.mark.parametrize('path, typed', [
+    ('/usr/bin/box_contact_view', 'box_contact_view'),
+    ('/ws/install/lib/box_contact_ros/view', 'ros2 run box_contact_ros view'),
+    ('/src/box_contact_ros/view/view.py', 'view')])
+def test_help_names_a_program_as_it_is_typed(monkeypatch, path, typed):
+    monkeypatch.setattr(sys, 'argv', [path])
+    assert program_parser('view', '').format_usage().startswith(f'usage: {typed} [')

@@ -372,7 +372,7 @@ def test_the_picture_has_the_legend_of_what_it_shows():
     words = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     assert words == ['sound', 'unsupported']
     labels = [text.get_text() for text in figure.axes[0].texts]
-    assert labels == [f'{found.load[1] / 1e3:.3g}']
+    assert labels == ['2: unsupported\nshare 0.40, centre 100 mm outside']
 
 
 def test_many_boxes_show_progress(monkeypatch, capsys):

@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from contextlib import closing, contextmanager
 from pathlib import Path
 
@@ -22,7 +23,15 @@ from browser import chromium, open_page
 
 from box_contact_ros import Plan, inspect_plan, read_plan
 from box_contact_ros.solver.pose import rotation_matrix
-from box_contact_ros.view.plan_page import CLICK_HINT, PlanPage, hit_by, lines_of, table
+from box_contact_ros.view.plan_page import (
+    CLICK_HINT,
+    MOST_NAMES,
+    PlanPage,
+    hit_by,
+    lines_of,
+    table,
+    worst_boxes,
+)
 
 SHIP = Path(__file__).resolve().parents[2] / 'docs' / 'examples' / 'files' / 'ship.edi'
 
@@ -39,6 +48,15 @@ def test_what_is_known_of_a_box(found):
     assert lines[:2] == ['0090102: sound', '21,000 kg'] and lines[-1] == '6.058 × 2.438 × 2.591 m'
     afloat = inspect_plan(Plan((1, 1, 1), [[0, 0, 0, 0, 0, 0, 1]], names=['a']))  # nothing is fixed
     assert lines_of(afloat, 0)[0] == 'a: not judged'
+
+
+def test_the_worst_boxes_have_buttons(found):
+    """What falls comes before what goes with it; of many there are forty."""
+    assert list(worst_boxes(found)) == ['0100304', '0100306']
+    assert [found.plan.names[box] for box in worst_boxes(found).values()] == list(
+        worst_boxes(found))
+    poses = [[3.0 * x, 0, 0, 0, 0, 0, 1] for x in range(60)]
+    assert len(worst_boxes(inspect_plan(Plan((1, 1, 1), poses, ground=0)))) == MOST_NAMES
 
 
 def test_a_page_bears_any_name_of_a_file(found):
@@ -68,7 +86,7 @@ def test_a_ray_hits_the_first_box():
 
 def test_the_program(program, tmp_path):
     running = program('view', str(SHIP), '--port', '8460')
-    running.wait_for_output('view: http://127.0.0.1:')
+    running.wait_for_output('view: open http://127.0.0.1:')
     running.process.send_signal(signal.SIGTERM)
     assert running.process.wait(PATIENCE) == 0
     done = subprocess.run([sys.executable, '-m', 'box_contact_ros.view.view', str(tmp_path / 'no')],
@@ -117,6 +135,19 @@ def test_the_page_in_a_browser(found, is_busy, tmp_path):
                         clickCount=1)
         tab.wait_for(f'document.getElementById("clicked").innerText != {CLICK_HINT!r}')
         assert tab.text('clicked').startswith('unsupported')
+
+        tab.evaluate('[...document.querySelectorAll("button")].find('
+                     'button => button.innerText == "0100306").click()')
+        tab.wait_for('document.getElementById("clicked").innerText.startsWith("goes with")')
+        switch = '[...document.querySelectorAll("input[type=checkbox]")].at(-1)'
+        assert page._shown.all()
+        tab.evaluate(f'{switch}.click()')
+        tab.wait_for(f'{switch}.checked')
+        for _ in range(200):
+            if not page._shown.all():
+                break
+            time.sleep(0.05)
+        assert page._shown.tolist() == (found.verdicts != 'sound').tolist()
 
 
 @pytest.mark.skipif(chromium() is None, reason='no browser is installed')

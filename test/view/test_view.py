@@ -366,6 +366,15 @@ def test_the_legend_names_the_boxes():
     pairs = tuple(Pair.between(name, 'stack') for name in boxes if name != 'stack')
     text = legend(SceneRows(Scene(boxes, pairs)))
     assert '&lt;b&gt;, l1, l2 and 2 more' in text and '&nbsp;stack ' in text
+    assert 'near' not in text and 'near: distance' in legend(ROWS, near=True)
+
+
+def test_a_late_force_is_that_of_the_chart():
+    """It was a dash beside a chart with its last value."""
+    with closing(Page('127.0.0.1', 8450, ROWS)) as page:
+        for step, force in enumerate((math.nan, 196.2e3, math.nan)):
+            page.show(tick_of(START + step, TOUCHING, {PAIR: EXACT}), force, model='exact')
+            assert shown(page._figures.content)['force'] == ('196.2 kN' if step else '–')
 
 
 @pytest.mark.parametrize(('volume', 'words'), [
@@ -386,7 +395,7 @@ def test_the_name_of_a_model_is_text():
 
 def test_the_program_tells_its_address_and_ends(program):
     running = program('view', '--ros-args', '-p', 'scene:=config/scenes/yard_bay.yaml')
-    running.wait_for_output('view: http://127.0.0.1:')
+    running.wait_for_output('view: open http://127.0.0.1:')
     running.signal(signal.SIGINT)
     assert running.wait() == 0, running.output
 
@@ -640,7 +649,7 @@ def test_a_landing_in_a_browser(program):
     The browser renders in software and takes all cores.
     """
     running = program('demo.demo', '--view', '--model', 'mlp')
-    url = re.search(r'http://127\.0\.0\.1:\d+', running.wait_for_output('view: http')).group()
+    url = re.search(r'http://127\.0\.0\.1:\d+', running.wait_for_output('view: open http')).group()
     with open_page(url, 640, 360) as tab:
         verdict = 'document.getElementById("verdict")?.innerText'
         try:

@@ -51,8 +51,8 @@ class Page:
         self._figures = gui.add_html('', order=0.0)
         self._history: deque[tuple[float, float, float]] = deque()  # time [s], depth, force
         self._charts: dict[str, Any] = {}
-        gui.add_html('<div id="legend" style="padding:0 0.7em 0.6em;font-size:0.78em">'
-                     f'{legend(rows)}</div>', order=1.0)
+        self._legend = gui.add_html('', order=1.0)
+        self._has_near = False
         self._seen = 0  # boxes; each that joins brings all of them into view
         self._origin = np.zeros(3)
         self._add_drawing(rows)
@@ -111,6 +111,7 @@ class Page:
         self._rows = rows
         colours = np.where(rows.is_a[:, None], style.BOX_A, style.BOX_B)
         self._faces, self._edges = add_cubes(self._server.scene, colours, style.BOX_OPACITY)
+        self._legend.content = legend(rows, near=self._has_near)
 
     def _draw_boxes(self, tick: DrawnTick, known: np.ndarray) -> None:
         """Move the boxes; those without a pose shrink to nothing."""
@@ -140,6 +141,9 @@ class Page:
         """Draw dashed lines between nearest points; the distance of the nearest is written."""
         is_near = answer is not None and len(answer.near) > 0
         self._near.visible = self._distance.visible = is_near
+        if is_near and not self._has_near:
+            self._has_near = True
+            self._legend.content = legend(self._rows, near=True)
         if answer is not None and is_near:
             a, b = answer.near.point_a - self._origin, answer.near.point_b - self._origin
             self._near.points = style.dashes(a, b)
@@ -184,6 +188,9 @@ class Page:
             self._history.append((time, 1e3 * depth, 1e-3 * force))
             while time - self._history[0][0] > HISTORY:
                 self._history.popleft()
+        # As the chart does: a force that is late for this tick is not unknown.
+        force = next((1e3 * known for _, _, known in reversed(self._history)
+                      if not math.isnan(known)), force)
         with self._server.atomic():
             self._figures.content = figures(tick, force, model=model, lands_again=lands_again)
             if self._history:
@@ -220,13 +227,18 @@ class Page:
             height=CHART_HEIGHT + (0 if above else TIMES_HEIGHT), order=3.0 - above)
 
 
-def legend(rows: SceneRows) -> str:
-    """Return which colour stands for what, as HTML: boxes by their first names."""
+def legend(rows: SceneRows, *, near: bool = False) -> str:
+    """Return which colour stands for what, as HTML: boxes by their first names.
+
+    near: whether lines between nearest points were drawn.
+    """
     names = np.array(list(rows.scene.boxes), dtype=object)
     parts = [(style.BOX_A, names[rows.is_a]), (style.BOX_B, names[~rows.is_a]),
-             (style.CONTACT, ['contact: point, normal, patch']), (style.NEAR, ['near: distance'])]
-    return ''.join(f'<span style="color:rgb{colour}">■</span>&nbsp;'  # no square ends a line
-                   f'{html.escape(_first(words))} &ensp;' for colour, words in parts if len(words))
+             (style.CONTACT, ['contact: point, normal, patch']),
+             (style.NEAR, ['near: distance'] if near else [])]
+    spans = ''.join(f'<span style="color:rgb{colour}">■</span>&nbsp;'  # no square ends a line
+                    f'{html.escape(_first(words))} &ensp;' for colour, words in parts if len(words))
+    return f'<div id="legend" style="padding:0 0.7em 0.6em;font-size:0.78em">{spans}</div>'
 
 
 def _first(names: Sequence[str]) -> str:

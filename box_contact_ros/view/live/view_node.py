@@ -6,6 +6,9 @@
 It draws the boxes of a scene as the running nodes publish them, and the contacts that answer them.
 It also shows which model the contact node runs, and the force on a crane's load. It prints the
 page's address.
+
+`view FILE` shows the plan of a file instead, and what is wrong with it. It needs no ROS:
+`view FILE --help`.
 """
 from __future__ import annotations
 
@@ -61,7 +64,7 @@ class ViewNode(Listener):
             self._page = Page(host, self.values['port'], self.rows)
         except OSError as error:
             raise ValueError(f'host {host}: {error.strerror}') from error
-        print(f'view: {self._page.url}', flush=True)
+        print(f'view: open {self._page.url}', flush=True)
         self.create_timer(FRAME_PERIOD, self._draw)
 
     def destroy_node(self) -> None:
