@@ -12,7 +12,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,19 +21,14 @@ import numpy as np
 
 from ..core import LENGTH_MAX, MASS_MAX
 from ..solver.checks import nearest_name, pose_fault, short_repr, size_fault
+from .forms import EXTENTS, PLACE, TURN, means_amount
 from .plan import Fault, Plan
 
-EXTENTS, PLACE, TURN = ('length', 'width', 'height'), ('x', 'y', 'z'), ('qx', 'qy', 'qz', 'qw')
 NEEDED = ('name', *EXTENTS, *PLACE)
 KEYS = (*NEEDED, *TURN, 'mass', 'limit', 'fixed')
 DELIMITERS = ',;\t'
 WORDS = {'true': True, '1': True, 'yes': True, 'false': False, '0': False, 'no': False, '': False}
 """What `fixed` may be in a CSV file."""
-AMOUNT = re.compile(
-    '.*(mass|weight|gewicht|poids|peso|limit|capacity|strength|payload|traglast|auflast).*|'
-    'kgs?|kilos?|kilograms?|lbs?|kn|tons?|tonnes?|gross|net|tare|brutto|'
-    'netto|vgm|max|maximum|stackable|maxload')
-"""Words in the names of columns that may mean a mass or a limit."""
 UNTURNED = (0.0, 0.0, 0.0, 1.0)
 GROUND, GROUND_THICKNESS, GROUND_MARGIN = 'ground', 1.0, 1.0
 """Name, thickness, and how far it reaches beyond the boxes [m]."""
@@ -140,12 +134,6 @@ def unread(values: Mapping[str, Any]) -> list[Fault]:
                        'limit [kg]', 'not all judged', 'part'),
                       (parts, 'not read, and may have boxes', 'not all judged', 'part'),
                       (others, 'not read', 'sound', '')) if names]
-
-
-def means_amount(key: str) -> bool:
-    """Return whether a name may mean a mass or a limit, such as gross_weight, kg or maxLoad."""
-    words = re.findall('[a-zäöüß]+', re.sub('([a-z])([A-Z])', r'\1 \2', key).lower())
-    return any(map(AMOUNT.fullmatch, words)) or words[-1:] == ['load']
 
 
 def _placements(container: Any) -> Iterator[dict[str, Any]]:

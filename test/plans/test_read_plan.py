@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from box_contact_ros.plans.forms import means_amount
 from box_contact_ros.plans.inspect_plan import inspect_plan
-from box_contact_ros.plans.packing import means_amount
 from box_contact_ros.plans.plan import Plan
 from box_contact_ros.plans.read_plan import read_any, read_plan
 from box_contact_ros.solver.contacts_of import contacts_of
