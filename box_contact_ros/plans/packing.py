@@ -22,14 +22,13 @@ import numpy as np
 from ..core import LENGTH_MAX, MASS_MAX
 from ..solver.checks import nearest_name, pose_fault, short_repr, size_fault
 from .forms import EXTENTS, PLACE, TURN, means_amount
-from .plan import Fault, Plan
+from .plan import UNTURNED, Fault, Plan
 
 NEEDED = ('name', *EXTENTS, *PLACE)
 KEYS = (*NEEDED, *TURN, 'mass', 'limit', 'fixed')
 DELIMITERS = ',;\t'
 WORDS = {'true': True, '1': True, 'yes': True, 'false': False, '0': False, 'no': False, '': False}
 """What `fixed` may be in a CSV file."""
-UNTURNED = (0.0, 0.0, 0.0, 1.0)
 GROUND, GROUND_THICKNESS, GROUND_MARGIN = 'ground', 1.0, 1.0
 """Name, thickness, and how far it reaches beyond the boxes [m]."""
 ROOM = 1.0  # between the stacks of one file, which are placed side by side [m]

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,6 +35,8 @@ FAULT_KINDS = {
     'shape': ('not all judged', 'shape'), 'support': ('not all judged', 'support'),
     'column': ('sound', '')}
 """What may be wrong with a row of a file: the best verdict with it, and what it lacks."""
+UNTURNED = (0.0, 0.0, 0.0, 1.0)
+"""The quaternion x y z w of a box that is not turned."""
 LACKS = {
     '': ('', ''), 'place': ('1 box was not placed', '{:,} boxes were not placed'),
     'weight': ('1 has no weight', '{:,} have no weight'),
@@ -137,6 +140,18 @@ class Plan:
         for row, fault in enumerate(self.faults):
             if not isinstance(fault, Fault):
                 raise ValueError(f'faults[{row}] must be a Fault, not {short_repr(fault)}')
+
+    @classmethod
+    def from_corners(cls, least: ArrayLike, sizes: ArrayLike, masses: ArrayLike | None = None,
+                     **known: Any) -> Plan:
+        """Return the plan of boxes that are not turned, by the least corner of each (n, 3) [m].
+
+        The rest is as `Plan` takes it. Raises ValueError, with field, row and value, for bad input.
+        """
+        least = as_floats(least, 'least', 'corners (n, 3) of rows x y z', (None, 3))
+        turns = np.tile(UNTURNED, (len(least), 1))
+        sizes, _ = as_boxes(sizes, np.hstack((least, turns)), names=('sizes', 'least'))
+        return cls(sizes, np.hstack((least + sizes / 2.0, turns)), masses, **known)
 
     def _set(self, **fields: object) -> None:
         for name, value in fields.items():
