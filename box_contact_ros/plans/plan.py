@@ -35,6 +35,7 @@ FAULT_KINDS = {
     'shape': ('not all judged', 'shape'), 'support': ('not all judged', 'support'),
     'column': ('sound', '')}
 """What may be wrong with a row of a file: the best verdict with it, and what it lacks."""
+NO_ROOM = ((-np.inf,) * 3, (np.inf,) * 3)
 UNTURNED = (0.0, 0.0, 0.0, 1.0)
 """The quaternion x y z w of a box that is not turned."""
 LACKS = {
@@ -109,17 +110,21 @@ class Plan:
     """(a, 2) pairs of boxes, by index, that neither touch nor overlap wherever they are."""
     faults: tuple[Fault, ...]
     """What is wrong with the file that the plan is from."""
+    room: np.ndarray
+    """(n, 2, 3) the least and the greatest corner of the inner space that each box must be in [m];
+    infinite where there is none."""
 
     def __init__(self, sizes: ArrayLike, poses: ArrayLike, masses: ArrayLike | None = None, *,
                  ground: ArrayLike = (), names: Sequence[str] | None = None,
                  centres: ArrayLike | None = None, limits: ArrayLike | None = None,
                  body: ArrayLike | None = None, apart: ArrayLike = (),
-                 faults: Iterable[Fault] = ()) -> None:
+                 faults: Iterable[Fault] = (), room: ArrayLike | None = None) -> None:
         """Take what is known; None is what the fields say of what is not.
 
         sizes: full extents (n, 3), or (3,) of all boxes. masses: (n,), or a number for all boxes.
         ground: a box or boxes. names: None are '0', '1', and so on. centres: (n, 3); None are the
-        boxes' own centres. body: (n,); None is a body for each box.
+        boxes' own centres. body: (n,); None is a body for each box. room: (n, 2, 3), or (2, 3) of
+        all boxes; None is no room.
 
         Raises ValueError, with field, row and value, for bad input.
         """
@@ -136,7 +141,7 @@ class Plan:
             limits=(np.full(count, np.inf) if limits is None else
                     _amounts(limits, 'limits', count, np.inf, 'kg')),
             body=_bodies(body, count), apart=as_places(apart, 'apart', count),
-            faults=tuple(faults))
+            faults=tuple(faults), room=_rooms(room, count))
         for row, fault in enumerate(self.faults):
             if not isinstance(fault, Fault):
                 raise ValueError(f'faults[{row}] must be a Fault, not {short_repr(fault)}')
@@ -178,6 +183,18 @@ def _centres(value: ArrayLike | None, count: int) -> np.ndarray:
     for row in np.flatnonzero(~(np.abs(array) <= LENGTH_MAX).all(axis=1))[:1]:
         raise ValueError(f'centres[{row}] ({", ".join(f"{x:g}" for x in array[row])}) is not '
                          f'finite, or exceeds {LENGTH_MAX:g} m')
+    return array
+
+
+def _rooms(value: ArrayLike | None, count: int) -> np.ndarray:
+    """Return the least and the greatest corner of the room of each box (n, 2, 3)."""
+    if value is None:
+        value = NO_ROOM
+    array = as_floats(value, 'room', f'corners (2, 3) or ({count}, 2, 3)', (2, 3), (count, 2, 3))
+    array = np.ascontiguousarray(np.broadcast_to(array, (count, 2, 3)))
+    for row in np.flatnonzero(~(array[:, 0] < array[:, 1]).all(axis=1))[:1]:
+        raise ValueError(f'room[{row}] must be a least and a greatest corner, not '
+                         f'{short_repr(array[row].tolist())}')
     return array
 
 

@@ -15,7 +15,8 @@ from .plan import Plan
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-COLOURS = {'sound': '#8fa8bf', 'not judged': '#cdb4db', 'overlap': '#003049', 'hangs': '#9d0208',
+COLOURS = {'sound': '#8fa8bf', 'not judged': '#cdb4db', 'overlap': '#003049',
+           'outside': '#0077b6', 'hangs': '#9d0208',
            'unsupported': '#e63946', 'tips under its load': '#c77dff', 'slides': '#5a189a',
            'goes with what falls': '#f4a261', 'overloaded': '#ffd166', 'ground': '#d9d9d9'}
 """By verdict, in the order of the legend."""
