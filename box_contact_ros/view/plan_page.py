@@ -21,7 +21,7 @@ import numpy as np
 
 from ..arguments import one_line, program_main, program_parser, within
 from ..extras import MissingExtra, require
-from ..plans.inspect_files import NOT_READ
+from ..plans.inspect_files import NOT_READ, add_given, given_of
 from ..plans.inspect_plan import inspect_plan
 from ..plans.inspection import Inspection
 from ..plans.plot import COLOURS
@@ -158,13 +158,14 @@ def main(args: Sequence[str] | None = None) -> int:
                         'reaches it sees the page')
     parser.add_argument('--port', type=within(1, 65535), default=8080, help='port to serve at, or '
                         'the next that is free')
+    add_given(parser)
     options = parser.parse_args(args)
     ended = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ended.set())
     try:
         require('view')
-        plan, bears = read_any(options.file)
+        plan, bears, _ = read_any(options.file, given_of(options))
         page = PlanPage(options.host, options.port, options.file, inspect_plan(plan, bears=bears))
     except (OSError, ValueError, MissingExtra) as error:
         print(one_line(error), file=sys.stderr)
