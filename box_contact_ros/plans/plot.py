@@ -11,6 +11,7 @@ import numpy as np
 from ..extras import require
 from ..solver.pose import rotation_matrix
 from .plan import Plan
+from .room import are_walls
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,6 +46,7 @@ def plot(plan: Plan, verdicts: np.ndarray, load: np.ndarray, title: str) -> Figu
         (np.min, np.inf), (np.max, -np.inf)))
     # The ground is often a floor of many metres.
     drawn |= (np.ptp(corners, axis=1) <= 2.0 * (high - low)).all(axis=1)
+    drawn &= ~are_walls(plan)
 
     figure = Figure(figsize=(9, 6), layout='constrained')
     axes = figure.add_subplot(projection='3d')

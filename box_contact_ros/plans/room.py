@@ -13,6 +13,8 @@ from .plan import Plan
 
 SIDES = (('-x', '-y', '-z'), ('+x', '+y', '+z'))
 """Of a room, at its least and at its greatest corner."""
+ROUNDING = 1e-6
+"""By how much a wall may miss its room, or reach into it [m]."""
 THICKNESS = 0.1
 """Of a container's walls and floor [m]."""
 
@@ -41,6 +43,18 @@ def are_beyond(plan: Plan, pairs: np.ndarray, outside: np.ndarray, tolerances: n
                          low[other] >= plan.room[box, 1] - slack), axis=1)
         rows |= (past & (outside[box] > 0.0)).any(axis=(1, 2))
     return rows
+
+
+def are_walls(plan: Plan) -> np.ndarray:
+    """Return which boxes (n,) are fixed, touch a room and are beside it, so that they hide it."""
+    low, high = _bounds(plan)
+    rows = np.zeros(len(plan), bool)
+    for least, greatest in np.unique(plan.room[np.isfinite(plan.room).all(axis=(1, 2))], axis=0):
+        least, greatest = least + ROUNDING, greatest - ROUNDING
+        beside = ((high <= least) | (low >= greatest))[:, :2].any(axis=1)
+        rows |= beside & ((high >= least - 2.0 * ROUNDING) & (low <= greatest + 2.0 * ROUNDING)
+                          ).all(axis=1)
+    return rows & np.isin(np.arange(len(plan)), plan.ground)
 
 
 def _bounds(plan: Plan) -> tuple[np.ndarray, np.ndarray]:

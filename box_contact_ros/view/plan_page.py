@@ -26,6 +26,7 @@ from ..plans.inspect_plan import inspect_plan
 from ..plans.inspection import Inspection
 from ..plans.plot import COLOURS
 from ..plans.read_plan import read_any
+from ..plans.room import are_walls
 from ..solver.pose import rotation_matrix
 from .style import unit_poses
 
@@ -71,13 +72,14 @@ class PlanPage:
         add_light(scene)
         if not len(plan):
             return
+        shown = np.flatnonzero(~are_walls(plan))
+        sizes, poses = plan.sizes[shown], unit_poses(plan.poses[shown])
         colours = np.array([list(bytes.fromhex(COLOURS[verdict][1:]))
-                            for verdict in self.found.verdicts])
-        poses = unit_poses(plan.poses)
-        half = 0.5 * np.einsum('nij,nj->ni', np.abs(rotation_matrix(poses[:, 3:])), plan.sizes)
+                            for verdict in self.found.verdicts[shown]])
+        half = 0.5 * np.einsum('nij,nj->ni', np.abs(rotation_matrix(poses[:, 3:])), sizes)
         # A floor that is far larger than what is on it must not be what is in view.
-        free = np.setdiff1d(np.arange(len(plan)), plan.ground)
-        seen = free if len(free) else np.arange(len(plan))
+        free = ~np.isin(shown, plan.ground)
+        seen = free if free.any() else ~free
         low = (poses[seen, :3] - half[seen]).min(axis=0)
         high = (poses[seen, :3] + half[seen]).max(axis=0)
         middle, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
@@ -85,14 +87,14 @@ class PlanPage:
         for mesh in meshes:
             mesh.batched_positions = poses[:, :3] - middle
             mesh.batched_wxyzs = np.roll(poses[:, 3:], 1, axis=1)
-            mesh.batched_scales = plan.sizes
+            mesh.batched_scales = sizes
 
         @meshes[0].on_click
         def _(event: Any) -> None:
-            box = hit_by(plan.sizes, poses, np.array(event.ray_origin) + middle,
+            box = hit_by(sizes, poses, np.array(event.ray_origin) + middle,
                          np.array(event.ray_direction))
             if box is not None:
-                self.select(box)
+                self.select(int(shown[box]))
 
         camera = self._server.initial_camera
         camera.position = camera_position(radius, camera.fov, NARROW)

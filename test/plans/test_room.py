@@ -5,13 +5,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from box_contact_ros.plans.inspect_plan import inspect_plan
 from box_contact_ros.plans.plan import Plan
-from box_contact_ros.plans.room import walls
+from box_contact_ros.plans.read_plan import read_plan
+from box_contact_ros.plans.room import are_walls, walls
+
+SOLUTION = Path(__file__).resolve().parents[2] / 'docs/examples/files/solution.csv'
 
 
 def test_rooms() -> None:
@@ -50,9 +54,18 @@ def test_walls_touch_and_leave_no_gap() -> None:
             assert meets.min() == pytest.approx(0.0, abs=1e-12) or {n, other} in ({1, 2}, {3, 4})
     plan = Plan.from_corners([*low, least], [*sizes, (0.5, 0.5, 0.5)], ground=range(5),
                              room=(least, greatest))
+    assert are_walls(plan).tolist() == [False, True, True, True, True, False]
     found = inspect_plan(plan, sides=True)
     assert found.sound and found.carried_by[found.carried_by == 5].size == 3
     plan = Plan.from_corners([*low, least - (0.012, 0, 0)], [*sizes, (0.5, 0.5, 0.5)],
                              ground=range(5), room=(least, greatest))
     found = inspect_plan(plan)
     assert [str(row) for row in found.rows()] == ['outside               5  12.0 mm beyond -x']
+
+
+def test_walls_are_not_drawn() -> None:
+    """They would hide what is in the container."""
+    pytest.importorskip('matplotlib')
+    plan = read_plan(SOLUTION, unit='mm')
+    (drawn,) = inspect_plan(plan).plot().axes[0].collections
+    assert len(plan) == 12 and len(drawn.get_facecolor()) == 6 * 8
