@@ -31,7 +31,7 @@ from .crowd import crowded
 from .forms import ORIGINS, UNITS, Given
 from .inspect_plan import inspect_plan
 from .inspection import Inspection
-from .plan import Fault
+from .plan import Fault, Plan
 from .read_plan import read_any
 
 NOT_READ = 2
@@ -64,7 +64,7 @@ def judged(path: str, options: argparse.Namespace) -> tuple[Inspection, str]:
     except ValueError as error:
         option = '--' if str(error).startswith('tolerance') else ''
         raise ValueError(f'{path}: {option}{error}') from None
-    if _lies_wrong(found) and options.origin is None and _lies_well(path, given):
+    if _lies_wrong(found) and options.origin is None and _lies_well_by_corners(path, given, plan):
         plan = dataclasses.replace(found.plan, faults=(*found.plan.faults, Fault(
             'origin', (), 'all stand and none overlaps if x y z are least corners: --origin corner'
             )))
@@ -77,11 +77,12 @@ def _lies_wrong(found: Inspection) -> bool:
     return bool(len(found.overlaps) or found.outside.any() or (found.cause != '').any())
 
 
-def _lies_well(path: str, given: Given) -> bool:
-    """Return whether geometry alone finds nothing if places are least corners."""
+def _lies_well_by_corners(path: str, given: Given, centred: Plan) -> bool:
+    """Return whether geometry alone finds nothing if places are least corners, not centres."""
     try:
         plan = read_any(path, given._replace(origin='corner')).plan
-        return not _lies_wrong(inspect_plan(dataclasses.replace(plan, masses=None)))
+        return not np.array_equal(plan.poses, centred.poses) and not _lies_wrong(
+            inspect_plan(dataclasses.replace(plan, masses=None)))
     except (ValueError, TooManyNear):
         return False
 
