@@ -16,6 +16,7 @@ from ..solver.contact_solver import ContactSolver
 from ..solver.faces import TOLERANCE
 from .inspection import Inspection
 from .plan import Fault, Plan
+from .room import beyond
 
 MOST, MOST_EACH = 200_000, 10
 """Pairs that are judged: in all, and for each box more."""
@@ -68,12 +69,13 @@ def crowded(plan: Plan, pairs: np.ndarray, tolerance: float | None, acceleration
         faults += (crowd([plan.names[box] for box in overlaps[:1].ravel()], count),)
     plan = Plan(plan.sizes, plan.poses, plan.masses, ground=plan.ground, names=plan.names,
                 centres=plan.centres, limits=plan.limits, body=plan.body, apart=plan.apart,
-                faults=faults)
+                faults=faults, room=plan.room)
     none, nothing = np.full(count, np.nan), np.zeros(0)
     return Inspection(
         plan=plan, tolerance=tolerance, acceleration=np.asarray(acceleration, float),
-        overlaps=overlaps, depths=depths, stands=fixed, cause=np.full(count, ''),
-        goes_with=np.full(count, -1), height=none, share=none,
+        overlaps=overlaps, depths=depths,
+        outside=beyond(plan, fixed, np.full(count, tolerance)), stands=fixed,
+        cause=np.full(count, ''), goes_with=np.full(count, -1), height=none, share=none,
         margin=none, loaded_margin=none, load=none, pressure=none,
         carried_by=np.zeros((0, 2), int), loads=nothing, corners=np.zeros((0, 4, 3)),
         corner_loads=np.zeros((0, 4)), mass=np.nan, centre_of_mass=np.full(3, np.nan))

@@ -17,6 +17,7 @@ import math
 import os
 import shlex
 import sys
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -27,8 +28,10 @@ from ..extras import MissingExtra
 from ..solver.checks import printable
 from ..solver.contacts_of import TooManyNear
 from .crowd import crowded
+from .forms import ORIGINS, UNITS, Given
 from .inspect_plan import inspect_plan
 from .inspection import Inspection
+from .plan import Fault, Plan
 from .read_plan import read_any
 
 NOT_READ = 2
@@ -38,9 +41,13 @@ PATIENT = 5.0  # time [s] after which several files have a progress bar
 COLUMNS = ('file', 'kind', 'boxes', 'text')
 
 
-def judged(path: str, options: argparse.Namespace) -> Inspection:
-    """Return what is wrong with the plan of a file. Raises OSError and ValueError."""
-    plan, bears = read_any(path)
+def judged(path: str, options: argparse.Namespace) -> tuple[Inspection, str]:
+    """Return what is wrong with the plan of a file, and in which form it was read.
+
+    Raises OSError and ValueError.
+    """
+    given = given_of(options)
+    plan, bears, form = read_any(path, given)
     limits = np.full(len(plan), np.inf) if options.geometry else plan.limits.copy()
     if options.limit is not None:
         free = np.setdiff1d(np.arange(len(plan)), plan.ground)
@@ -50,13 +57,59 @@ def judged(path: str, options: argparse.Namespace) -> Inspection:
         faults=tuple(fault for fault in plan.faults
                      if not (options.geometry and fault.kind == 'mass')))
     try:
-        return inspect_plan(plan, tolerance=options.tolerance, acceleration=options.acceleration,
-                            bears=options.bears or bears)
+        found = inspect_plan(plan, tolerance=options.tolerance, acceleration=options.acceleration,
+                             bears=options.bears or bears, sides=options.sides)
     except TooManyNear as error:
-        return crowded(plan, error.pairs, options.tolerance, options.acceleration)
+        return crowded(plan, error.pairs, options.tolerance, options.acceleration), form
     except ValueError as error:
         option = '--' if str(error).startswith('tolerance') else ''
         raise ValueError(f'{path}: {option}{error}') from None
+    if _lies_wrong(found) and options.origin is None and _lies_well_by_corners(path, given, plan):
+        plan = dataclasses.replace(found.plan, faults=(*found.plan.faults, Fault(
+            'origin', (), 'all stand and none overlaps if x y z are least corners: --origin corner'
+            )))
+        found = dataclasses.replace(found, plan=plan)
+    return found, form
+
+
+def _lies_wrong(found: Inspection) -> bool:
+    """Return whether boxes overlap, are outside or do not stand."""
+    return bool(len(found.overlaps) or found.outside.any() or (found.cause != '').any())
+
+
+def _lies_well_by_corners(path: str, given: Given, centred: Plan) -> bool:
+    """Return whether geometry alone finds nothing if places are least corners, not centres."""
+    try:
+        plan = read_any(path, given._replace(origin='corner')).plan
+        return not np.array_equal(plan.poses, centred.poses) and not _lies_wrong(
+            inspect_plan(dataclasses.replace(plan, masses=None)))
+    except (ValueError, TooManyNear):
+        return False
+
+
+def add_given(parser: argparse.ArgumentParser) -> None:
+    """Add options for what a packer's file does not tell."""
+    parser.add_argument('--origin', choices=ORIGINS, help="what x y z are in a packer's file "
+                        '(default: the centre, unless its form has corners)')
+    parser.add_argument('--unit', choices=UNITS, help="of lengths in a packer's file (default: "
+                        'that of its form)')
+    parser.add_argument('--container', type=within(0.0), nargs=3, metavar=('L', 'W', 'H'),
+                        help='inner size of a container along x y z, in the unit of the file; its '
+                        'least corner is at 0 0 0')
+
+
+def given_of(options: argparse.Namespace) -> Given:
+    """Return what those options tell."""
+    return Given(options.origin, options.unit, options.container)
+
+
+def _words(given: Given) -> list[str]:
+    """Return those options as they are typed."""
+    words: list[str] = []
+    for name, value in given._asdict().items():
+        if value is not None:
+            words += [f'--{name}', *([value] if isinstance(value, str) else map(str, value))]
+    return words
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -67,6 +120,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--csv', action='store_true', help='a row for each fault')
     parser.add_argument('--picture', metavar='OUT.png', help='draw the plan of one file, coloured '
                         'by cause (needs Matplotlib)')
+    add_given(parser)
     parser.add_argument('--limit', type=within(0.0), metavar='KG', help='the most that may rest on '
                         'any box')
     parser.add_argument('--tolerance', type=within(0.0), metavar='M', help='the gap up to which '
@@ -75,6 +129,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--all', action='store_true', help='print all lines, not 40')
     parser.add_argument('--bears', choices=('faces', 'corners'), help='where boxes stand on each '
                         'other (default: corners for containers, faces for others)')
+    parser.add_argument('--sides', action='store_true', help='boxes beside each other carry by '
+                        'friction, and so do the walls of a container')
     parser.add_argument('--acceleration', type=float, nargs=3, default=(0.0, 0.0, -9.81),
                         metavar=('X', 'Y', 'Z'), help='what the goods feel, gravity included '
                         '[m/s²]; a lorry that brakes along +x by 0.4 g: 3.92 0 -9.81')
@@ -97,14 +153,15 @@ def main(args: Sequence[str] | None = None) -> int:
     writer = csv.writer(sys.stdout, lineterminator='\n')
     if options.csv:
         writer.writerow(COLUMNS)
-    worst = 'sound'
+    worst, counts, boxes = 'sound', Counter[str](), 0
     for path in _with_progress(options.files):
         try:
-            found = judged(path, options)
+            found, form = judged(path, options)
             figure = found.plot() if options.picture else None
         except (OSError, ValueError, MissingExtra) as error:
             print(one_line(error), file=sys.stderr)
             worst = 'not read'
+            counts[worst] += 1
             continue
         if figure:
             try:
@@ -112,6 +169,8 @@ def main(args: Sequence[str] | None = None) -> int:
             except ValueError as error:  # for an ending that is no picture's
                 parser.error(f'--picture: {one_line(error)}')
         worst = max(worst, found.verdict, key=list(STATUSES).index)
+        counts[found.verdict] += 1
+        boxes += len(found.plan) - len(found.plan.ground)
         if options.json:
             print(json.dumps({'file': path, **as_json(found)}))
         elif options.csv:
@@ -120,10 +179,16 @@ def main(args: Sequence[str] | None = None) -> int:
         elif len(options.files) > 1:
             print(f'{printable(path)}: {found.summary()}', flush=True)
         else:
+            if form:
+                print(form)
             print(found.text(None) if options.all else found)
             if path.isprintable():
                 shown = path if not path.startswith('-') else f'./{path}'
-                print(f'To see it in 3D: box_contact_view {shlex.quote(shown)}')
+                print('To see it in 3D:', shlex.join(
+                    ['box_contact_view', *_words(given_of(options)), shown]))
+    if len(options.files) > 1 and not (options.json or options.csv):
+        total = ', '.join(f'{counts[word]:,} {word}' for word in STATUSES if counts[word])
+        print(f'{len(options.files):,} files, {boxes:,} boxes: {total}')
     return STATUSES[worst]
 
 

@@ -22,6 +22,7 @@ from .crowd import most_near
 from .inspection import OVER, Inspection
 from .judged import faults_of
 from .plan import Fault, Plan
+from .room import are_beyond, beyond
 from .standing import across_of, base_areas, heights, hull_margins, needs, standing
 from .statics import LEVEL, Beds, Bodies, Rest, settle
 
@@ -69,8 +70,7 @@ def inspect_plan(plan: Plan, *, tolerance: float | None = None, friction: float 
         plan = replace(plan, faults=(*plan.faults, *faults))
     bodies = _bodies(plan, meet)
     return _judged(plan, meet, bodies, None if plan.masses is None else
-                   _loads(plan, meet, bodies, friction),
-                   float(tolerances.max(initial=0.0)))
+                   _loads(plan, meet, bodies, friction), tolerances)
 
 
 def _tolerances(plan: Plan, value: float | None) -> np.ndarray:
@@ -286,8 +286,8 @@ def _resting(carried_by: np.ndarray, holds: np.ndarray, fixed: np.ndarray) -> np
         stands = higher
 
 
-def _judged(plan: Plan, meet: _Meetings, bodies: Bodies, loads: _Loads | None, tolerance: float,
-            ) -> Inspection:
+def _judged(plan: Plan, meet: _Meetings, bodies: Bodies, loads: _Loads | None,
+            tolerances: np.ndarray) -> Inspection:
     count, body, up = len(plan), plan.body, meet.frame[2]
     verdict = _verdict(plan, meet, bodies, loads)
     if verdict.unknown.any():
@@ -312,15 +312,18 @@ def _judged(plan: Plan, meet: _Meetings, bodies: Bodies, loads: _Loads | None, t
     most = np.linalg.norm(meet.felt) * plan.limits
     cause = verdict.cause[body]
     cause[(cause == '') & (load > (1.0 + OVER) * most)] = 'overloaded'
-    depth = -meet.met_separation
+    depth, overlaps = -meet.met_separation, meet.overlaps
+    outside = beyond(plan, meet.fixed[body], tolerances)
+    if outside.any():  # which tells more than that a box overlaps a wall
+        overlaps = overlaps & ~are_beyond(plan, meet.met, outside, tolerances)
     first = np.unique(body, return_index=True)[1]
     mass, centre = np.nan, np.full(3, np.nan)
     if plan.masses is not None:
         mass = float(plan.masses.sum())
         centre = plan.masses @ _mass_centres(plan) / mass if mass > 0.0 else centre
     return Inspection(
-        plan=plan, tolerance=tolerance, acceleration=meet.felt,
-        overlaps=np.sort(meet.met[meet.overlaps], axis=1), depths=depth[meet.overlaps],
+        plan=plan, tolerance=float(tolerances.max(initial=0.0)), acceleration=meet.felt,
+        overlaps=np.sort(meet.met[overlaps], axis=1), depths=depth[overlaps], outside=outside,
         stands=verdict.stands[body], cause=cause,
         goes_with=np.where(verdict.goes_with >= 0, first[verdict.goes_with], -1)[body],
         height=heights(plan.sizes, plan.poses, meet.frame, body, verdict.hangs), share=share,

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..solver.checks import printable
 from .plan import LACKS, VERDICTS, Plan
+from .room import SIDES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -63,6 +64,9 @@ class Inspection:
     """(o, 2) pairs of boxes that overlap by more than the tolerance, by index."""
     depths: np.ndarray
     """(o,) how deep [m]."""
+    outside: np.ndarray
+    """(n, 2, 3) how far each box reaches beyond the least and the greatest corner of its room [m];
+    0 up to its tolerance."""
     stands: np.ndarray
     """(n,) bool."""
     cause: np.ndarray
@@ -100,23 +104,25 @@ class Inspection:
     def verdict(self) -> str:
         """Return 'not sound' for what is certainly wrong, else 'not all judged', or 'sound'."""
         faults = {fault.verdict for fault in self.plan.faults}
-        if len(self.overlaps) or (self.cause != '').any():
+        if len(self.overlaps) or self.outside.any() or (self.cause != '').any():
             faults.add('not sound')
         return next((verdict for verdict in VERDICTS if verdict in faults), 'sound')
 
     @property
     def sound(self) -> bool:
-        """Whether all was judged, all boxes stand, and none overlaps or is overloaded."""
+        """Whether all was judged, all boxes stand, and none overlaps, is outside or overloaded."""
         return self.verdict == 'sound'
 
     @property
     def verdicts(self) -> np.ndarray:
         """Return a word (n,) for each box: 'ground', else 'overlap', its cause, or 'sound'.
 
-        'not judged': whether it stands is not known.
+        'outside': beyond its room, and without an overlap. 'not judged': whether it stands is not
+        known.
         """
         words = np.where(self.cause == '', np.where(self.stands, 'sound', 'not judged'),
                          self.cause).astype('U24')
+        words[self.outside.any(axis=(1, 2))] = 'outside'
         words[self.overlaps.ravel()] = 'overlap'
         words[self.plan.ground] = 'ground'
         return words
@@ -154,6 +160,10 @@ class Inspection:
         for n in np.argsort(-self.depths, kind='stable').tolist():
             a, b = self.overlaps[n].tolist()
             rows.append(Row('overlap', (names[a], names[b]), f'{1e3 * self.depths[n]:.1f} mm deep'))
+        for n in np.flatnonzero(self.outside.any(axis=(1, 2))).tolist():
+            sides = zip(np.ravel(SIDES), self.outside[n].ravel())
+            rows.append(Row('outside', (names[n],), ', '.join(
+                f'{1e3 * reach:.1f} mm beyond {side}' for side, reach in sides if reach)))
         rows += self._falls()
         on_top = self.load / np.linalg.norm(self.acceleration)
         over = np.flatnonzero(on_top > (1.0 + OVER) * plan.limits)

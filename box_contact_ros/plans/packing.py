@@ -1,11 +1,12 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Packing plans: CSV and JSON of our own, and the JSON of two projects.
+"""Packing plans: CSV and JSON of our own, and the forms of known packers.
 
-A row is a box: its name, full extents and centre [m], and, where it has them, its quaternion, mass
-and limit [kg], and whether it is fixed. Where no row is fixed, z = 0 is the ground.
-msg_schemas/plan.json is the format in JSON; the columns of a CSV file have the same names.
+A row is a box: its name, full extents, centre or least corner, and, where it has them, its
+quaternion, mass and limit [kg], and whether it is fixed. Lengths are in metres unless the form or
+the caller has another unit. Where no row is fixed and no container has a floor, z = 0 is the
+ground. msg_schemas/plan.json is the format in JSON; the columns of a CSV file have the same names.
 """
 from __future__ import annotations
 
@@ -14,64 +15,146 @@ import io
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core import LENGTH_MAX, MASS_MAX
 from ..solver.checks import nearest_name, pose_fault, short_repr, size_fault
-from .plan import Fault, Plan
+from .forms import (
+    EXTENTS,
+    GREATEST,
+    LEAST,
+    NOTHING,
+    OWN,
+    PLACE,
+    PLACES,
+    SIZES,
+    TURN,
+    UNITS,
+    Form,
+    Given,
+    Item,
+    Packing,
+    document_packing,
+    means_amount,
+    table_form,
+    table_packing,
+)
+from .plan import NO_ROOM, UNTURNED, Fault, Plan
+from .room import walls
 
-EXTENTS, PLACE, TURN = ('length', 'width', 'height'), ('x', 'y', 'z'), ('qx', 'qy', 'qz', 'qw')
-NEEDED = ('name', *EXTENTS, *PLACE)
-KEYS = (*NEEDED, *TURN, 'mass', 'limit', 'fixed')
+KEYS = ('name', *(key for way in (*SIZES, *PLACES) for key in way), *TURN, 'mass', 'limit', 'fixed')
+COLUMNS = ('name', *EXTENTS, *PLACE, *TURN, 'mass', 'limit', 'fixed')
+"""What a refusal names; the others are other ways to tell sizes and places."""
 DELIMITERS = ',;\t'
 WORDS = {'true': True, '1': True, 'yes': True, 'false': False, '0': False, 'no': False, '': False}
 """What `fixed` may be in a CSV file."""
-AMOUNT = re.compile(
-    '.*(mass|weight|gewicht|poids|peso|limit|capacity|strength|payload|traglast|auflast).*|'
-    'kgs?|kilos?|kilograms?|lbs?|kn|tons?|tonnes?|gross|net|tare|brutto|'
-    'netto|vgm|max|maximum|stackable|maxload')
-"""Words in the names of columns that may mean a mass or a limit."""
-UNTURNED = (0.0, 0.0, 0.0, 1.0)
+COMMA = re.compile(r'[-+]?\d+,\d+')
+"""A number with a decimal comma, or with one between thousands."""
+DECIMALS = '; are commas decimal marks? Then separate the columns by ;'
 GROUND, GROUND_THICKNESS, GROUND_MARGIN = 'ground', 1.0, 1.0
 """Name, thickness, and how far it reaches beyond the boxes [m]."""
 ROOM = 1.0  # between the stacks of one file, which are placed side by side [m]
-MILLIMETRE = 1e-3
+LONG = 20.0
+"""Half of the boxes are longer only where their unit is not the metre [m]."""
 Row = Mapping[str, Any]
 
 
-def read_csv(text: str) -> Plan:
-    """Return the plan of a CSV file; its faults are rows. Raises ValueError for other files."""
+class Read(NamedTuple):
+    """A plan, and how its file was read: '' for a form of our own."""
+
+    plan: Plan
+    form: str
+
+
+def read_csv(text: str, given: Given = NOTHING) -> Read:
+    """Return the plan of a CSV file, or of a packer's table; its faults are rows.
+
+    Raises ValueError for other files.
+    """
     lines = list(io.StringIO(text.removeprefix('\ufeff'), newline=''))
-    start = next((n for n, line in enumerate(lines) if line.strip()), None)
+    start = next((n for n, line in enumerate(lines) if is_first(line)), None)
     if start is None:
         raise ValueError('it is empty')
-    delimiter = max(DELIMITERS, key=lines[start].count)
-    reader = csv.reader(lines[start:], delimiter=delimiter, strict=True)
+    delimiter = _delimiter(lines[start])
+    if not delimiter:  # columns, and a rule below the header
+        lines[start:] = [','.join(line.split()) for line in lines[start:] if line.strip(' -\r\n')]
+    reader = csv.reader(lines[start:], delimiter=delimiter or ',', strict=True)
     try:
         header, *rows = reader
     except csv.Error as error:  # such as a quote that is not closed
         raise ValueError(f'line {start + reader.line_num}: it is not CSV: {error}') from None
+    form = table_form(_stripped(header))
+    try:
+        keys, needed = (form.keys, tuple(filter(None, form.keys))) if form else _own_keys(header)
+    except ValueError as error:
+        raise ValueError(f'line {start + 1}: {error}') from None
+    faults: list[Fault] = []
+    rows = [row for row in rows if any(value.strip() for value in row)]
+    is_cut = not text.endswith(('\n', '\r'))
+    cells = [(number, _cells(row, keys, delimiter)) for number, row in enumerate(rows, 1)
+             if _is_whole(row, number, keys, needed, delimiter, faults,
+                          is_cut and number == len(rows))]
+    packing = table_packing(form, cells) if form else Packing(
+        OWN, [Item(number, '', row) for number, row in cells])
+    return plan_of(replace(packing, faults=[*faults, *packing.faults]), given)
+
+
+def is_first(line: str) -> bool:
+    """Return whether a line is the first one that counts: neither blank nor a comment."""
+    return line.strip()[:1] not in ('', '#')
+
+
+def is_header(line: str) -> bool:
+    """Return whether a line is a header that is read, whatever its file is called."""
+    cells = [cell.strip().lower() for cell in re.split(_delimiter(line) or ' +', line.strip())]
+    return table_form(cells) is not None or 'name' in cells and len({*cells} & {*KEYS}) > 3
+
+
+def _delimiter(line: str) -> str:
+    """Return what separates the columns of a header, or '' for blanks."""
+    delimiter = max(DELIMITERS, key=line.count)
+    return delimiter if delimiter in line else ''
+
+
+def _own_keys(header: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the key of each column of our own, and those that are needed.
+
+    Raises ValueError for columns that are missing, or come twice.
+    """
     names = _stripped(header)
     columns = [name.lower() for name in names]
     for key, count in Counter(filter(None, columns)).items():
         if count > 1:
-            raise ValueError(f'line {start + 1}: the column {key} comes twice')
-    for key in NEEDED:
+            raise ValueError(f'the column {key} comes twice')
+    sizes, place = _ways(columns)
+    needed = ('name', *sizes, *place)
+    for key in needed:
         if key not in columns:
-            raise ValueError(f'line {start + 1}: the column {key} is missing'
-                             f'{nearest_name(key, columns)}; the columns are {", ".join(KEYS)}')
-    faults: list[Fault] = []
-    rows = [row for row in rows if any(value.strip() for value in row)]
-    is_cut = not text.endswith(('\n', '\r'))
-    keys = [column if column in KEYS else name or f'column {n}'
-            for n, (column, name) in enumerate(zip(columns, names), 1)]
-    return plan_of([(number, _cells(row, number, keys, delimiter)) for number, row in enumerate(
-        rows, 1) if _is_whole(row, number, keys, delimiter, faults,
-                              is_cut and number == len(rows))], faults)
+            raise ValueError(f'the column {key} is missing{nearest_name(key, columns)}; the columns'
+                             f' are {", ".join(COLUMNS)}, and x_min y_min z_min if you have the '
+                             'least corner')
+    return tuple(column if column in KEYS else name or f'column {n}'
+                 for n, (column, name) in enumerate(zip(columns, names), 1)), needed
+
+
+def _ways(keys: Collection[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return by which keys a file tells sizes and places, or by which it has the most.
+
+    Raises ValueError if it tells one in two ways.
+    """
+    found = []
+    for ways, what in (SIZES, 'a size'), (PLACES, 'a place'):
+        whole = [way for way in ways if {*way} <= {*keys}]
+        if len(whole) > 1:
+            raise ValueError(f'{" ".join(whole[0])} and {" ".join(whole[1])} both tell {what}: '
+                             'leave one out')
+        found += whole or [max(ways, key=lambda way: len({*way} & {*keys}))]
+    sizes, place = found
+    return sizes, LEAST if sizes == GREATEST else place
 
 
 def _stripped(cells: Iterable[str]) -> list[str]:
@@ -82,22 +165,23 @@ def _stripped(cells: Iterable[str]) -> list[str]:
     return stripped
 
 
-def _cells(row: list[str], number: int, keys: list[str], delimiter: str) -> dict[str, str]:
+def _cells(row: list[str], keys: Sequence[str], delimiter: str) -> dict[str, str]:
     """Return what a row says, by key."""
-    cells = {key: value.strip() for key, value in zip(keys, row) if value.strip()}
+    cells = {key: value.strip() for key, value in zip(keys, row) if key and value.strip()}
     if delimiter == ';':  # where a comma is the decimal mark
         cells = {key: value if key == 'name' else value.replace(',', '.')
                  for key, value in cells.items()}
     return cells
 
 
-def _is_whole(row: list[str], number: int, keys: list[str], delimiter: str, faults: list[Fault],
-              is_cut: bool) -> bool:
+def _is_whole(row: list[str], number: int, keys: Sequence[str], needed: Sequence[str],
+              delimiter: str, faults: list[Fault], is_cut: bool) -> bool:
     """Return whether a row can be read; add what seems to be missing.
 
-    is_cut: whether the file ends within the row, so that its last cell may be a part of one.
+    needed: keys without which it cannot. is_cut: whether the file ends within the row, so that its
+    last cell may be a part of one.
     """
-    name = _cells(row, number, keys, delimiter).get('name', f'row {number}')
+    name = _cells(row, keys, delimiter).get('name', f'row {number}')
     count = min(len(row), max(len(keys), len(_stripped(row))))
     hidden = sum(delimiter in line for cell in row for line in cell.strip().splitlines()[1:])
     if hidden:
@@ -105,27 +189,25 @@ def _is_whole(row: list[str], number: int, keys: list[str], delimiter: str, faul
                                             'that may be rows'))
     if count == len(keys):
         return True
-    left_out = is_cut or count > len(keys) or not set(NEEDED) <= {*keys[:count]}
+    left_out = is_cut or count > len(keys) or not {*needed} <= {*keys[:count]}
+    commas = count > len(keys) and delimiter == ','
     faults.append(Fault('cut', (name,), f'row {number} has {count} cells, and the header '
-                                        f'{len(keys)}{": left out" if left_out else ""}',
-                        lacks='place' if left_out else None))
+                        f'{len(keys)}{DECIMALS if commas else ""}'
+                        f'{": left out" if left_out else ""}', lacks='place' if left_out else None))
     return not left_out
 
 
-def read_packing(document: Any) -> Plan | None:
+def read_packing(document: Any, given: Given = NOTHING) -> Read | None:
     """Return the plan of a JSON document, or None if it has another form."""
-    if isinstance(document, Mapping):
-        if isinstance(document.get('boxes'), list):
-            return plan_of(enumerate(document['boxes'], 1), unread(
-                {key: value for key, value in document.items() if key != 'boxes'}))
-        if isinstance(document.get('containers'), list):
-            return plan_of(enumerate(_side_by_side(map(_placements, document['containers'])), 1))
-        if document and all(isinstance(order, list) and order and all(
-                isinstance(entry, Mapping) and 'flb_coordinates' in entry for entry in order)
-                for order in document.values()):
-            return plan_of(enumerate(_side_by_side(_order(name, order)
-                                                   for name, order in document.items()), 1))
-    return None
+    packing = document_packing(document)
+    own = document.get('boxes') if isinstance(document, Mapping) else None
+    if packing is None and isinstance(own, list):
+        packing = Packing(OWN, [Item(n, '', row) for n, row in enumerate(own, 1)])
+        if 'container' in document:
+            packing.rooms[''] = document['container']
+        packing.faults += unread({key: value for key, value in document.items()
+                                  if key not in ('boxes', 'container')})
+    return plan_of(packing, given) if packing else None
 
 
 def unread(values: Mapping[str, Any]) -> list[Fault]:
@@ -142,74 +224,19 @@ def unread(values: Mapping[str, Any]) -> list[Fault]:
                       (others, 'not read', 'sound', '')) if names]
 
 
-def means_amount(key: str) -> bool:
-    """Return whether a name may mean a mass or a limit, such as gross_weight, kg or maxLoad."""
-    words = re.findall('[a-zäöüß]+', re.sub('([a-z])([A-Z])', r'\1 \2', key).lower())
-    return any(map(AMOUNT.fullmatch, words)) or words[-1:] == ['load']
+def plan_of(packing: Packing, given: Given) -> Read:
+    """Return the plan of a packing; rows that cannot be placed are left out, and named.
 
-
-def _placements(container: Any) -> Iterator[dict[str, Any]]:
-    """Yield the rows of a container of 3d-bin-container-packing's viewer, in millimetres."""
-    try:
-        for n, entry in enumerate(container['stack']['placements']):
-            goods = entry['stackable']
-            name = f'{container.get("name")}/{goods.get("name") or n + 1}/{n + 1}'
-            yield {**_from_corner(name, [goods[key] for key in ('dx', 'dy', 'dz')],
-                                  [entry[key] for key in ('x', 'y', 'z')]), **_amounts(goods)}
-    except (LookupError, TypeError, AttributeError) as error:
-        raise ValueError(f'a container lacks {error}') from None
-
-
-def _order(name: str, entries: Sequence[Row]) -> Iterator[dict[str, Any]]:
-    """Yield the rows of an order of BED-BPP, in millimetres."""
-    for n, entry in enumerate(entries):
-        try:
-            item, corner = entry['item'], entry['flb_coordinates']
-            extents = [item[f'{side}/mm'] for side in EXTENTS]
-            if entry['orientation'] == 1:
-                extents[:2] = extents[1::-1]
-            yield {**_from_corner(f'{name}/{item["sequence"]}', extents, corner),
-                   'mass': item['weight/kg'], **_amounts(item)}
-        except (LookupError, TypeError) as error:
-            raise ValueError(f'order {name}, entry {n}: it lacks {error}') from None
-
-
-def _amounts(goods: Row) -> Row:
-    """Return what may mean a mass or a limit and is not read."""
-    return {key: value for key, value in goods.items() if key != 'weight/kg' and means_amount(key)}
-
-
-def _from_corner(name: str, extents: Sequence[Any], corner: Sequence[Any]) -> dict[str, Any]:
-    """Return a row of extents and of the least corner, both in millimetres."""
-    sides, low = ([_number(value) * MILLIMETRE for value in values] for values in (extents, corner))
-    return {'name': name, **dict(zip(EXTENTS, sides)),
-            **{key: value + side / 2.0 for key, value, side in zip(PLACE, low, sides)}}
-
-
-def _side_by_side(stacks: Iterable[Iterable[dict[str, Any]]]) -> Iterator[Row]:
-    """Yield the rows of stacks that each begin at x = 0, one after another along x."""
-    start = 0.0
-    for stack in stacks:
-        rows = list(stack)
-        ends = [row['x'] + row['length'] / 2.0 for row in rows]
-        for row in rows:
-            yield {**row, 'x': row['x'] + start}
-        start += max((end for end in ends if math.isfinite(end)), default=0.0) + ROOM
-
-
-def plan_of(rows: Iterable[tuple[int, Any]], faults: Iterable[Fault] = ()) -> Plan:
-    """Return the plan of numbered rows; those that cannot be placed are left out, and named.
-
-    faults: what is already known to be wrong.
-    Raises ValueError where no row can be placed.
+    Raises ValueError where no row can be placed, or what is given contradicts the file.
     """
-    faults, boxes = list(faults), []
+    form, items, faults = packing.form, list(packing.items), list(packing.faults)
+    rows = [item.row if isinstance(item.row, Mapping) else {} for item in items]
     others: dict[str, Any] = {}
-    for number, row in rows:
-        row = row if isinstance(row, Mapping) else {}
+    for row in rows:
         others |= {key: value for key, value in row.items() if key not in KEYS}
-        if box := _box(row, number, faults):
-            boxes.append(box)
+    way = _Way.of({key for row in rows for key in row}, form, given)
+    boxes = [box for item, row in zip(items, rows)
+             if (box := _box(item, row, way, faults))]
     faults += unread(others)
     if not boxes:
         raise ValueError(f'no box can be placed: {faults[0].text}' if faults else 'it has no box')
@@ -221,17 +248,115 @@ def plan_of(rows: Iterable[tuple[int, Any]], faults: Iterable[Fault] = ()) -> Pl
     for box in boxes:
         if weighed and box.mass is None and not box.fixed:
             faults.append(Fault('mass', (box.name,), 'has no mass: taken as 0'))
-    sizes, poses = np.array([box.size for box in boxes]), np.array([box.pose for box in boxes])
-    masses = [box.mass or 0.0 for box in boxes]
-    limits = [box.limit for box in boxes]
-    ground = [n for n, box in enumerate(boxes) if box.fixed]
-    if not ground:
-        size, pose = slab_below(sizes, poses)
-        sizes, poses = np.vstack((sizes, size)), np.vstack((poses, pose))
-        names, masses, limits = [*names, GROUND], [*masses, 0.0], [*limits, math.inf]
-        ground = [len(boxes)]
-    return Plan(sizes, poses, masses if weighed else None, ground=ground, names=names,
-                limits=limits, faults=faults)
+    faults += way.doubts(boxes)
+    stacks = [*dict.fromkeys(box.stack for box in boxes)]
+    rooms = {stack: size for stack in stacks
+             if (size := _inner(given.container or packing.rooms.get(stack), way)) is not None}
+    if form.in_line and rooms:  # so that each container begins at x = 0
+        for box in boxes:
+            box.pose[0] -= (_number(box.stack) - 1.0) * rooms[box.stack][0]
+    starts = (_side_by_side(boxes, stacks, rooms) if rooms or not form.in_line else
+              dict.fromkeys(stacks, 0.0))
+    poses = np.array([box.pose for box in boxes])
+    poses[:, 0] += [starts[box.stack] for box in boxes]
+    return Read(_on_ground(boxes, poses, weighed, faults, {
+        stack: np.array([(starts[stack], 0.0, 0.0), size + (starts[stack], 0.0, 0.0)])
+        for stack, size in rooms.items()}), way.text)
+
+
+def _on_ground(boxes: Sequence[_Box], poses: np.ndarray, weighed: bool, faults: Iterable[Fault],
+               rooms: Mapping[str, np.ndarray]) -> Plan:
+    """Return the plan of boxes and of what carries them: rooms (2, 3) by stack, or the ground."""
+    sizes = np.array([box.size for box in boxes])
+    bare = [n for n, box in enumerate(boxes) if box.stack not in rooms]
+    slabs = [(f'{stack or "container"} {name}', size, [*centre, *UNTURNED])
+             for stack, room in rooms.items() for name, size, centre in walls(*room)]
+    if bare and not any(box.fixed for box in boxes):
+        size, pose = slab_below(sizes[bare], poses[bare])
+        slabs.append((GROUND, size, pose.tolist()))
+    if slabs:
+        sizes = np.vstack((sizes, [size for _, size, _ in slabs]))
+        poses = np.vstack((poses, [pose for *_, pose in slabs]))
+    count = len(boxes)
+    return Plan(
+        sizes, poses, [box.mass or 0.0 for box in boxes] + [0.0] * len(slabs) if weighed else None,
+        ground=[*(n for n, box in enumerate(boxes) if box.fixed), *range(count, len(sizes))],
+        names=[box.name for box in boxes] + [name for name, *_ in slabs],
+        limits=[box.limit for box in boxes] + [math.inf] * len(slabs), faults=faults,
+        room=np.array([*(rooms.get(box.stack, NO_ROOM) for box in boxes), *[NO_ROOM] * len(slabs)]))
+
+
+def _inner(value: Any, way: _Way) -> np.ndarray | None:
+    """Return the inner size of a container (3,) [m], or None if there is none."""
+    if value is None:
+        return None
+    numbers = [way.scale * _number(one) for one in value] if isinstance(value, Sequence) else []
+    if len(numbers) != 3 or not all(number > 0.0 for number in numbers) or size_fault(numbers):
+        raise ValueError(f'container must be three inner sizes above 0, not {short_repr(value)}')
+    return np.array(numbers)
+
+
+def _side_by_side(boxes: Sequence[_Box], stacks: Sequence[str], rooms: Mapping[str, np.ndarray],
+                  ) -> dict[str, float]:
+    """Return how far along x each stack goes, so that they are beside each other [m]."""
+    ends = dict.fromkeys(stacks, 0.0)
+    for box in boxes:
+        ends[box.stack] = max(ends[box.stack], box.pose[0] + box.size[0] / 2.0)
+    starts, start = {}, 0.0
+    for stack in stacks:
+        starts[stack] = start
+        start += max(ends[stack], rooms[stack][0] if stack in rooms else 0.0) + ROOM
+    return starts
+
+
+@dataclass(frozen=True)
+class _Way:
+    """How the numbers of a file tell where its boxes are."""
+
+    form: Form
+    place: tuple[str, ...]
+    sizes: tuple[str, ...]
+    of_corner: bool
+    """Whether a place is a least corner."""
+    unit: str | None
+    is_given: bool
+    """Whether the caller has told the unit."""
+
+    @classmethod
+    def of(cls, keys: Collection[str], form: Form, given: Given) -> _Way:
+        """Return how a file with these keys is read. Raises ValueError for a contradiction."""
+        sizes, place = _ways(keys)
+        if place == LEAST and given.origin == 'centre':
+            raise ValueError(f"origin must not be 'centre': {' '.join(LEAST)} are a corner" if
+                             form is OWN else
+                             f"origin must not be 'centre': {form.title} has least corners")
+        return cls(form, place, sizes, place == LEAST or given.origin == 'corner',
+                   given.unit or form.unit, given.unit is not None)
+
+    @property
+    def scale(self) -> float:
+        """Return the length of the unit [m]."""
+        return UNITS[self.unit or 'mm']
+
+    @property
+    def text(self) -> str:
+        """Return a line on how the file of a known packer is read; '' for our own form."""
+        if self.form is OWN:
+            return ''
+        where = ('two corners' if self.sizes == GREATEST else 'least corners, sizes along x y z' if
+                 self.of_corner else 'centres, sizes along x y z')
+        return f'read as {self.form.title}: {where}, {self.unit or "no unit"}'
+
+    def doubts(self, boxes: Sequence[_Box]) -> list[Fault]:
+        """Return a fault if the unit is not known, or seems to be another."""
+        if self.unit is None:
+            return [Fault('unit', (), 'the file has none: read as mm; add --unit m, cm or mm')]
+        longest = sorted(max(box.size) for box in boxes if not box.fixed)
+        middle = longest[len(longest) // 2] if longest else 0.0
+        if self.is_given or self.form is not OWN or middle <= LONG:
+            return []
+        return [Fault('unit', (), f'half of the boxes are {middle:g} m long or more: add --unit mm '
+                                  'or cm, or m if they are')]
 
 
 def slab_below(sizes: np.ndarray, poses: np.ndarray, height: float = 0.0,
@@ -248,6 +373,7 @@ class _Box:
     """A row that can be placed."""
 
     name: str
+    stack: str
     size: list[float]
     pose: list[float]
     mass: float | None
@@ -255,20 +381,29 @@ class _Box:
     fixed: bool
 
 
-def _box(row: Row, number: int, faults: list[Fault]) -> _Box | None:
+def _box(item: Item, row: Row, way: _Way, faults: list[Fault]) -> _Box | None:
     """Return what a row says, or None; add what is wrong with it to the faults."""
-    name = str(row.get('name', f'row {number}'))
-    place = '' if name == f'row {number}' else f'row {number}: '
+    name = str(row.get('name', f'row {item.number}'))
+    place = '' if name == f'row {item.number}' else f'row {item.number}: '
     turn = TURN if any(key in row for key in TURN) else ()
-    for kind, keys in ('dimension', EXTENTS), ('pose', PLACE + turn):
+    size: list[float] = []
+    pose: list[float] = []
+    for kind, keys in ('dimension', way.sizes), ('pose', way.place + turn):
         values = [_number(row.get(key)) for key in keys]
-        text = next((f'{key} is {short_repr(row[key]) if key in row else "missing"}'
-                     for key, value in zip(keys, values) if math.isnan(value)), '')
+        text = next((_not_read(row, key) for key, value in zip(keys, values) if math.isnan(value)),
+                    '')
         if kind == 'dimension':
-            size, text = values, text or size_fault(values) or ''
+            if way.sizes == GREATEST:
+                values = [high - _number(row.get(key)) for high, key in zip(values, LEAST)]
+            size = [way.scale * value for value in values]
+            text = text or size_fault(size) or ''
         else:
-            pose = values if turn else [*values, *UNTURNED]
+            pose = [way.scale * value for value in values[:3]] + (values[3:] or [*UNTURNED])
+            if way.of_corner:
+                pose[:3] = [low + side / 2.0 for low, side in zip(pose, size)]
             text = text or pose_fault(pose) or ''
+            if way.of_corner and pose[3:] != [*UNTURNED]:
+                text = text or 'a turned box is told by its centre, x y z'
         if text:
             faults.append(Fault(kind, (name,), f'{place}{text}: left out'))
             return None
@@ -286,7 +421,16 @@ def _box(row: Row, number: int, faults: list[Fault]) -> _Box | None:
         faults.append(Fault('pose', (name,), f'{place}fixed is {short_repr(row["fixed"])}, neither '
                                              'true nor false: left out'))
         return None
-    return _Box(name, size, pose, amounts[0], math.inf if amounts[1] is None else amounts[1], fixed)
+    return _Box(name, item.stack, size, pose, amounts[0],
+                math.inf if amounts[1] is None else amounts[1], fixed)
+
+
+def _not_read(row: Row, key: str) -> str:
+    """Return what is wrong with a key that has no number."""
+    if key not in row:
+        return f'{key} is missing'
+    is_comma = isinstance(row[key], str) and COMMA.fullmatch(row[key])
+    return f'{key} is {short_repr(row[key])}{"; the decimal mark is a point" if is_comma else ""}'
 
 
 def _number(value: Any) -> float:

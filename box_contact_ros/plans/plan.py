@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,8 +33,12 @@ FAULT_KINDS = {
     'size type': ('not all judged', 'place'), 'dimension': ('not all judged', 'place'),
     'pose': ('not all judged', 'place'), 'mass': ('not all judged', 'weight'),
     'shape': ('not all judged', 'shape'), 'support': ('not all judged', 'support'),
+    'unit': ('not all judged', 'unit'), 'origin': ('not sound', 'origin'),
     'column': ('sound', '')}
 """What may be wrong with a row of a file: the best verdict with it, and what it lacks."""
+NO_ROOM = ((-np.inf,) * 3, (np.inf,) * 3)
+UNTURNED = (0.0, 0.0, 0.0, 1.0)
+"""The quaternion x y z w of a box that is not turned."""
 LACKS = {
     '': ('', ''), 'place': ('1 box was not placed', '{:,} boxes were not placed'),
     'weight': ('1 has no weight', '{:,} have no weight'),
@@ -41,6 +46,8 @@ LACKS = {
     'limit': ('1 has no known limit', '{:,} have no known limit'),
     'support': ('support not judged: nothing is fixed',) * 2,
     'judgement': ('1 was not judged', '{:,} were not judged'),
+    'unit': ('the unit is doubtful: add --unit',) * 2,
+    'origin': ('sound by --origin corner',) * 2,
     'shape': ('1 shape is not known', '{:,} shapes are not known'),
     'part': ('1 part of the file was not read', '{:,} parts of the file were not read')}
 """What boxes or rows may lack, as the last line says it of one and of more."""
@@ -106,17 +113,21 @@ class Plan:
     """(a, 2) pairs of boxes, by index, that neither touch nor overlap wherever they are."""
     faults: tuple[Fault, ...]
     """What is wrong with the file that the plan is from."""
+    room: np.ndarray
+    """(n, 2, 3) the least and the greatest corner of the inner space that each box must be in [m];
+    infinite where there is none."""
 
     def __init__(self, sizes: ArrayLike, poses: ArrayLike, masses: ArrayLike | None = None, *,
                  ground: ArrayLike = (), names: Sequence[str] | None = None,
                  centres: ArrayLike | None = None, limits: ArrayLike | None = None,
                  body: ArrayLike | None = None, apart: ArrayLike = (),
-                 faults: Iterable[Fault] = ()) -> None:
+                 faults: Iterable[Fault] = (), room: ArrayLike | None = None) -> None:
         """Take what is known; None is what the fields say of what is not.
 
         sizes: full extents (n, 3), or (3,) of all boxes. masses: (n,), or a number for all boxes.
         ground: a box or boxes. names: None are '0', '1', and so on. centres: (n, 3); None are the
-        boxes' own centres. body: (n,); None is a body for each box.
+        boxes' own centres. body: (n,); None is a body for each box. room: (n, 2, 3), or (2, 3) of
+        all boxes; None is no room.
 
         Raises ValueError, with field, row and value, for bad input.
         """
@@ -133,10 +144,22 @@ class Plan:
             limits=(np.full(count, np.inf) if limits is None else
                     _amounts(limits, 'limits', count, np.inf, 'kg')),
             body=_bodies(body, count), apart=as_places(apart, 'apart', count),
-            faults=tuple(faults))
+            faults=tuple(faults), room=_rooms(room, count))
         for row, fault in enumerate(self.faults):
             if not isinstance(fault, Fault):
                 raise ValueError(f'faults[{row}] must be a Fault, not {short_repr(fault)}')
+
+    @classmethod
+    def from_corners(cls, least: ArrayLike, sizes: ArrayLike, masses: ArrayLike | None = None,
+                     **known: Any) -> Plan:
+        """Return the plan of boxes that are not turned, by the least corner of each (n, 3) [m].
+
+        The rest is as `Plan` takes it. Raises ValueError, with field, row and value, for bad input.
+        """
+        least = as_floats(least, 'least', 'corners (n, 3) of rows x y z', (None, 3))
+        turns = np.tile(UNTURNED, (len(least), 1))
+        sizes, _ = as_boxes(sizes, np.hstack((least, turns)), names=('sizes', 'least'))
+        return cls(sizes, np.hstack((least + sizes / 2.0, turns)), masses, **known)
 
     def _set(self, **fields: object) -> None:
         for name, value in fields.items():
@@ -163,6 +186,18 @@ def _centres(value: ArrayLike | None, count: int) -> np.ndarray:
     for row in np.flatnonzero(~(np.abs(array) <= LENGTH_MAX).all(axis=1))[:1]:
         raise ValueError(f'centres[{row}] ({", ".join(f"{x:g}" for x in array[row])}) is not '
                          f'finite, or exceeds {LENGTH_MAX:g} m')
+    return array
+
+
+def _rooms(value: ArrayLike | None, count: int) -> np.ndarray:
+    """Return the least and the greatest corner of the room of each box (n, 2, 3)."""
+    if value is None:
+        value = NO_ROOM
+    array = as_floats(value, 'room', f'corners (2, 3) or ({count}, 2, 3)', (2, 3), (count, 2, 3))
+    array = np.ascontiguousarray(np.broadcast_to(array, (count, 2, 3)))
+    for row in np.flatnonzero(~(array[:, 0] < array[:, 1]).all(axis=1))[:1]:
+        raise ValueError(f'room[{row}] must be a least and a greatest corner, not '
+                         f'{short_repr(array[row].tolist())}')
     return array
 
 

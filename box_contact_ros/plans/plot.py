@@ -14,11 +14,13 @@ from ..solver.checks import printable
 from ..solver.contact_solver import ContactSolver
 from ..solver.pose import rotation_matrix
 from .inspection import GOES, Inspection
+from .room import are_walls
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-COLOURS = {'sound': '#dde5ee', 'not judged': '#cdb4db', 'overlap': '#003049', 'hangs': '#9d0208',
+COLOURS = {'sound': '#dde5ee', 'not judged': '#cdb4db', 'overlap': '#003049',
+           'outside': '#0077b6', 'hangs': '#9d0208',
            'unsupported': '#e63946', 'tips under its load': '#c77dff', 'slides': '#5a189a',
            'goes with what falls': '#f4a261', 'overloaded': '#ffd166', 'ground': '#f2f2f2'}
 """By verdict, in the order of the legend."""
@@ -76,15 +78,19 @@ def plot(found: Inspection) -> Figure:
 
 
 def _drawn(found: Inspection) -> np.ndarray:
-    """Return the boxes that are drawn, by index: not a ground that is far larger than the rest."""
+    """Return the boxes that are drawn, by index.
+
+    Walls of a container, and a ground that is far larger than the rest, are not.
+    """
     plan = found.plan
+    ground = plan.ground[~are_walls(plan)[plan.ground]]
     free = np.setdiff1d(np.arange(len(plan)), plan.ground)
     if not len(free):
-        return plan.ground
+        return ground
     half = np.einsum('nij,nj->ni', np.abs(rotation_matrix(plan.poses[:, 3:])), plan.sizes) / 2.0
     low, high = plan.poses[:, :3] - half, plan.poses[:, :3] + half
     reach = high[free].max(axis=0) - low[free].min(axis=0)
-    small = plan.ground[(2.0 * half[plan.ground] <= 2.0 * reach).all(axis=1)]
+    small = ground[(2.0 * half[ground] <= 2.0 * reach).all(axis=1)]
     return np.sort(np.concatenate((free, small)))
 
 

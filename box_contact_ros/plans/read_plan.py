@@ -7,12 +7,14 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..resources import read_regular
 from ..solver.checks import short_repr
+from .forms import NOTHING, ORIGINS, UNITS, Given
+from .packing import is_first, is_header, read_csv, read_packing
 from .plan import MOST_BYTES, Plan
 
 FORMATS = ('SMDG BAPLIE, SDF, MJCF, URDF, a scene file (YAML), and packing plans as CSV or JSON')
@@ -24,23 +26,33 @@ class ReadPlan(NamedTuple):
     plan: Plan
     bears: str
     """'corners' of containers, else 'faces', as `inspect_plan` takes it."""
+    form: str = ''
+    """How the file of a known packer was read, for people; '' for other files."""
 
 
-def read_plan(path: str | os.PathLike[str]) -> Plan:
+def read_plan(path: str | os.PathLike[str], *, origin: str | None = None, unit: str | None = None,
+              container: Sequence[float] | None = None) -> Plan:
     """Return the plan of a file: SMDG BAPLIE, SDF, MJCF, URDF, a scene file, CSV or JSON.
+
+    origin, unit, container: of CSV and JSON alone, what the file does not tell. origin: 'centre' or
+    'corner', what `x y z` are. unit: 'm', 'cm' or 'mm'. container: (3,) the inner size of each
+    container, in the unit of the file.
 
     What a file says wrongly about some boxes is among the plan's faults. MJCF and URDF need the
     extra `sim`. Raises OSError, and ValueError with the file and the reason for what is no plan.
     """
-    return read_any(path).plan
+    return read_any(path, Given(origin, unit, container)).plan
 
 
-def read_any(path: str | os.PathLike[str]) -> ReadPlan:
+def read_any(path: str | os.PathLike[str], given: Given = NOTHING) -> ReadPlan:
     """Return the plan of a file as `read_plan` does, and how its boxes stand on each other."""
     file = Path(path)
+    for name, value, words in (('origin', given.origin, ORIGINS), ('unit', given.unit, [*UNITS])):
+        if value is not None and value not in words:
+            raise ValueError(f'{name} must be one of {", ".join(words)}, not {short_repr(value)}')
     try:
         data = read_regular(file, MOST_BYTES)
-        return _read(file, data)
+        return _read(file, data, given)
     except OSError as error:
         if error.filename is not None:
             raise
@@ -56,26 +68,35 @@ def read_any(path: str | os.PathLike[str]) -> ReadPlan:
         raise ValueError(f'{file}: {error}') from None
 
 
-def _read(file: Path, data: bytes) -> ReadPlan:
+def _read(file: Path, data: bytes, given: Given) -> ReadPlan:
     start = data[:4096].decode('latin-1').removeprefix('ï»¿').lstrip()
     ending = file.suffix.lower()
-    if start[:4] in ('UNA:', 'UNB+') or start[:3] in ('UNA', 'UNB', 'UNH') or ending == '.edi':
+    if start[:1] in ('{', '['):
+        return _read_json(file, data, given)
+    first = next(filter(is_first, start.splitlines()), '')
+    is_edi = start[:4] in ('UNA:', 'UNB+') or start[:3] in ('UNA', 'UNB', 'UNH') or ending == '.edi'
+    if not is_edi and (ending in ('.csv', '.tsv') or is_header(first)):
+        plan, form = read_csv(data.decode('utf-8'), given)
+        return ReadPlan(plan, 'faces', form)
+    _tells_itself(given)
+    if is_edi:
         from .baplie import read_baplie
         return ReadPlan(read_baplie(data.decode('latin-1')), 'corners')
     if start.startswith('<'):
         return ReadPlan(_read_xml(file, data), 'faces')
-    if start[:1] in ('{', '['):
-        return ReadPlan(_read_json(file, data), 'faces')
     if ending in ('.yaml', '.yml'):
         from .scene import read_scene_plan
         return ReadPlan(read_scene_plan(file), 'faces')
-    first = start.partition('\n')[0].lower()
-    if ending in ('.csv', '.tsv') or ('name' in first and 'length' in first):
-        from .packing import read_csv
-        return ReadPlan(read_csv(data.decode('utf-8')), 'faces')
-    shown = first.strip()[:60]
+    shown = start.partition('\n')[0].strip()[:60].lower()
     raise ValueError(f'line 1: {shown!r} begins no format that is read: {FORMATS}' if shown else
                      f'it is empty; what is read: {FORMATS}')
+
+
+def _tells_itself(given: Given) -> None:
+    """Raise ValueError for what is given of a file that tells it itself."""
+    for name, value in given._asdict().items():
+        if value is not None:
+            raise ValueError(f'{name} must not be given: it is for CSV and JSON of packers alone')
 
 
 def _read_xml(file: Path, data: bytes) -> Plan:
@@ -99,18 +120,17 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return document
 
 
-def _read_json(file: Path, data: bytes) -> Plan:
-    from .packing import read_packing
-
+def _read_json(file: Path, data: bytes, given: Given) -> ReadPlan:
     try:
         document = json.loads(data, object_pairs_hook=_object)
     except json.JSONDecodeError as error:
         raise ValueError(f'line {error.lineno}: it is not JSON: {error.msg}') from None
-    plan = read_packing(document)
-    if plan is not None:
-        return plan
+    read = read_packing(document, given)
+    if read is not None:
+        return ReadPlan(read.plan, 'faces', read.form)
     if isinstance(document, Mapping) and {'boxes', 'bodies', 'pairs'} & document.keys():
         from .scene import read_scene_plan
-        return read_scene_plan(file)
+        _tells_itself(given)
+        return ReadPlan(read_scene_plan(file), 'faces')
     raise ValueError('it is JSON, but neither a packing plan (boxes: [...], see '
                      'msg_schemas/plan.json) nor a scene file')

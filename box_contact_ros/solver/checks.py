@@ -230,7 +230,10 @@ def as_boxes(sizes: ArrayLike, poses: ArrayLike, names: tuple[str, str] = ('size
     of_sizes, of_poses = names
     poses = as_floats(poses, of_poses, 'poses (n, 7) of rows x y z qx qy qz qw', (None, 7))
     count = len(poses)
-    sizes = as_floats(sizes, of_sizes, f'full extents (3,) or ({count}, 3)', (3,), (count, 3))
+    sizes = as_floats(sizes, of_sizes, f'full extents (3,) or ({count}, 3)', (3,), (None, 3))
+    if sizes.ndim == 2 and len(sizes) != count:
+        raise ValueError(f'{of_sizes}: {len(sizes):,} size{"s"[:len(sizes) != 1]}, but {count:,} '
+                         f'pose{"s"[:count != 1]}')
     if sizes.ndim == 1:
         sizes = np.tile(as_size(sizes, of_sizes), (count, 1))
     for row in np.flatnonzero(~((sizes >= LENGTH_MIN) & (sizes <= LENGTH_MAX)).all(axis=1))[:1]:

@@ -22,11 +22,12 @@ import numpy as np
 
 from ..arguments import one_line, program_main, program_parser, within
 from ..extras import MissingExtra, require
-from ..plans.inspect_files import NOT_READ
+from ..plans.inspect_files import NOT_READ, add_given, given_of
 from ..plans.inspect_plan import inspect_plan
 from ..plans.inspection import Inspection
 from ..plans.plot import COLOURS
 from ..plans.read_plan import read_any
+from ..plans.room import are_walls
 from ..solver.checks import printable
 from ..solver.pose import rotation_matrix
 from .style import unit_poses
@@ -58,7 +59,8 @@ class PlanPage:
         self._clicked = gui.add_html(_section('clicked', CLICK_HINT), order=0.0)
         gui.add_html(table(title, found), order=1.0)
         self._middle = np.zeros(3)  # of what is drawn [m]
-        self._shown = np.ones(len(found.plan), bool)
+        self._drawn = ~are_walls(found.plan)
+        self._shown = self._drawn
         self._draw()
 
     def close(self) -> None:
@@ -79,17 +81,18 @@ class PlanPage:
         add_light(scene)
         if not len(plan):
             return
+        shown = np.flatnonzero(self._drawn)
+        sizes, poses = plan.sizes[shown], unit_poses(plan.poses[shown])
         colours = np.array([list(bytes.fromhex(COLOURS[verdict][1:]))
-                            for verdict in self.found.verdicts])
-        poses = unit_poses(plan.poses)
-        half = 0.5 * np.einsum('nij,nj->ni', np.abs(rotation_matrix(poses[:, 3:])), plan.sizes)
+                            for verdict in self.found.verdicts[shown]])
+        half = 0.5 * np.einsum('nij,nj->ni', np.abs(rotation_matrix(poses[:, 3:])), sizes)
         # A floor that is far larger than what is on it must not be what is in view.
-        free = np.setdiff1d(np.arange(len(plan)), plan.ground)
-        seen = free if len(free) else np.arange(len(plan))
+        free = ~np.isin(shown, plan.ground)
+        seen = free if free.any() else ~free
         low = (poses[seen, :3] - half[seen]).min(axis=0)
         high = (poses[seen, :3] + half[seen]).max(axis=0)
         self._middle, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
-        sound = self.found.verdicts == 'sound'
+        sound = self.found.verdicts[shown] == 'sound'
         quiet: list[Any] = []
         for name, boxes in (('/sound', np.flatnonzero(sound)), ('/faults', np.flatnonzero(~sound))):
             if not len(boxes):
@@ -98,7 +101,7 @@ class PlanPage:
             for mesh in meshes:
                 mesh.batched_positions = poses[boxes, :3] - self._middle
                 mesh.batched_wxyzs = np.roll(poses[boxes, 3:], 1, axis=1)
-                mesh.batched_scales = plan.sizes[boxes]
+                mesh.batched_scales = sizes[boxes]
             quiet += meshes if name == '/sound' else ()
             meshes[0].on_click(self._hit)
         self._add_controls(quiet)
@@ -128,7 +131,8 @@ class PlanPage:
 
             @switch.on_update
             def _(_: Any) -> None:
-                self._shown = (self.found.verdicts != 'sound') | (not switch.value)
+                self._shown = self._drawn & (
+                    (self.found.verdicts != 'sound') | (not switch.value))
                 for mesh in quiet:
                     mesh.visible = not switch.value
 
@@ -211,13 +215,14 @@ def main(args: Sequence[str] | None = None) -> int:
                         'reaches it sees the page')
     parser.add_argument('--port', type=within(1, 65535), default=8080, help='port to serve at, or '
                         'the next that is free')
+    add_given(parser)
     options = parser.parse_args(args)
     ended = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ended.set())
     try:
         require('view')
-        plan, bears = read_any(options.file)
+        plan, bears, _ = read_any(options.file, given_of(options))
         page = PlanPage(options.host, options.port, options.file, inspect_plan(plan, bears=bears))
     except (OSError, ValueError, MissingExtra) as error:
         print(one_line(error), file=sys.stderr)

@@ -13,8 +13,9 @@ It prints:
     gripper.xml: overlap
     pallet.csv: unsupported, overloaded
     ship.edi: unsupported, goes with what falls
+    solution.csv: outside, unsupported, unit
     yard.sdf: overlap
-    4 plans, 0 sound
+    5 plans, 0 sound
 """
 import sys
 from pathlib import Path
@@ -30,7 +31,7 @@ def judge(path: Path) -> tuple[bool, str]:
     from box_contact_ros.plans.read_plan import read_any
 
     try:
-        plan, bears = read_any(path)
+        plan, bears, _ = read_any(path)
         found = inspect_plan(plan, bears=bears)
     except (OSError, ValueError) as error:
         return False, str(error)

@@ -26,11 +26,12 @@ def test_the_page_shows_what_is_printed(arguments, printed, monkeypatch, capsys)
     assert capsys.readouterr().out == printed
 
 
-def test_the_page_has_a_ship_a_pallet_and_a_world():
-    assert [Path(arguments).suffix for arguments, _ in SHOWN] == ['.edi', '.csv', '.sdf']
+def test_the_page_has_a_packers_file_a_ship_and_a_world():
+    assert [Path(arguments).suffix for arguments, _ in SHOWN] == ['.csv', '.edi', '.sdf']
 
 
 def test_every_fault_is_on_the_page():
     from box_contact_ros.plans.inspection import CAUSES
     from box_contact_ros.plans.plan import FAULT_KINDS
-    assert [kind for kind in (*FAULT_KINDS, *CAUSES, 'overlap') if f'`{kind}`' not in PAGE] == []
+    kinds = (*FAULT_KINDS, *CAUSES, 'overlap', 'outside')
+    assert [kind for kind in kinds if f'`{kind}`' not in PAGE] == []

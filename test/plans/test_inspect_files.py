@@ -247,11 +247,12 @@ def test_several_files_have_a_line_each(tmp_path, capsys):
     bad = str(written(tmp_path, 'b.csv', sheet('a,1,1,1,0,0,0.7')))
     assert inspect_files.main([good, bad]) == 1
     assert capsys.readouterr().out.splitlines() == [f'{good}: 1 box: sound',
-                                                    f'{bad}: 1 box: not sound']
+                                                    f'{bad}: 1 box: not sound',
+                                                    '2 files, 2 boxes: 1 sound, 1 not sound']
     assert inspect_files.main([bad, str(tmp_path / 'none.csv'), good]) == 2
     printed = capsys.readouterr()
     assert printed.err == f'{tmp_path / "none.csv"}: No such file or directory\n'
-    assert len(printed.out.splitlines()) == 2
+    assert printed.out.splitlines()[2:] == ['3 files, 2 boxes: 1 sound, 1 not sound, 1 not read']
 
 
 def test_of_several_files_the_worst_counts(tmp_path, capsys):
@@ -351,3 +352,6 @@ def test_the_hint_can_be_typed(tmp_path, monkeypatch, capsys):
         written(tmp_path, name, sheet('a,1,1,1,0,0,0.5'))
         assert inspect_files.main(['--', name]) == 0
         assert capsys.readouterr().out.endswith(f'box_contact_view {shown}\n')
+    inspect_files.main(['a b;c.csv', '--unit', 'cm', '--container', '1', '2.5', '3'])
+    assert capsys.readouterr().out.endswith(
+        "box_contact_view --unit cm --container 1.0 2.5 3.0 'a b;c.csv'\n")

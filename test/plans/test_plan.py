@@ -29,7 +29,20 @@ def test_lists_become_arrays():
     assert plan.body.tolist() == [0, 0] and plan.names == ('a', 'b') and len(plan.faults) == 1
 
 
+def test_a_plan_by_least_corners():
+    plan = Plan.from_corners([(0, 0, 0), (1, 0, 0)], [(1, 2, 3), (2, 2, 2)], 5, ground=1)
+    assert plan.poses.tolist() == [[.5, 1, 1.5, 0, 0, 0, 1], [2, 1, 1, 0, 0, 0, 1]]
+    assert plan.masses.tolist() == [5, 5] and plan.ground.tolist() == [1]
+    assert Plan.from_corners([(0, 0, 0)] * 2, (1, 1, 1)).sizes.shape == (2, 3)
+    for least, sizes, words in (([(0, 0)], (1, 1, 1), 'least must be corners'),
+                                ([(0, 0, np.nan)], (1, 1, 1), r'least\[0\] position .* finite'),
+                                ([(0, 0, 0)], [(1, 1, 1)] * 2, 'sizes: 2 sizes, but 1 pose')):
+        with pytest.raises(ValueError, match=f'^{words}'):
+            Plan.from_corners(least, sizes)
+
+
 @pytest.mark.parametrize('field, value, words', [
+    ('sizes', [(1, 1, 1)], '^sizes: 1 size, but 2 poses$'),
     ('sizes', [(1, 1, 1), (1, -1, 1)], r'sizes\[1\] \(1, -1, 1\) is not positive'),
     ('sizes', (1, np.nan, 1), 'sizes .* is not finite'),
     ('poses', [AT[:6]] * 2, r'poses must be .* not an array of shape \(2, 6\)'),

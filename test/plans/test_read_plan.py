@@ -435,6 +435,14 @@ def test_the_schema(tmp_path: Path) -> None:
     jsonschema = pytest.importorskip('jsonschema')
     schema = json.loads((ROOT / 'msg_schemas/plan.json').read_text('utf-8'))
     jsonschema.Draft202012Validator.check_schema(schema)
+    box = json.loads(document())['boxes'][0]
+    for way, good in (({'x_min': -.5, 'y_min': -.5, 'z_min': 0}, False), ({'lx': 1}, True),
+                      ({'lx': 1, 'ly': 1, 'lz': 1}, False)):
+        text = json.dumps({'boxes': [{**box, **way}], 'container': [1, 1, 1]})
+        assert jsonschema.Draft202012Validator(schema).is_valid(json.loads(text)) == good
+        if not good:
+            with pytest.raises(ValueError, match='both tell a'):
+                read_plan(written(tmp_path, 'a.json', text))
     for changed, good in (({}, True), ({'mass': 3.5, 'limit': 0, 'fixed': True}, True),
                           ({'qx': 0, 'qy': 0, 'qz': 1, 'qw': 0}, True), ({'length': 0}, False),
                           ({'z': '1'}, False), ({'qx': 1}, False), ({'mass': -1}, False)):
@@ -496,7 +504,7 @@ def test_what_stands_on_what_is_left_out_is_not_judged(boxes, left_out, names, t
             re.sub('|'.join(f'EQD.CN.TEST000000{n}' for n in left_out), 'EQD+BB+X', baplie(*boxes)),
             baplie(*(f'{box.split()[0]} ZZZZ' if n in left_out else box
                      for n, box in enumerate(boxes)))):
-        plan, bears = read_any(written(tmp_path, 'a.edi', text))
+        plan, bears, _ = read_any(written(tmp_path, 'a.edi', text))
         assert [fault.names for fault in plan.faults if 'stands on' in fault.text] == (
             [tuple(names)] if names else [])
         assert inspect_plan(plan, bears=bears).verdict == 'not all judged'

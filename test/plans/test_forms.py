@@ -1,0 +1,297 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Packers' own forms, read as they are: places, overlaps and shares equal those of integers."""
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_read_plan import document, sheet, written
+
+from box_contact_ros.plans import inspect_files
+from box_contact_ros.plans.forms import Given
+from box_contact_ros.plans.inspect_plan import inspect_plan
+from box_contact_ros.plans.packing import read_packing
+from box_contact_ros.plans.read_plan import read_any, read_plan
+
+BOXES = [(0, 0, 0, 60, 40, 30), (60, 0, 0, 60, 40, 30), (30, 0, 30, 60, 40, 20),
+         (0, 35, 0, 60, 40, 30), (95, 0, 30, 40, 40, 20), (40, 10, 50, 30, 30, 25)]
+"""Least corners and sizes: the first and the fourth overlap, the fifth is beyond the container."""
+CONTAINER = (130, 80, 100)
+
+
+def packingsolver(stacks: bool) -> str:
+    """Return a solution, as it writes boxes or stacks of boxes."""
+    label, end = (',{n}', '0') if stacks else ('', 'XYZ')
+    lines = [f'TYPE,ID,COPIES,BIN{",STACK" * stacks},X,Y,Z,LX,LY,LZ,'
+             f'{"GROUP_ID" if stacks else "ROTATION"}',
+             f'BIN,0,1,0{",-1" * stacks},0,0,0,{CONTAINER[0]},{CONTAINER[1]},{CONTAINER[2]},']
+    lines += ['STACK,0,1,0,0,0,0,0,60,40,30,'] * stacks
+    return '\n'.join([*lines, *(f'ITEM,{n % 2},1,0{label.format(n=n)},'
+                                f'{",".join(map(str, box))},{end}'
+                                for n, box in enumerate(BOXES)), ''])
+
+
+def roadef() -> str:
+    """Return items of the ROADEF challenge 2022, as its checker has the header."""
+    rows = [';'.join(map(str, ('0090_01', 'P18', f'P18_{n}', f'A{n}', x, y, f'{z} ', x + length,
+                               y + width, z + height)))
+            for n, (x, y, z, length, width, height) in enumerate(BOXES)]
+    return '\n'.join(['Item ident;Id truck;Id stack;Item code;X origin;Y origin; Z origin; '
+                      'X extremity; Y extremity; Z extremity', *rows, ''])
+
+
+def dwave(bins: int = 1) -> str:
+    """Return a table of D-Wave's example; each bin begins where the one before it ends."""
+    rows = [f'{n % 3:>9}{bin_ + 1:>16}{1:>15}{x + bin_ * CONTAINER[0]:>5}' + ''.join(
+        f'{value:>6}' for value in rest) for bin_ in range(bins)
+        for n, (x, *rest) in enumerate(BOXES)]
+    return '\n'.join([
+        f'# Number of bins used: {bins}', '# Objective value: 10.4', '',
+        "  case_id    bin_location    orientation    x    y    z    x'    y'    z'",
+        '---------  --------------  -------------  ---  ---  ---  ----  ----  ----', *rows])
+
+
+def py3dbp() -> str:
+    """Return the attributes of a bin, with numbers as text, as decimals are often written."""
+    items = [{'name': f'{n}', 'width': f'{height}', 'height': f'{length}', 'depth': f'{width}',
+              'weight': '2.5', 'rotation_type': 2, 'position': [f'{x}', f'{y}', f'{z}.000']}
+             for n, (x, y, z, length, width, height) in enumerate(BOXES)]
+    sides = dict(zip(('width', 'height', 'depth'), CONTAINER))
+    return json.dumps({'bins': [{'name': 'bin', **sides, 'items': items,
+                                 'unfitted_items': [{'name': 'left'}]}]})
+
+
+def py3dbp_answer() -> str:
+    """Return the answer of its web service: corners and floored halves."""
+    return json.dumps({'Success': True, 'data': {
+        'box': [{'WHD': CONTAINER, 'partNumber': 'c'}], 'unfitItem': [], 'fitItem': [
+            {'WHD': box[3:], 'position': [low + side // 2 for low, side in zip(box, box[3:])],
+             'partNumber': f'{n}', 'weight': 2} for n, box in enumerate(BOXES)]}})
+
+
+def benchmark(kind: str = 'placed') -> str:
+    """Return a pallet of palletizing-benchmark."""
+    sides = ('width', 'depth', 'height')
+    return json.dumps({'order_id': '1', 'kind': kind, 'stats': {}, 'container': dict(zip(
+        sides, CONTAINER)), 'boxes': [
+            {'id': n, 'sku_id': 's', 'rotation': 0, 'weight': 2.5, 'position': dict(zip('xyz', (
+                low + side / 2 for low, side in zip(box, box[3:])))),
+             'dimensions': dict(zip(sides, box[3:]))} for n, box in enumerate(BOXES)]})
+
+
+def viewer() -> str:
+    """Return a container of the viewer of 3d-bin-container-packing."""
+    keys = ('x', 'y', 'z', 'dx', 'dy', 'dz')
+    placements = [{**dict(zip(keys[:3], box)), 'stackable': {
+        'name': 'g', **dict(zip(keys[3:], box[3:])), 'type': 'box'}} for box in BOXES]
+    return json.dumps({'containers': [{'name': '1', 'stack': {'placements': placements}, **dict(zip(
+        ('loadDx', 'loadDy', 'loadDz'), CONTAINER))}]})
+
+
+CORNERS = 'least corners, sizes along x y z'
+FORMS = {
+    'packingsolver': ('a.csv', packingsolver(False),
+                      f'a solution of packingsolver: {CORNERS}, no unit'),
+    'stacks of packingsolver': ('a.csv', packingsolver(True),
+                                f'a solution of packingsolver: {CORNERS}, no unit'),
+    'ROADEF': ('a.csv', roadef(), 'items of the ROADEF challenge 2022: two corners, mm'),
+    'D-Wave': ('a.txt', dwave(), f"a solution of D-Wave's 3d-bin-packing: {CORNERS}, no unit"),
+    'py3dbp': ('a.json', py3dbp(), f'what py3dbp packed: {CORNERS}, no unit'),
+    'answer of py3dbp': ('a.json', py3dbp_answer(), f'what py3dbp packed: {CORNERS}, no unit'),
+    'benchmark': ('a.json', benchmark(), 'a pallet of palletizing-benchmark: centres, sizes along '
+                                         'x y z, m'),
+    'viewer': ('a.json', viewer(), f'containers of 3d-bin-container-packing: {CORNERS}, mm'),
+    'least corners': ('a.csv', '\n'.join(['name,x_min,y_min,z_min,lx,ly,lz', *(
+        f'{n},{",".join(map(str, box))}' for n, box in enumerate(BOXES)), '']), ''),
+    'two corners': ('a.csv', '\n'.join(['name;x_min;y_min;z_min;x_max;y_max;z_max', *(
+        f'{n};' + ';'.join(f'{value:.1f}'.replace('.', ',') for value in (
+            *box[:3], *(low + side for low, side in zip(box, box[3:]))))
+        for n, box in enumerate(BOXES)), '']), ''),
+}
+
+
+def meets(axis: int, a: tuple[int, ...], b: tuple[int, ...]) -> int:
+    """Return by how much two boxes overlap along an axis."""
+    return min(a[axis] + a[axis + 3], b[axis] + b[axis + 3]) - max(a[axis], b[axis])
+
+
+OVERLAPS = [[a, b] for a in range(6) for b in range(a + 1, 6)
+            if min(meets(axis, BOXES[a], BOXES[b]) for axis in range(3)) > 0]
+SHARES = [1.0 if box[2] == 0 else min(1.0, sum(  # two that overlap may carry one place
+    max(0, meets(0, box, low)) * max(0, meets(1, box, low)) for low in BOXES
+    if low[2] + low[5] == box[2]) / (box[3] * box[4])) for box in BOXES]
+
+
+@pytest.mark.parametrize('unit', ['m', 'cm', 'mm'])
+@pytest.mark.parametrize('form', FORMS)
+def test_a_form_is_read_as_it_is(form: str, unit: str, tmp_path: Path) -> None:
+    """And its overlaps, shares and what is outside are those of integers."""
+    name, text, line = FORMS[form]
+    given = Given(unit=unit, container=CONTAINER)
+    plan, bears, title = read_any(written(tmp_path, name, text), given)
+    known = line.rpartition(', ')[0]
+    assert title == (f'read as {known}, {unit}' if line else '') and bears == 'faces'
+    assert not any(fault.verdict != 'sound' for fault in plan.faults)
+    scale = {'m': 1.0, 'cm': 1e-2, 'mm': 1e-3}[unit]
+    least = plan.poses[:6, :3] - plan.sizes[:6] / 2.0
+    assert np.abs(np.hstack((least, plan.sizes[:6])) / scale - BOXES).max() < 1e-9
+    found = inspect_plan(replace(plan, masses=None))
+    assert OVERLAPS == [[0, 3]] and found.overlaps.tolist() == OVERLAPS
+    assert found.depths == pytest.approx([5 * scale])
+    assert found.share[:6] == pytest.approx(SHARES) and SHARES[4] == 0.625
+    assert np.argwhere(found.outside).tolist() == [[4, 1, 0]]
+    assert found.outside[4, 1, 0] == pytest.approx(5 * scale)
+    assert plan.names[6:] == tuple(f'{plan.names[6].rpartition(" ")[0]} {end}' for end in (
+        'floor', 'wall -x', 'wall +x', 'wall -y', 'wall +y'))
+
+
+@pytest.mark.parametrize('form', FORMS)
+def test_the_first_line_names_the_form(form: str, tmp_path: Path, capsys) -> None:
+    """A form without a unit is read in mm, and not all is judged before the unit is told."""
+    pytest.importorskip('clarabel')
+    name, text, line = FORMS[form]
+    path = written(tmp_path, name, text)
+    assert inspect_files.main([str(path)]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert not line or lines[0] == f'read as {line}'
+    doubt = 'no unit' in line or not line
+    assert any(row.startswith('unit  ') for row in lines) == doubt
+    assert lines[-2].endswith('not sound; the unit is doubtful: add --unit') == doubt
+
+
+def test_without_a_unit_not_all_is_judged(tmp_path: Path, capsys) -> None:
+    pytest.importorskip('clarabel')
+    text = packingsolver(False).splitlines(keepends=True)
+    path = str(written(tmp_path, 'a.csv', ''.join(text[:4])))
+    assert inspect_files.main([path]) == 3
+    assert 'read as mm; add --unit m, cm or mm' in capsys.readouterr().out
+    assert inspect_files.main([path, '--unit', 'cm']) == 0
+    assert capsys.readouterr().out.splitlines()[0].endswith('x y z, cm')
+
+
+def test_bins_in_a_line(tmp_path: Path) -> None:
+    """D-Wave's x goes on from bin to bin; with a container each has its own."""
+    path = written(tmp_path, 'a.txt', dwave(2))
+    plan = read_plan(path, unit='mm')
+    assert plan.poses[6:12, 0] - plan.poses[:6, 0] == pytest.approx(0.13)
+    plan = read_plan(path, unit='mm', container=CONTAINER)
+    assert plan.poses[6:12, 0] - plan.poses[:6, 0] == pytest.approx(1.135)
+    found = inspect_plan(plan)
+    assert np.argwhere(found.outside).tolist() == [[4, 1, 0], [10, 1, 0]]
+    assert found.overlaps.tolist() == [[0, 3], [6, 9]] and plan.names[12] == '1 floor'
+
+
+REFUSED = {
+    'remainder': ('a.json', benchmark('remainder'), {}, "its kind is 'remainder'"),
+    'two ways': ('a.csv', sheet(more=',x_min,y_min,z_min'), {}, 'line 1: x y z and x_min y_min '
+                 'z_min both tell a place: leave one out'),
+    'two sizes': ('a.csv', sheet(more=',lx,ly,lz'), {}, 'height and lx ly lz both tell a size'),
+    'a corner is missing': ('a.csv', 'name,x_min,z_min,lx,ly,lz\n', {}, 'column y_min is missing'),
+    'a greatest corner alone': ('a.csv', 'name,x,y,z,x_max,y_max,z_max\n', {},
+                                'column x_min is missing'),
+    'centres': ('a.csv', packingsolver(False), {'origin': 'centre'}, 'solver has least corners'),
+    'centres of our own': (*FORMS['least corners'][:2], {'origin': 'centre'}, 'are a corner'),
+    'origin': ('a.csv', sheet(), {'origin': 'middle'}, 'origin must be one of centre, corner, not'),
+    'unit': ('a.csv', sheet(), {'unit': 'inch'}, "unit must be one of m, cm, mm, not 'inch'"),
+    'container': ('a.csv', sheet('a,1,1,1,0,0,.5'), {'container': (1, 2)}, 'container must be'),
+    'container in a file': ('a.json', '{"container": [1, 2, 0], ' + document()[1:], {},
+                            r'three inner sizes above 0, not \[1, 2, 0\]'),
+    'of a ship': ('a.edi', '', {'unit': 'mm'}, 'unit must not be given'),
+    'of a scene': ('a.json', '{"boxes": {}}', {'origin': 'corner'}, 'origin must not be given'),
+    'decimal commas': ('a.csv', sheet('a,1,2,1,0,1,0,0,0,0,0,0,5'), {}, 'are commas decimal marks'),
+}
+
+
+@pytest.mark.parametrize('case', REFUSED)
+def test_what_is_refused(case: str, tmp_path: Path) -> None:
+    name, text, given, words = REFUSED[case]
+    with pytest.raises(ValueError, match=words) as caught:
+        read_plan(written(tmp_path, name, text), **given)
+    assert '\n' not in str(caught.value)
+
+
+ODD = [None, True, [], {}, 'x', '', -1, 0, 1e400, np.nan, [1, 2], {'a': 1}, '1,2', 10**400]
+
+
+def test_odd_values_are_faults_or_refused() -> None:
+    """Wherever they are in a document."""
+    rng = np.random.default_rng(4)
+    texts = [text for name, text, _ in FORMS.values() if name == 'a.json']
+    counts = [0, 0]
+    for _ in range(3000):
+        part = whole = [json.loads(texts[rng.integers(len(texts))])]
+        while isinstance(part, list | dict) and part:
+            holder, key = part, list(part if isinstance(part, dict) else range(len(part)))[
+                rng.integers(len(part))]
+            part = part[key]
+            if rng.random() < 0.3:
+                break
+        holder[key] = ODD[rng.integers(len(ODD))]
+        try:
+            counts[0] += read_packing(whole[0], Given()) is not None
+        except ValueError:
+            counts[1] += 1
+    assert min(counts) > 100
+
+
+def test_a_decimal_comma_in_a_number(tmp_path: Path) -> None:
+    text = sheet('a,1,1,1,0,0,.5', 'b,"1,2",1,1,0,0,1.5')
+    (fault,) = read_plan(written(tmp_path, 'a.csv', text)).faults
+    assert fault.text == "row 2: length is '1,2'; the decimal mark is a point: left out"
+
+
+def test_a_turned_box_has_no_least_corner(tmp_path: Path) -> None:
+    text = sheet('a,1,1,1,0,0,0,0,0,0,1', 'b,1,1,1,0,0,1,0,0,1,0', more=',qx,qy,qz,qw')
+    plan = read_plan(written(tmp_path, 'a.csv', text), origin='corner')
+    assert [(fault.kind, *fault.names) for fault in plan.faults] == [('pose', 'b')]
+    assert plan.poses[0, :3].tolist() == [.5, .5, .5]
+
+
+def wall_of(*rows: str) -> str:
+    """Return bricks, by their least corners."""
+    return sheet('a,60,40,30,0,0,0', 'b,60,40,30,60,0,0', 'c,60,40,30,30,0,30', *rows)
+
+
+@pytest.mark.parametrize(('text', 'options', 'status', 'words'), [
+    (wall_of(), [], 1, ['origin  ', '--origin corner', 'unit  ']),
+    (wall_of(), ['--origin', 'corner'], 3, ['unit  ']),
+    (wall_of(), ['--origin', 'corner', '--unit', 'cm'], 0, []),
+    (wall_of('d,60,40,30,30,0,31'), ['--unit', 'cm'], 1, []),  # wrong as corners, too
+    (sheet('a,.6,.4,.3,.3,.2,.15', 'b,.6,.4,.3,.3,.2,.45'), [], 0, []),
+    (wall_of(), ['--origin', 'corner', '--unit', 'cm', '--container', '120', '40', '60'], 0, []),
+    (wall_of(), ['--unit', 'cm', '--container', '120', '40', '60'], 1, ['origin  ', 'outside  ']),
+    (wall_of(), ['--origin', 'corner', '--unit', 'cm', '--container', '119', '40', '58'], 1,
+     ['outside               b  10.0 mm beyond +x', 'outside               c  20.0 mm beyond +z'])])
+def test_what_seems_to_be_meant(text, options, status, words, tmp_path, capsys) -> None:
+    """One line tells that places are corners, or sizes not in metres; what is told is believed."""
+    pytest.importorskip('clarabel')
+    assert inspect_files.main([str(written(tmp_path, 'a.csv', text)), *options]) == status
+    lines = capsys.readouterr().out
+    for word in ('origin  ', 'unit  ', 'outside  ', *words):
+        assert (word in lines) == any(word in one for one in words), lines
+
+
+# --- containers -----------------------------------------------------------------------------------
+
+
+def test_a_load_leans_on_a_wall(tmp_path: Path) -> None:
+    """A wall carries with sides and friction, and an overlap with it is told as outside alone."""
+    pytest.importorskip('clarabel')
+    low = {'name': 'low', 'lx': .3, 'ly': 1, 'lz': 1, 'x_min': 0, 'y_min': 0, 'z_min': 0,
+           'mass': 50}
+    high = {**low, 'name': 'high', 'lx': 1, 'z_min': 1, 'mass': 10}
+    boxes = {'boxes': [low, high], 'container': [1, 1, 3]}
+    plan = read_plan(written(tmp_path, 'a.json', json.dumps(boxes)))
+    assert inspect_plan(plan).cause.tolist()[:2] == ['', 'unsupported']
+    assert inspect_plan(plan, sides=True, friction=1.0).sound
+    high['x_min'] = .012
+    plan = read_plan(written(tmp_path, 'a.json', json.dumps(boxes)))
+    found = inspect_plan(plan, sides=True)
+    assert [str(row) for row in found.rows()][:1] == [
+        'outside               high  12.0 mm beyond +x']
+    assert not len(found.overlaps) and found.verdict == 'not sound'
