@@ -248,7 +248,7 @@ def pallets(folder: Path) -> None:
     order = Plan(orders.sizes[kept], orders.poses[kept], orders.masses[kept],
                  ground=len(kept) - 1, names=[orders.names[n].removeprefix(ORDER) for n in kept])
     for name, plan, size in (('pallets', order, (6.6, 6.0)),
-                             ('pallet', read_plan(examples / 'files' / 'pallet.csv'), (7.0, 4.0))):
+                             ('pallet', read_plan(examples / 'files' / 'solution.csv', unit='mm'), (7.0, 3.6))):
         figure = inspect_plan(plan).plot()
         figure.set_size_inches(*size)
         figure.savefig(folder / f'{name}.png', dpi=80, metadata={'Software': None})
