@@ -240,15 +240,15 @@ def trihedron(folder: Path) -> None:
 
 
 def pallets(folder: Path) -> None:
-    """Draw pallets.png, a real order, and pallet.png, a file of the docs, coloured by cause."""
+    """Draw pallets.png, a real order, and pallet.png, a packer's file, coloured by cause."""
     examples = Path(__file__).parents[1] / 'examples'
     orders = read_plan(examples / 'pallets' / 'packing_plans.json')
     kept = [n for n, name in enumerate(orders.names)
             if name.startswith(ORDER) or n in orders.ground]
     order = Plan(orders.sizes[kept], orders.poses[kept], orders.masses[kept],
                  ground=len(kept) - 1, names=[orders.names[n].removeprefix(ORDER) for n in kept])
-    for name, plan, size in (('pallets', order, (6.6, 6.0)),
-                             ('pallet', read_plan(examples / 'files' / 'solution.csv', unit='mm'), (7.0, 3.6))):
+    packed = read_plan(examples / 'files' / 'solution.csv', unit='mm')
+    for name, plan, size in (('pallets', order, (6.6, 6.0)), ('pallet', packed, (7.0, 3.6))):
         figure = inspect_plan(plan).plot()
         figure.set_size_inches(*size)
         figure.savefig(folder / f'{name}.png', dpi=80, metadata={'Software': None})
