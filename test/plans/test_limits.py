@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -52,6 +53,20 @@ def test_what_is_no_file_is_refused_at_once(name, make, tmp_path, capsys):
     make(path)
     assert inspect_files.main([str(path)]) == 2
     assert capsys.readouterr().err == f'{path}: it is not a regular file\n'
+
+
+@pytest.mark.parametrize('name', ['p.csv', 'p.edi', 'p.sdf', 'p.yaml'])
+def test_a_file_without_permission(name, tmp_path):
+    path = written(tmp_path, name, 'x')
+    path.chmod(0)
+    # Who may read everything, as root, does without that right.
+    start = ['setpriv', '--bounding-set', '-dac_override,-dac_read_search'] * (os.geteuid() == 0)
+    if start and not shutil.which(start[0]):
+        pytest.skip('setpriv is not installed')
+    done = subprocess.run([*start, sys.executable, '-m', 'box_contact_ros.plans.inspect_files',
+                           str(path)], capture_output=True, text=True, timeout=100)
+    assert (done.returncode, done.stdout) == (2, '')
+    assert done.stderr == f'{path}: Permission denied\n'
 
 
 @pytest.mark.parametrize('make', [os.mkfifo, os.mkdir, lambda path: os.symlink('/dev/zero', path)])
