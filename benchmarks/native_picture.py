@@ -40,7 +40,8 @@ def draw(path: Path, table: Path, instruction_set: str, sets: list[str]) -> None
     axis.set_yticks(range(len(sets)), sets)
     axis.invert_yaxis()
     axis.set(xscale='log', xlabel=f'time of a call from C [times {UNIT_NAME}]',
-             title=f'exact takes {median:.1f} times as long as MuJoCo ({instruction_set})')
+             title=f'In the median set exact takes {median:.1f} times as long as MuJoCo '
+                   f'({instruction_set})')
     axis.set_xticks([0.5, 1, 2, 5, 10], ['0.5', '1', '2', '5', '10'])
     axis.minorticks_off()
     axis.grid(color='0.9', linewidth=0.5)

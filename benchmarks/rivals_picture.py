@@ -35,7 +35,8 @@ def title(by_scene: dict[str, dict[str, dict[str, str]]]) -> str:
     ratios = [float(mine) / float(theirs) for mine, theirs in pairs if mine and theirs]
     least, most = (output.number(ratio, 2) for ratio in (min(ratios), max(ratios)))
     mine, theirs = (f'{row["engine"]} ({row["numbers"]})' for row in (ours, rival))
-    return f'Awake, a step of {mine} takes {least} to {most} times as long as one of {theirs}'
+    return (f'Awake, a step of {mine} takes {least} to {most} times as long as one of {theirs}.\n'
+            'Green: it is faster than the engine of the column; red: slower.')
 
 
 def draw(path: Path, table: Path) -> None:

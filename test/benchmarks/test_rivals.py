@@ -131,7 +131,7 @@ def test_the_map_says_where_ours_is_faster() -> None:
              for name, each in times.items()}
     assert rivals_picture.title({'wall': found}) == (
         'Awake, a step of PatchForces (float) takes 0.50 to 1.2 times as long as one of '
-        'Box3D (float)')
+        'Box3D (float).\nGreen: it is faster than the engine of the column; red: slower.')
     assert rivals_picture.cell('', '100')[0] == '–'
     assert rivals_picture.cell('20', '100') == ('20.0\n× 0.20', rivals_picture.RATIOS[0][1])
     assert rivals_picture.cell('2000', '100')[1] == rivals_picture.RATIOS[-1][1]
