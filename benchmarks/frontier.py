@@ -153,8 +153,8 @@ def in_short(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> str:
                 f'`{name}`, {instruction_set}' if name in CORE_MODELS else name,
                 f'{number(shown.single[0] / 1e3)}, {number(shown.single[1] / 1e3)}',
                 number(shown.batch), shown.best if name in rivals else '–',
-                *[number(row.errors.points['all'].p99) if row and row.errors.points else '–'
-                  for row in (shown, rest)],
+                *[number(row.choices[shown.best].points['all'].p99)
+                  if row and row.choices[shown.best].points else '–' for row in (shown, rest)],
                 number(max(normals, default=math.nan)),
                 f'{sum(row.errors.missed for row in mine.values())} of '
                 f'{sum(row.judged for row in mine.values()):,}',

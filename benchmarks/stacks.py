@@ -228,7 +228,9 @@ def main(args: Sequence[str] | None = None) -> int:
         for name, ways in found.items() for way, each in ways.items()), digits=3, about=about)
     stacks_picture.draw(folder / 'stacks.png', folder / 'stacks.csv')
     stacks_picture.draw_parts(folder / 'stacks_parts.png', folder / 'stacks.csv')
+    cheaper = sum(ways[MUJOCO].cost < ways[ours].cost for ways in found.values())
     output.write_page(folder, 'stacks', args, machine=about, rest=rest, both=both, **beside,
+                      scenes=len(found), cheaper=cheaper,
                       pushed=pushed(ORDERS[:1] if options.quick else ORDERS))
     missed = [name for name, ways in found.items() if math.isnan(ways[ours].rest)]
     for name in missed:

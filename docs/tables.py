@@ -44,10 +44,10 @@ class Choice(NamedTuple):
 CHOICES = (
     Choice('`exact`', 'exact', ('exact volume', 'exact covariance')),
     Choice('`mlp`', 'mlp', ('mlp volume', 'mlp covariance')),
-    Choice("the paper's network", 'paper', ('paper',), rest='settled cubes'),
+    Choice("the paper's network, cubes", 'paper', ('paper',), rest='settled cubes'),
     Choice('MuJoCo', 'MuJoCo mj_collision', ('mjc_BoxBox',)),
-    Choice('PyBullet', 'PyBullet getContactPoints', ('Bullet btBoxBoxDetector',)),
-    Choice('Coal', 'Coal ComputeCollision', ('Coal ComputeCollision',)),
+    Choice('PyBullet; in C Bullet', 'PyBullet getContactPoints', ('Bullet btBoxBoxDetector',)),
+    Choice('Coal, patch', 'Coal ComputeCollision, contact patch', ('Coal ComputeContactPatch',)),
     Choice('Drake, hydroelastic', 'Drake hydroelastic'),
 )
 """This package's models, the network of the source paper, and the engines."""
@@ -126,8 +126,8 @@ def with_version(name: str, row: Row) -> str:
     package = row['versions'].split(', ')[2:]  # after those of Python and NumPy
     if not package or not name[0].isupper():
         return name
-    engine, comma, way = name.partition(',')
-    return f'{engine} {package[0].split()[1]}{comma}{way}'
+    engine, *way = re.split('(?=[,;])', name, maxsplit=1)
+    return f'{engine} {package[0].split()[1]}{"".join(way)}'
 
 
 def models() -> str:
@@ -137,7 +137,7 @@ def models() -> str:
         call = fastest(rows('frontier.csv', contestant=choice.contestant, set=choice.rest,
                             **{'class': 'all'}))
         assert call
-        errors = [f'{cell(row, "point_p50", digits=2)}, {cell(row, "point_p99", digits=2)}'
+        errors = [f'{float(row["point_p50"]):.2g}, {float(row["point_p99"]):.2g}'
                   for row in error_rows(choice)] or ['reference'] * 2
         share = float(call['contacts']) / float(call['judged'])
         body.append([with_version(choice.name, call), cell(call, 'call_p50', 1e3),
@@ -151,13 +151,15 @@ def models() -> str:
     return (f'{table}\n\nMedian times on one core, {SHOWN[where["instruction_set"]]}, '
             f'{where["processor"]}; in C those in brackets are with the size of the patch, which '
             "Python includes. Off: median and 99th percentile of distances from `exact`'s point, "
-            "in % of the smaller box's longest edge. Of the ways in which an engine's points make "
-            'one, the nearest is taken. PyBullet needs five detections at a new pose. At rest: '
-            'goods that have settled; moving: swaying containers; landing: containers that touch '
-            'down. A dash: not measured.\n\n'
+            "in % of the smaller box's longest edge, for engines of 1,000 pairs. They answer "
+            'another question: of the ways to make one point of theirs, the nearest is taken. '
+            'Answered: in pairs shallower than 1e-9 of the size, some find no contact. Moving: '
+            'swaying containers. PyBullet is asked at new poses, which need five detections; its C '
+            'is Bullet 3.24 for SSE2. A dash: not measured.\n\n'
             f'`exact` is the default. In batches from Python `mlp` takes {batches[0]} of its time '
             f'at rest, {batches[1]} landing and {batches[2]} moving; for one pair it takes longer. '
-            f"The paper's network takes {by_exact('paper', 'landings', 'call')} landing.")
+            f"For one pair, the paper's network takes {by_exact('paper', 'landings', 'call')} of "
+            'the time of `exact` landing.')
 
 
 def bench() -> str:
@@ -169,7 +171,7 @@ def bench() -> str:
     ratio, _, rest = ratios[1].removeprefix('contact / echo ').partition(' ')
     return (f'Over ROS, an answer takes {ratio} times as long as that of an echo node, which sends '
             f'each pose back and computes nothing (95 % interval {rest.partition("]")[0]}]; '
-            f'{machine[1]}): which model answers is not felt. The median answer at {rate[1]} Hz '
+            f'{machine[1]}). The median answer at {rate[1]} Hz '
             f'takes {median[1]} ms, and that of the soup node {soup} times as long. See [the '
             'report](docs/results/bench_exact.md).')
 
