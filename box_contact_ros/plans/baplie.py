@@ -239,7 +239,7 @@ def checked(rows: Iterable[Stowed], faults: list[Fault]) -> tuple[list[Placed], 
             not_stowed.append(row.number or row.slot)
         elif not row.is_container:
             breakbulk.append(row)
-        elif not re.fullmatch('[0-9]{7}', row.slot):
+        elif not re.fullmatch('(?!000)[0-9]{7}', row.slot):  # bays begin at 1
             forms[len(row.slot)].append(row.name)
         elif row.slot in placed:
             faults.append(Fault('twice', (row.slot,), f'{row.number or "a container"} has the slot '
@@ -255,8 +255,8 @@ def checked(rows: Iterable[Stowed], faults: list[Fault]) -> tuple[list[Placed], 
             placed[row.slot] = Placed(row.slot, row.number, *_numbers(row.slot), size, mass)
     for count, names in forms.items():
         faults.append(Fault('slot', tuple(names), (
-            f'slots of {count} characters are not known, only 7 digits (bay, row, tier)' if count
-            else 'without a slot (LOC+147)') + ': left out'))
+            f'slots of {count} characters are not known, only 7 digits (bay from 001, row, tier)'
+            if count else 'without a slot (LOC+147)') + ': left out'))
     for kind, names in unknown.items():
         faults.append(Fault('size type', tuple(names), (
             f'of the type {kind} no size is known' if kind else 'without a size type (EQD)')

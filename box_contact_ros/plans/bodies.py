@@ -4,13 +4,14 @@
 """Bodies of boxes and other shapes, as simulators have them, to a plan of the boxes.
 
 What moves and touches a shape that is no box, or has one, is not judged: it is taken as fixed, and
-named. Joints stay as they are in the file, so what they join is one body.
+named. So is what touches nothing while some shape is not known, and what feels no gravity. Joints
+stay as they are in the file, so what they join is one body.
 """
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -67,12 +68,12 @@ def total(weights: Iterable[Weight]) -> Weight:
 def plan_of_bodies(solids: Sequence[Solid], fixed: set[Hashable],
                    weights: Mapping[Hashable, Weight],
                    may_touch: Callable[[int, int], bool], faults: list[Fault], *,
-                   is_whole: bool = True) -> Plan:
+                   is_whole: bool = True, afloat: Collection[Hashable] = ()) -> Plan:
     """Return the plan of the boxes and planes among solids.
 
     fixed: bodies that do not move. weights: of those that do.
     may_touch: whether two solids, by index, may touch at all.
-    is_whole: whether all that collides is among the solids.
+    is_whole: whether all that collides is among the solids. afloat: bodies without gravity.
     Raises ValueError where no box is left, because none can be read.
     """
     solids, places = _readable(solids, faults)
@@ -93,12 +94,12 @@ def plan_of_bodies(solids: Sequence[Solid], fixed: set[Hashable],
                 {} if moves else UNMOVED)))
     unjudged = _unjudged(solids, pairs[touches], fixed, may_touch, places,
                          is_whole and all(solid.size is not None for solid in shapes))
-    if unjudged:
-        faults.append(Fault('shape', tuple(
-            solids[n].name for n in boxes if solids[n].body in unjudged),
-            'touches, or is joined to, what is no box: taken as fixed, and not judged',
-            lacks='judgement'))
-    fixed = fixed | unjudged
+    for held, why in (({*afloat} - fixed, 'feels no gravity'), *unjudged):
+        names = tuple(solids[n].name for n in boxes if solids[n].body in held)
+        if names:
+            faults.append(Fault('shape', names, f'{why}: taken as fixed, and not judged',
+                                lacks='judgement'))
+        fixed = fixed | held
     row_of = {n: row for row, n in enumerate(kept)}
     apart = [(row_of[a], row_of[b]) for a, b in pairs.tolist()
              if a in row_of and b in row_of and not may_touch(places[a], places[b])]
@@ -111,6 +112,15 @@ def plan_of_bodies(solids: Sequence[Solid], fixed: set[Hashable],
         ground=[row for row, n in enumerate(kept) if solids[n].body in fixed],
         names=[solids[n].name for n in kept], body=[number[solids[n].body] for n in kept],
         apart=apart, faults=faults)
+
+
+def other_gravity(gravity: np.ndarray) -> list[Fault]:
+    """Return a fault if gravity (3,) is not along −z, as plans are judged by default."""
+    along = np.abs(gravity).max() * 1e-6
+    if not np.isfinite(gravity).all() or (np.abs(gravity[:2]) <= along).all() and gravity[2] <= 0:
+        return []
+    return [Fault('gravity', (), 'it is {:g} {:g} {:g} in the file: judge by it with '
+                                 '--acceleration'.format(*gravity))]
 
 
 def _readable(solids: Sequence[Solid], faults: list[Fault]) -> tuple[list[Solid], list[int]]:
@@ -170,8 +180,8 @@ def _near(solids: Sequence[Solid], fixed: set[Hashable], may_touch: Callable[[in
 
 def _unjudged(solids: Sequence[Solid], touching: np.ndarray, fixed: set[Hashable],
               may_touch: Callable[[int, int], bool], places: Sequence[int], is_whole: bool,
-              ) -> set[Hashable]:
-    """Return the moving bodies that a shape which is no box may carry.
+              ) -> list[tuple[set[Hashable], str]]:
+    """Return the moving bodies that a shape which is no box may carry, and why.
 
     is_whole: whether the extents of all that collides are known. Otherwise these are also the
     bodies that touch nothing.
@@ -185,7 +195,9 @@ def _unjudged(solids: Sequence[Solid], touching: np.ndarray, fixed: set[Hashable
             for own, other in (solids[a], solids[b]), (solids[b], solids[a]):
                 if other.kind not in ('box', 'plane') and own.body in boxed:
                     found.add(own.body)
-    return found if is_whole else found | (boxed - carried)
+    return [(found, 'touches, or is joined to, what is no box'),
+            (set() if is_whole else boxed - carried - found,
+             'touches nothing, but a mesh or a file that was not read may carry it')]
 
 
 def _shared(solids: Sequence[Solid], weights: Mapping[Hashable, Weight],

@@ -57,9 +57,11 @@ class Form:
     """Whether a name is that of a kind of box, so that the row's number tells boxes apart."""
     in_line: bool = False
     """Whether a container begins where the one before it ends, along x."""
+    note: str = ''
+    """What a reader may take otherwise."""
 
 
-def _table(title: str, unit: str | None, header: str, keys: str, **more: bool) -> Form:
+def _table(title: str, unit: str | None, header: str, keys: str, **more: Any) -> Form:
     return Form(title, unit, tuple(header.lower().split(',')), tuple(keys.split(',')), **more)
 
 
@@ -85,7 +87,7 @@ OWN = Form('', 'm')
 BED_BPP = Form('orders of BED-BPP', 'mm')
 VIEWER = Form('containers of 3d-bin-container-packing', 'mm')
 BENCHMARK = Form('a pallet of palletizing-benchmark', 'm')
-PY3DBP = Form('what py3dbp packed', None)
+PY3DBP = Form('what py3dbp packed', None, note=', and z, the depth, is up')
 ROTATIONS = dict(enumerate(((0, 1, 2), (1, 0, 2), (1, 2, 0), (2, 1, 0), (2, 0, 1), (0, 2, 1))))
 """Which of width, height and depth are along x, y and z, by py3dbp's `rotation_type`."""
 AMOUNT = re.compile(
@@ -112,6 +114,8 @@ class Packing:
     items: Iterable[Item]
     rooms: dict[str, Sequence[Any]] = field(default_factory=dict)
     """The inner size of each container (3,)."""
+    most: dict[str, Any] = field(default_factory=dict)
+    """The most that may be in each container [kg]."""
     faults: list[Fault] = field(default_factory=list)
 
 
@@ -246,6 +250,8 @@ def _py3dbp(document: Any) -> Packing | None:
         stack = str(one.get('partno') or one.get('name'))
         items += _items(stack, one['items'], read, numbered=True)
         packing.rooms[stack] = [one[side] for side in sides]
+        if 'max_weight' in one:
+            packing.most[stack] = one['max_weight']
         packing.faults += _unfitted(one.get('unfitted_items'))
     return packing
 
@@ -272,7 +278,7 @@ def _unfitted(entries: Any) -> Iterator[Fault]:
                   for entry in (entries if isinstance(entries, list) else ())
                   if isinstance(entry, Mapping))
     if names:
-        yield Fault('column', names, 'not packed, as the file has it')
+        yield Fault('slot', names, 'not packed, as the file has it')
 
 
 def means_amount(key: str) -> bool:

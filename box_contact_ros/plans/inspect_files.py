@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Is a plan sound? A line for each fault, the worst first, and one for the whole plan.
+"""Is a plan sound? A line for each fault, first what was left out, and one for the whole plan.
 
 It reads SMDG BAPLIE, SDF, MJCF, URDF, scene files, and packing plans as CSV or JSON. Of several
 files it prints a line each. The exit status is 2 if a file could not be read, else 1 if a plan is
@@ -55,19 +55,21 @@ def judged(path: str, options: argparse.Namespace) -> tuple[Inspection, str]:
     plan = dataclasses.replace(
         plan, masses=None if options.geometry else plan.masses, limits=limits,
         faults=tuple(fault for fault in plan.faults
-                     if not (options.geometry and fault.kind == 'mass')))
+                     if not (options.geometry and fault.kind == 'mass'
+                             or options.acceleration and fault.kind == 'gravity')))
+    felt = options.acceleration or (0.0, 0.0, -9.81)
     try:
-        found = inspect_plan(plan, tolerance=options.tolerance, acceleration=options.acceleration,
+        found = inspect_plan(plan, tolerance=options.tolerance, acceleration=felt,
                              bears=options.bears or bears, sides=options.sides)
     except TooManyNear as error:
-        return crowded(plan, error.pairs, options.tolerance, options.acceleration), form
+        return crowded(plan, error.pairs, options.tolerance, felt), form
     except ValueError as error:
         option = '--' if str(error).startswith('tolerance') else ''
         raise ValueError(f'{path}: {option}{error}') from None
-    if _lies_wrong(found) and options.origin is None and _lies_well_by_corners(path, given, plan):
+    if _lies_wrong(found) and options.origin is None and (
+            hint := _other_origin(path, given, plan, form)):
         plan = dataclasses.replace(found.plan, faults=(*found.plan.faults, Fault(
-            'origin', (), 'all stand and none overlaps if x y z are least corners: --origin corner'
-            )))
+            'origin', (), f'all stand and none overlaps if {hint}')))
         found = dataclasses.replace(found, plan=plan)
     return found, form
 
@@ -77,14 +79,20 @@ def _lies_wrong(found: Inspection) -> bool:
     return bool(len(found.overlaps) or found.outside.any() or (found.cause != '').any())
 
 
-def _lies_well_by_corners(path: str, given: Given, centred: Plan) -> bool:
-    """Return whether geometry alone finds nothing if places are least corners, not centres."""
+def _other_origin(path: str, given: Given, plan: Plan, form: str) -> str:
+    """Return by which other origin geometry alone finds nothing, or ''."""
     try:
-        plan = read_any(path, given._replace(origin='corner')).plan
-        return not np.array_equal(plan.poses, centred.poses) and not _lies_wrong(
-            inspect_plan(dataclasses.replace(plan, masses=None)))
+        other = read_any(path, given._replace(origin='corner')).plan
+        hint = 'x y z are least corners: --origin corner'
+        if np.array_equal(other.poses, plan.poses):  # it has corners by its columns
+            centres = plan.poses.copy()
+            own = np.setdiff1d(np.arange(len(plan)), plan.ground)
+            centres[own, :3] -= plan.sizes[own] / 2.0
+            other = dataclasses.replace(plan, poses=centres)
+            hint = '' if form else 'x_min y_min z_min are centres: call them x y z'
+        return '' if _lies_wrong(inspect_plan(dataclasses.replace(other, masses=None))) else hint
     except (ValueError, TooManyNear):
-        return False
+        return ''
 
 
 def add_given(parser: argparse.ArgumentParser) -> None:
@@ -131,9 +139,10 @@ def _parser() -> argparse.ArgumentParser:
                         'other (default: corners for containers, faces for others)')
     parser.add_argument('--sides', action='store_true', help='boxes beside each other carry by '
                         'friction, and so do the walls of a container')
-    parser.add_argument('--acceleration', type=float, nargs=3, default=(0.0, 0.0, -9.81),
-                        metavar=('X', 'Y', 'Z'), help='what the goods feel, gravity included '
-                        '[m/s²]; a lorry that brakes along +x by 0.4 g: 3.92 0 -9.81')
+    parser.add_argument('--acceleration', type=float, nargs=3, metavar=('X', 'Y', 'Z'),
+                        help='what the goods feel, gravity included [m/s²] (default: 0 0 -9.81, '
+                        'whatever the file says); a lorry that brakes along +x by 0.4 g: '
+                        '3.92 0 -9.81')
     parser.add_argument('--geometry', action='store_true', help='leave masses out: judge overlaps '
                         'and support alone')
     return parser

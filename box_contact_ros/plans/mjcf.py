@@ -27,7 +27,7 @@ import numpy as np
 
 from ..extras import require
 from ..resources import open_regular, read_regular
-from .bodies import UNMOVED, Solid, Weight, plan_of_bodies, total
+from .bodies import UNMOVED, Solid, Weight, other_gravity, plan_of_bodies, total
 from .plan import MOST_BYTES, Fault, Plan
 from .sdf import parse_xml
 
@@ -150,8 +150,13 @@ def compiled_plan(path: Path) -> Plan:
     for body in range(1, model.nbody):
         weights.setdefault(tops[body], []).append(
             Weight(float(model.body_mass[body]), data.xipos[body].copy()))
+    pulls = np.zeros(model.nbody, bool)
+    if not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY:
+        pulls = (model.body_gravcomp < 1.0) & model.opt.gravity.any()
+        faults += other_gravity(model.opt.gravity)
+    heavy = {tops[body] for body in np.flatnonzero(pulls).tolist()}
     return plan_of_bodies(solids, {0}, {top: total(parts) for top, parts in weights.items() if top},
-                          _filter(model), faults, is_whole=not meshes)
+                          _filter(model), faults, is_whole=not meshes, afloat={*tops} - heavy)
 
 
 def _compiled(path: Path) -> tuple[Any, list[str]]:

@@ -60,6 +60,8 @@ GROUND, GROUND_THICKNESS, GROUND_MARGIN = 'ground', 1.0, 1.0
 ROOM = 1.0  # between the stacks of one file, which are placed side by side [m]
 LONG = 20.0
 """Half of the boxes are longer only where their unit is not the metre [m]."""
+LONG_ROOM, FULL = 30.0, 5.0
+"""A container is longer, or shorter than a box by more, only where their units differ [m, 1]."""
 Row = Mapping[str, Any]
 
 
@@ -248,10 +250,11 @@ def plan_of(packing: Packing, given: Given) -> Read:
     for box in boxes:
         if weighed and box.mass is None and not box.fixed:
             faults.append(Fault('mass', (box.name,), 'has no mass: taken as 0'))
-    faults += way.doubts(boxes)
+    way, doubts = way.doubts(boxes)
     stacks = [*dict.fromkeys(box.stack for box in boxes)]
     rooms = {stack: size for stack in stacks
              if (size := _inner(given.container or packing.rooms.get(stack), way)) is not None}
+    faults += [*doubts, *_odd_rooms(boxes, rooms), *_too_heavy(boxes, packing.most)]
     if form.in_line and rooms:  # so that each container begins at x = 0
         for box in boxes:
             box.pose[0] -= (_number(box.stack) - 1.0) * rooms[box.stack][0]
@@ -296,6 +299,31 @@ def _inner(value: Any, way: _Way) -> np.ndarray | None:
     return np.array(numbers)
 
 
+def _odd_rooms(boxes: Sequence[_Box], rooms: Mapping[str, np.ndarray]) -> list[Fault]:
+    """Return a fault if a container seems to have another unit than its boxes."""
+    for stack, room in rooms.items():
+        longest = max(max(box.size) for box in boxes if box.stack == stack)
+        if room.max() > LONG_ROOM and longest < LONG or longest > FULL * room.max():
+            return [Fault('unit', (), f'the container is {room.max():g} m long, and a box '
+                                      f'{longest:g} m: its size is in the unit of the file')]
+    return []
+
+
+def _too_heavy(boxes: Sequence[_Box], most: Mapping[str, Any]) -> list[Fault]:
+    """Return a fault for each container that has more in it than it may have."""
+    faults = []
+    for stack, value in most.items():
+        limit = _number(value)
+        mass = sum(box.mass or 0.0 for box in boxes if box.stack == stack)
+        if math.isnan(limit):
+            faults.append(Fault('mass', (stack,), f'max_weight is {short_repr(value)}: not judged',
+                                lacks='limit'))
+        elif mass > limit:
+            faults.append(Fault('mass', (stack,), f'{mass:g} kg are in it, and its max_weight is '
+                                                  f'{limit:g} kg', verdict='not sound', lacks=''))
+    return faults
+
+
 def _side_by_side(boxes: Sequence[_Box], stacks: Sequence[str], rooms: Mapping[str, np.ndarray],
                   ) -> dict[str, float]:
     """Return how far along x each stack goes, so that they are beside each other [m]."""
@@ -327,7 +355,8 @@ class _Way:
         """Return how a file with these keys is read. Raises ValueError for a contradiction."""
         sizes, place = _ways(keys)
         if place == LEAST and given.origin == 'centre':
-            raise ValueError(f"origin must not be 'centre': {' '.join(LEAST)} are a corner" if
+            raise ValueError(f"origin must not be 'centre': {' '.join(LEAST)} are a corner, and "
+                             f"{' '.join(PLACE)} centres" if
                              form is OWN else
                              f"origin must not be 'centre': {form.title} has least corners")
         return cls(form, place, sizes, place == LEAST or given.origin == 'corner',
@@ -345,18 +374,26 @@ class _Way:
             return ''
         where = ('two corners' if self.sizes == GREATEST else 'least corners, sizes along x y z' if
                  self.of_corner else 'centres, sizes along x y z')
-        return f'read as {self.form.title}: {where}, {self.unit or "no unit"}'
+        return f'read as {self.form.title}: {where}{self.form.note}, {self.unit or "no unit"}'
 
-    def doubts(self, boxes: Sequence[_Box]) -> list[Fault]:
-        """Return a fault if the unit is not known, or seems to be another."""
+    def doubts(self, boxes: Sequence[_Box]) -> tuple[_Way, list[Fault]]:
+        """Return how the file is read, and a fault if its unit is not known, or seems another.
+
+        Boxes that are far too long for metres are taken as millimetres.
+        """
         if self.unit is None:
-            return [Fault('unit', (), 'the file has none: read as mm; add --unit m, cm or mm')]
+            return self, [Fault('unit', (), 'the file has none: read as mm; add --unit m, cm or '
+                                            'mm')]
         longest = sorted(max(box.size) for box in boxes if not box.fixed)
         middle = longest[len(longest) // 2] if longest else 0.0
         if self.is_given or self.form is not OWN or middle <= LONG:
-            return []
-        return [Fault('unit', (), f'half of the boxes are {middle:g} m long or more: add --unit mm '
-                                  'or cm, or m if they are')]
+            return self, []
+        for box in boxes:
+            box.size[:] = [UNITS['mm'] * value for value in box.size]
+            box.pose[:3] = [UNITS['mm'] * value for value in box.pose[:3]]
+        return replace(self, unit='mm'), [Fault(
+            'unit', (), f'half of the boxes would be {middle:g} m long or more: read as mm; add '
+                        '--unit mm or cm, or m if they are')]
 
 
 def slab_below(sizes: np.ndarray, poses: np.ndarray, height: float = 0.0,

@@ -33,8 +33,8 @@ FAULT_KINDS = {
     'size type': ('not all judged', 'place'), 'dimension': ('not all judged', 'place'),
     'pose': ('not all judged', 'place'), 'mass': ('not all judged', 'weight'),
     'shape': ('not all judged', 'shape'), 'support': ('not all judged', 'support'),
-    'unit': ('not all judged', 'unit'), 'origin': ('not sound', 'origin'),
-    'column': ('sound', '')}
+    'unit': ('not all judged', 'unit'), 'gravity': ('not all judged', ''),
+    'origin': ('not sound', 'origin'), 'column': ('sound', '')}
 """What may be wrong with a row of a file: the best verdict with it, and what it lacks."""
 NO_ROOM = ((-np.inf,) * 3, (np.inf,) * 3)
 UNTURNED = (0.0, 0.0, 0.0, 1.0)
@@ -47,7 +47,7 @@ LACKS = {
     'support': ('support not judged: nothing is fixed',) * 2,
     'judgement': ('1 was not judged', '{:,} were not judged'),
     'unit': ('the unit is doubtful: add --unit',) * 2,
-    'origin': ('sound by --origin corner',) * 2,
+    'origin': ('sound by another origin',) * 2,
     'shape': ('1 shape is not known', '{:,} shapes are not known'),
     'part': ('1 part of the file was not read', '{:,} parts of the file were not read')}
 """What boxes or rows may lack, as the last line says it of one and of more."""

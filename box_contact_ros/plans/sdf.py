@@ -20,12 +20,14 @@ import numpy as np
 
 from ..core import MASS_MAX
 from ..extras import require
-from .bodies import HERE, Solid, Weight, plan_of_bodies, total, within
+from .bodies import HERE, Solid, Weight, other_gravity, plan_of_bodies, total, within
 from .plan import Fault, Plan
 
 ALL_BITS, DENSITY, MASS = 0xffff, 1000.0, 1.0
 """Defaults of SDF: of <collide_bitmask>, <density> [kg/m³] and <mass> [kg]."""
 WORLD = 'world'
+LIGHTS = ('model://sun', 'model://Sun')
+"""Models of Gazebo that nothing can touch."""
 COMMENT = b'<!--'
 CLOSING = {COMMENT: b'-->', b'<![CDATA[': b']]>', b'<?': b'?>'}
 """What ends what is no element."""
@@ -109,6 +111,7 @@ class _World:
     collides: set[str] = field(default_factory=set)  # models whose own links may touch
     fixed: set[str] = field(default_factory=set)  # links
     weights: dict[str, Weight] = field(default_factory=dict)  # of links
+    afloat: set[str] = field(default_factory=set)  # links that feel no gravity
     joined: dict[str, str] = field(default_factory=dict)  # links, to one of the same body
     state: dict[str, np.ndarray] = field(default_factory=dict)  # poses of models and links
     names: set[str] = field(default_factory=set)  # of models and collisions
@@ -155,6 +158,11 @@ def read_sdf(root: Element) -> Plan:
         _read_model(model, '', HERE, False, world)
     for joint in places[0].findall('joint'):
         _read_joint(joint, '', world)
+    gravity = [_float(number) for number in (places[0].findtext('gravity') or '').split()]
+    if len(gravity) == 3:
+        if not any(gravity):
+            world.afloat.update(world.weights)
+        world.faults += other_gravity(np.array(gravity))
     return _plan(world)
 
 
@@ -172,9 +180,11 @@ def _plan(world: _World) -> Plan:
         return bool(world.bits[a] & world.bits[b]) and (
             model != world.models[b] or model in world.collides)
 
+    heavy = {world.body(link) for link in {*world.weights} - world.afloat}
     return plan_of_bodies(solids, set(fixed), {body: total(weights) for body, weights in
                                                parts.items() if body not in fixed},
-                          may_touch, world.faults, is_whole=not world.missing)
+                          may_touch, world.faults, is_whole=not world.missing,
+                          afloat={world.body(link) for link in world.afloat} - heavy)
 
 
 def _read_state(state: Element, world: _World) -> None:
@@ -200,6 +210,8 @@ def _read_state(state: Element, world: _World) -> None:
 
 def _read_includes(place: Element, scope: str, world: _World) -> None:
     for part in place.findall('include'):
+        if (part.findtext('uri') or '').strip() in LIGHTS:
+            continue
         world.fault('shape', scope + (part.findtext('name') or part.findtext('uri') or 'include'),
                     'is included from another file: not read', 'part')
         world.missing += 1
@@ -267,6 +279,8 @@ def _read_link(link: Element, scope: str, frame: np.ndarray, is_static: bool, wo
         world.solids.append(Solid(path, kind, size, place, name))
         world.bits.append(_bits(part, path, world))
         world.models.append(name.split('::')[0])
+    if (link.findtext('gravity') or '').strip().lower() in ('false', '0'):
+        world.afloat.add(name)
     try:
         world.weights[name] = _weight(link, pose, volume)
     except Unreadable as error:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from box_contact_ros.plans import inspect_files
 from box_contact_ros.plans.inspect_plan import inspect_plan
 from box_contact_ros.plans.packing import means_amount
 from box_contact_ros.plans.plan import Plan
@@ -492,6 +493,11 @@ def test_slots_of_six_digits(tmp_path: Path) -> None:
     assert same(read_plan(written(tmp_path, 'a', blank)), read_plan(written(tmp_path, 'b', seven)))
 
 
+def test_there_is_no_bay_0(tmp_path: Path) -> None:
+    plan = read_plan(written(tmp_path, 'a', baplie('0000082 22G1', '0010082 22G1')))
+    assert [(fault.kind, fault.names) for fault in plan.faults] == [('slot', ('0000082',))]
+
+
 @pytest.mark.parametrize(('boxes', 'left_out', 'names'), [
     (['0010082 22G1', '0010084 22G1'], [0], ['0010084']),
     (['0010082 22G1', '0030082 22G1', '0020084 42G1'], [0], ['0020084']),
@@ -508,3 +514,55 @@ def test_what_stands_on_what_is_left_out_is_not_judged(boxes, left_out, names, t
         assert [fault.names for fault in plan.faults if 'stands on' in fault.text] == (
             [tuple(names)] if names else [])
         assert inspect_plan(plan, bears=bears).verdict == 'not all judged'
+
+
+# --- gravity, and what is not read ----------------------------------------------------------------
+
+LINK = '<model name="b"><pose>0 0 5 0 0 0</pose><link name="l">{}' + collision().partition(
+    '<link name="l">')[2] + '</model>'
+
+
+@pytest.mark.parametrize(('name', 'text', 'fixed'), [
+    ('p.sdf', world(model('b', collision(), 5.0)), False),
+    ('p.sdf', world('<gravity>0 0 0</gravity>', model('b', collision(), 5.0)), True),
+    ('p.sdf', world('<gravity>0 0 -1.6</gravity>', model('b', collision(), 5.0)), False),
+    ('p.sdf', world(LINK.format('<gravity>false</gravity>')), True),
+    ('p.xml', mjcf(body('b', 5.0)), False),
+    ('p.xml', mjcf(body('b', 5.0), more='<option gravity="0 0 0"/>'), True),
+    ('p.xml', mjcf(body('b', 5.0), more='<option><flag gravity="disable"/></option>'), True),
+    ('p.xml', mjcf(body('b', 5.0).replace('<body', '<body gravcomp="1"')), True)])
+def test_what_feels_no_gravity_does_not_hang(name, text, fixed, tmp_path):
+    """It hung, and the plan was certainly wrong."""
+    if name == 'p.xml':
+        pytest.importorskip('mujoco')
+    plan = read_plan(written(tmp_path, name, text))
+    told = [fault for fault in plan.faults if 'feels no gravity' in fault.text]
+    assert len(told) == fixed and inspect_plan(plan).verdict == (
+        'not all judged' if fixed else 'not sound')
+
+
+@pytest.mark.parametrize(('name', 'text'), [
+    ('p.sdf', world('<gravity>0 -9.81 0</gravity>', A)),
+    ('p.xml', mjcf(body('a', 0.5), more='<option gravity="0 -9.81 0"/>'))])
+def test_another_gravity_is_told(name, text, tmp_path, capsys):
+    if name == 'p.xml':
+        pytest.importorskip('mujoco')
+    path = str(written(tmp_path, name, text))
+    assert inspect_files.main([path]) == 3
+    line = 'it is 0 -9.81 0 in the file: judge by it with --acceleration'
+    assert line in capsys.readouterr().out
+    inspect_files.main([path, '--acceleration', '0', '0', '-9.81'])
+    assert 'in the file' not in capsys.readouterr().out
+
+
+def test_what_may_be_carried_by_what_was_not_read_does_not_touch_it(tmp_path):
+    """The sun of Gazebo carries nothing, so that what hangs below it hangs."""
+    include = '<include><uri>model://{}</uri></include>'
+    plan = read_plan(written(tmp_path, 'p.sdf', world(
+        include.format('sun'), model('b', collision(), 5.0))))
+    assert not plan.faults and inspect_plan(plan).verdict == 'not sound'
+    plan = read_plan(written(tmp_path, 'p.sdf', world(
+        include.format('crane'), model('b', collision(), 5.0))))
+    assert [fault.text for fault in plan.faults if fault.names == ('b::l::c',)] == [
+        'touches nothing, but a mesh or a file that was not read may carry it: taken as fixed, and '
+        'not judged']
