@@ -37,6 +37,7 @@ myst_heading_anchors = 4
 myst_all_links_external = False
 autodoc_typehints = 'none'  # docstrings have shapes and units
 autodoc_member_order = 'bysource'
+autodoc_default_options = {'exclude-members': '__new__'}  # of named tuples
 add_module_names = False
 default_role = 'literal'  # docstrings are plain text with `names`
 linkcheck_anchors = False

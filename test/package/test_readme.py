@@ -167,11 +167,11 @@ def published(words: list[str], **_) -> None:
 
 
 def called(words: list[str], **_) -> None:
-    """Ask nodes of two cubes, of the yard and of the chassis: one answers that its boxes touch."""
+    """Ask nodes of two cubes and of the yard: one answers that its boxes touch."""
     assert words[3:5] == ['/contact_node/check', 'box_contact_msgs/srv/Check']
     request = filled(Check.Request(), yaml.safe_load(words[5]))
-    files = [ROOT / f'config/scenes/{name}.yaml' for name in ('yard_bay', 'load_on_chassis')]
-    scenes = [two_boxes((2.0, 2.0, 2.0), (2.0, 2.0, 2.0)), *map(read_scene, files)]
+    yard = read_scene(ROOT / 'config/scenes/yard_bay.yaml')
+    scenes = [two_boxes((2.0, 2.0, 2.0), (2.0, 2.0, 2.0)), yard]
     responses = [CheckAnswerer(SceneSolver(scene)).answer(request, Check.Response())
                  for scene in scenes]
     assert sum(bool(response.contacts.contacts) for response in responses) >= 1, responses
