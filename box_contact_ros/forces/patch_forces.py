@@ -235,17 +235,20 @@ class PatchForces:
         self._native.set_bodies(*_columns(bodies))
 
     def set_boxes(self, sizes: ArrayLike, *, body: ArrayLike | None = None,
-                  poses: ArrayLike | None = None) -> None:
+                  poses: ArrayLike | None = None, find_pairs: bool = False) -> None:
         """Say which boxes the bodies have; pairs are then of boxes, and poses of bodies.
 
         sizes: full extents (m, 3) [m]. body: of each box (m,); None: box k is body k. poses: of the
         boxes (m, 7) in the frames of their bodies; None: those frames. Patches of boxes that stay
-        with their body stay; pairs without contacts are forgotten.
+        with their body stay; pairs without contacts are forgotten. find_pairs: each `advance` finds
+        the pairs that touch, and solves them by `exact`; `hold` is refused. Boxes of one body are
+        never a pair.
         ValueError: names the field and its value.
         """
         self._native.set_boxes(_as_rows(sizes, 'sizes', 3),
                                None if body is None else as_wholes(body, 'body'),
-                               None if poses is None else _as_rows(poses, 'poses', 7))
+                               None if poses is None else _as_rows(poses, 'poses', 7),
+                               bool(find_pairs))
 
     def hold(self, pairs: ArrayLike, contacts: Contacts | None = None,
              poses: ArrayLike | None = None, *,

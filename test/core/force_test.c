@@ -100,7 +100,7 @@ static void check_rest(void) {
     unsigned char awake[2] = {7, 7};
     bc_patch_forces* forces;
     check(bc_patch_forces_create(both, 2, &options, &forces) == BC_OK, "create");
-    check(bc_patch_forces_set_boxes(forces, boxes, 2) == BC_OK, "boxes");
+    check(bc_patch_forces_set_boxes(forces, boxes, 2, 0) == BC_OK, "boxes");
     check(bc_patch_forces_hold(forces, &asked, NULL) == BC_OK, "hold");
     bc_motion motion = {sizeof motion, poses, velocities, NULL, awake};
     for (int step = 0; step < 400; ++step)

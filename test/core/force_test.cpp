@@ -15,8 +15,9 @@ using namespace box_contact;
 
 namespace {
 
-// The rows of what rests, and is not named, are neither read nor written. One that is named wakes.
-int count_faults_at_rest() {
+// The rows of what rests, and is not named, are neither read nor written. One that is named wakes. The pair
+// is held, or found.
+int count_faults_at_rest(bool find_pairs) {
   const Size size{1.0, 1.0, 1.0};
   const Body bodies[] = {Body::of_box(size, 1000.0), Body::of_box(size, 0.0)};
   const BodyBox boxes[] = {{0, {{{0, 0, 0}, {0, 0, 0, 1}}, size}},
@@ -27,8 +28,8 @@ int count_faults_at_rest() {
   Wrench outside[2] = {{{0.0, 0.0, -9810.0}, {}}, {}};
   unsigned char awake[2];
   PatchForces forces(bodies);
-  forces.set_boxes(boxes);
-  forces.hold(Patches(pair));
+  forces.set_boxes(boxes, find_pairs);
+  if (!find_pairs) forces.hold(Patches(pair));
   for (int step = 0; step < 1000; ++step)
     forces.advance(0.001, poses, velocities, outside, awake);
   int faults = awake[0] || awake[1];
@@ -37,6 +38,9 @@ int count_faults_at_rest() {
   const long before = allocations;
   forces.advance_changed({}, 0.001, poses, velocities, outside, awake);
   faults += allocations != before || awake[0] || !std::isnan(poses[0].position[2]);
+  if (find_pairs) forces.set_boxes(boxes, true);
+  forces.advance_changed({}, 0.001, poses, velocities, outside, awake);
+  faults += awake[0] || forces.loads().size() != 1;
   for (Span<const std::int64_t> changed : {Span<const std::int64_t>(named), {unknown}}) {
     try {
       forces.advance_changed(changed, 0.001, poses, velocities, outside);
@@ -118,7 +122,8 @@ int main() {
   Wrench outside[2] = {{{0.0, 0.0, -9.81 * 20000.0}, {}}, {}}, wrenches[2];
   Contact contact{};
   const std::int64_t pair[2] = {0, 1};
-  int failures = count_faults_of_a_body() + count_faults_at_rest() + count_faults_of_waking();
+  int failures = count_faults_of_a_body() + count_faults_at_rest(false) +
+                 count_faults_at_rest(true) + count_faults_of_waking();
   for (int step = 0; step < 2000; ++step) {
     long before = allocations;
     if (step % 5 == 0) {

@@ -20,7 +20,7 @@
  * angular. They and wrenches are in the common frame, at and about the centre of mass.
  * docs/explanation/force.md has the equations. One thread at a time may use an object.
  * `bc_patch_forces_hold` allocates no memory once as many pairs have been held, and
- * `bc_patch_forces_advance` by one thread none at all. The bits are the same on all instruction sets,
+ * `bc_patch_forces_advance` by one thread none at all, unless it finds pairs. The bits are the same on all instruction sets,
  * and for any number of threads.
  */
 #ifndef BOX_CONTACT_FORCE_H
@@ -138,9 +138,11 @@ BC_API int64_t bc_patch_forces_bodies(const bc_patch_forces* forces); /* how man
 BC_API bc_status bc_patch_forces_set_bodies(bc_patch_forces* forces, const bc_body* bodies,
                                             int64_t count);
 /* Say which boxes the bodies have: pairs are then of boxes, and poses of bodies. Patches of boxes that
- * stay with their body stay; pairs of contacts of one's own are forgotten. 0 boxes: box k is body k. */
+ * stay with their body stay; pairs of contacts of one's own are forgotten. 0 boxes: box k is body k.
+ * With `find_pairs`, each advance finds the pairs of boxes that touch, and solves them by model `exact`:
+ * nothing is to be held, and bc_patch_forces_hold is refused. Boxes of one body are never a pair. */
 BC_API bc_status bc_patch_forces_set_boxes(bc_patch_forces* forces, const bc_body_box* boxes,
-                                           int64_t count);
+                                           int64_t count, int find_pairs);
 
 /* Forget the patches of bodies, which were put elsewhere, or all patches. */
 BC_API bc_status bc_patch_forces_forget(bc_patch_forces* forces, const int64_t* bodies,

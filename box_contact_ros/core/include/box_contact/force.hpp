@@ -102,9 +102,11 @@ class PatchForces {
   }
   void reset() { bc_patch_forces_reset(forces_.get()); }
 
-  // Say which boxes the bodies have: pairs are then of boxes, and poses of bodies.
-  void set_boxes(Span<const BodyBox> boxes) {
-    detail::check(bc_patch_forces_set_boxes(forces_.get(), boxes.data(), std::int64_t(boxes.size())));
+  // Say which boxes the bodies have: pairs are then of boxes, and poses of bodies. find_pairs: each advance
+  // finds the pairs that touch, and nothing is to be held.
+  void set_boxes(Span<const BodyBox> boxes, bool find_pairs = false) {
+    detail::check(bc_patch_forces_set_boxes(forces_.get(), boxes.data(), std::int64_t(boxes.size()),
+                                            find_pairs));
   }
 
   // Take an answer, asked for at `poses`; pairs that are left out are forgotten. Contacts of one's own

@@ -10,6 +10,7 @@
 
 #include "../kernel.hpp"
 #include "gaps.hpp"
+#include "near_pairs.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
@@ -21,13 +22,18 @@ class OwnContacts {
   // The boxes of the bodies; none: box k is body k, and nobody knows its size.
   const std::vector<bc_body_box>& boxes() const { return boxes_; }
   size_t count() const { return asked_.count(); }
+  // Whether pairs are found anew at each advance, instead of asked for.
+  bool finds_pairs() const { return finds_pairs_; }
+  bool is_used() const { return finds_pairs_ || count() > 0; }
 
-  void set_boxes(std::vector<bc_body_box> boxes) {
+  void set_boxes(std::vector<bc_body_box> boxes, bool finds_pairs) {
     boxes_ = std::move(boxes);
+    finds_pairs_ = finds_pairs;
     sizes_.clear();
     for (const bc_body_box& box : boxes_) sizes_.push_back(box.box.size);
     poses_.resize(boxes_.size());
     is_placed_.resize(boxes_.size());
+    if (finds_pairs) near_.set_boxes(boxes_);
     forget();
   }
   void forget() {
@@ -104,22 +110,43 @@ class OwnContacts {
     chosen_for_ = revision;
     is_all_ = !is_any_asleep;
     if (is_all_) return;
-    rows_.clear();
-    placed_.clear();
-    std::fill(is_placed_.begin(), is_placed_.end(), uint8_t(0));
-    live_.resize(0);
+    choose_none();
     for (const Key& key : keys_) {
       size_t k = key.row;
       auto a = size_t(asked_.pairs[2 * k]), b = size_t(asked_.pairs[2 * k + 1]);
       if (!key.is_new && is_quiet(a) && is_quiet(b)) continue;
       rows_.push_back(k);
       live_.add(asked_, k);
-      for (size_t box : {a, b}) {
-        if (!is_placed_[box]) placed_.push_back(box);
-        is_placed_[box] = 1;
-      }
+      note_placed(a, b);
     }
   }
+  // Find the pairs that are solved: see NearPairs. `pose_of(body)` also knows where the others are. Returns the most
+  // patches that they may have.
+  template <class EachActive, class PoseOf>
+  size_t find(double dt, int64_t revision, const bc_wrench* outside,
+              const std::vector<Body>& bodies, const EachActive& each_active,
+              const PoseOf& pose_of) {
+    auto place = [&](int32_t box, double longest) {
+      const auto& [body, own] = boxes_[size_t(box)];
+      const bc_pose& pose = poses_[size_t(box)] = in_common_frame(pose_of(size_t(body)), own.pose);
+      double falls = Gaps(bodies, boxes_, longest, outside).around(box);
+      const double(&q)[4] = pose.quaternion;
+      return detail::bounds_of({vector(pose.position), {q[0], q[1], q[2], q[3]}},
+                               0.5 * vector(own.size.extent) + Vec<double>{falls, falls, falls});
+    };
+    is_all_ = false;
+    if (near_.find(dt, revision, boxes_, bodies, each_active, place)) {
+      choose_none();
+      for (auto [a, b] : near_.pairs()) {
+        live_.pairs.insert(live_.pairs.end(), {a, b});
+        note_placed(size_t(a), size_t(b));
+      }
+      found_.resize(live_.count());
+    }
+    return live_.count();
+  }
+  // An advance was refused, so bodies are not where they were looked at.
+  void cancel() { near_.forget(); }
   // All pairs were solved once.
   void settle() {
     if (!is_any_new_) return;
@@ -129,7 +156,7 @@ class OwnContacts {
   }
 
   // Solve the chosen pairs with the bodies at `poses`. `solve(rows, count, results)` answers rows, and returns
-  // the first that is refused, or −1; so does this. A pair that is apart, but near by `gaps`,
+  // the first that is refused, or −1; so does this, of those of `answer()`. A pair that is apart, but near by `gaps`,
   // gets the patch that it has once it touches, and keeps its separation above zero.
   template <class Solve>
   long solve(const bc_pose* poses, const Gaps& gaps, const Solve& solve, SolvePair solve_pair) {
@@ -138,7 +165,7 @@ class OwnContacts {
     };
     if (is_all_)
       for (size_t k = 0; k < boxes_.size(); ++k) place(k);
-    else
+    else if (!finds_pairs_)
       std::for_each(placed_.begin(), placed_.end(), place);
     const Pairs& live = chosen();
     if (live.count() == 0) return -1;
@@ -147,7 +174,7 @@ class OwnContacts {
     detail::Rows rows{numbers, numbers, sizes, sizes, 3, 3, live.pairs.data(), long(boxes_.size())};
     long refused = solve(rows, long(live.count()), found_.results(farthest(gaps)));
     if (refused < 0) refused = solve_near(gaps, solve_pair);
-    return refused < 0 || is_all_ ? refused : long(rows_[size_t(refused)]);
+    return refused;
   }
   // Solve the pair of a patch anew, with its bodies at other places. A pair that is apart now keeps its
   // patch, which goes with the bodies.
@@ -181,9 +208,9 @@ class OwnContacts {
             found_.point.data(),
             found_.volume.data(),
             found_.covariance.data(),
-            live.friction.data(),
-            live.surface.data(),
-            live.stiffness.data(),
+            finds_pairs_ ? nullptr : live.friction.data(),
+            finds_pairs_ ? nullptr : live.surface.data(),
+            finds_pairs_ ? nullptr : live.stiffness.data(),
             0.0,
             0.0};
   }
@@ -200,7 +227,7 @@ class OwnContacts {
     std::vector<int64_t> pairs;  // (n, 2)
     std::vector<double> friction, surface, stiffness;
 
-    size_t count() const { return friction.size(); }
+    size_t count() const { return pairs.size() / 2; }
     void resize(size_t n) {
       pairs.resize(2 * n);
       for (auto* column : {&friction, &stiffness}) column->resize(n);
@@ -248,6 +275,18 @@ class OwnContacts {
     make_room();
   }
   const Pairs& chosen() const { return is_all_ ? asked_ : live_; }
+  void choose_none() {
+    rows_.clear();
+    placed_.clear();
+    std::fill(is_placed_.begin(), is_placed_.end(), uint8_t(0));
+    live_.resize(0);
+  }
+  void note_placed(size_t a, size_t b) {
+    for (size_t box : {a, b}) {
+      if (!is_placed_[box]) placed_.push_back(box);
+      is_placed_[box] = 1;
+    }
+  }
   // No pair that is solved, and farther apart, is a constraint [m].
   double farthest(const Gaps& gaps) const {
     double most = 0.0;
@@ -292,7 +331,8 @@ class OwnContacts {
   std::vector<bc_size> sizes_;  // of the boxes
   std::vector<bc_pose> poses_;  // of the boxes, in the common frame
   Pairs asked_;
-  bool is_any_new_ = false;
+  bool is_any_new_ = false, finds_pairs_ = false;
+  NearPairs near_;
   // Those that are solved, by pair, unless all are.
   static constexpr int64_t none_chosen = -1;
   int64_t chosen_for_ = none_chosen;

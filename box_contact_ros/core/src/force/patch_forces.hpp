@@ -49,7 +49,7 @@ class PatchForces : public PatchStore {
       ahead[k] = pose_after(time, bodies_[k], poses[k], velocities[k]);
     };
     for (size_t k = 0; k < bodies_.size(); ++k) write(k, steps.ahead());
-    if (own_.count() == 0) return;
+    if (!own_.is_used()) return;
     for (const Patch& patch : state_.patches)
       for (auto k : {size_t(patch.a), size_t(patch.b)})
         if (double factor = ended_[k].fineness.factor; factor > 1.0)
@@ -62,17 +62,20 @@ class PatchForces : public PatchStore {
     sleep_.compare(given, changed);
     next_.clock = state_.clock;
     woken_.clear();
-    if (own_.count() == 0) next_.patches = state_.patches;
-    wake_into(own_.count() == 0 ? next_.patches : woken_);
+    if (!own_.is_used()) next_.patches = state_.patches;
+    wake_into(!own_.is_used() ? next_.patches : woken_);
   }
   // Solve the contacts of one's own at the start of a step `dt`, and read them: see OwnContacts::solve.
   template <class Solve, class InThreads>
   long solve_own(double dt, const Given& given, const Solve& solve, SolvePair solve_pair,
                  InThreads& in_threads, HoldResult& result) {
     result = HoldResult::all;
-    if (own_.count() == 0) return -1;
-    own_.choose(sleep_.revision(), sleep_.is_any_asleep(),
-                [this](size_t box) { return sleep_.is_quiet(size_t(body_of(int64_t(box)))); });
+    if (!own_.is_used()) return -1;
+    if (own_.finds_pairs())
+      find_pairs(dt, given);
+    else
+      own_.choose(sleep_.revision(), sleep_.is_any_asleep(),
+                  [this](size_t box) { return sleep_.is_quiet(size_t(body_of(int64_t(box)))); });
     long refused =
         own_.solve(given.poses, Gaps(bodies_, boxes(), dt, given.outside), solve, solve_pair);
     if (refused >= 0) return refused;
@@ -93,7 +96,7 @@ class PatchForces : public PatchStore {
     bc_motion all = motion;
     if (!all.poses) all.poses = poses_.data();
     StepInputs step{next_.clock.begin(dt, options_.substeps), given, all,
-                    own_.count() > 0 ? &own_ : nullptr, solve_pair};
+                    own_.is_used() ? &own_ : nullptr, solve_pair};
     BodyStep body_step(bodies_, step.steps, given, all, state_.is_moved_by_wrenches, ended_);
     if (!is_grouped_) islands_.group(bodies_, sleep_.awake(), next_.patches);
     is_grouped_ = true;
@@ -122,6 +125,7 @@ class PatchForces : public PatchStore {
   // All is as it was before the advance began.
   void cancel() {
     sleep_.cancel_waking(bodies_);
+    own_.cancel();
     is_grouped_ = false;
   }
   // Whether something wakes in this advance.
@@ -134,6 +138,17 @@ class PatchForces : public PatchStore {
   }
 
  private:
+  // Find the pairs of a step that are of something that moves.
+  void find_pairs(double dt, const Given& given) {
+    auto each_active = [this](const auto& visit) {
+      each_read([&](size_t body) {
+        if (!sleep_.is_quiet(body)) visit(body);
+      });
+    };
+    auto pose_of = [&](size_t body) -> const bc_pose& { return sleep_.pose_of(body, given); };
+    make_room(
+        own_.find(dt, sleep_.revision(), given.outside, bodies_, each_active, pose_of));
+  }
   // Islands that a new patch joins to what is awake wake up. Their patches are those of their poses.
   void wake_touched() {
     for (const Patch& patch : next_.patches) sleep_.mark(patch);

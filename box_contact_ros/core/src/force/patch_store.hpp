@@ -69,8 +69,9 @@ class PatchStore {
              !(bodies_[size_t(patch.a)].is_free() || bodies_[size_t(patch.b)].is_free());
     });
   }
-  // Change which boxes the bodies have. Patches of boxes that stay with their body stay.
-  void set_boxes(std::vector<bc_body_box> boxes) {
+  // Change which boxes the bodies have. Patches of boxes that stay with their body stay. Pairs are found of
+  // what is awake: so those are whose boxes changed, and all bodies at first.
+  void set_boxes(std::vector<bc_body_box> boxes, bool finds_pairs) {
     auto is_kept = [&](int32_t box) {
       auto k = size_t(box);
       return k < boxes.size() && k < this->boxes().size() &&
@@ -78,8 +79,15 @@ class PatchStore {
     };
     sleep_.mark_if(
         [&](const Patch& patch) { return !is_kept(patch.box_a) || !is_kept(patch.box_b); });
+    std::vector<uint8_t> is_changed(bodies_.size(), finds_pairs && !own_.finds_pairs());
+    for (const std::vector<bc_body_box>* all : {&std::as_const(boxes), &this->boxes()})
+      for (size_t k = 0; finds_pairs && k < all->size(); ++k)
+        if (!is_kept(int32_t(k))) is_changed[size_t((*all)[k].body)] = 1;
+    sleep_.mark_those(is_changed);
     wake();
-    own_.set_boxes(std::move(boxes));
+    sleep_.change_bodies(bodies_, is_changed);
+    if (finds_pairs) state_.clock.answer_each_step();
+    own_.set_boxes(std::move(boxes), finds_pairs);
     drop([this](const Patch& patch) { return !is_of_boxes(patch); });
   }
   // Forget the patches of bodies.
@@ -119,6 +127,9 @@ class PatchStore {
     state_.clock.answer(answer.age, answer.period);
     return result;
   }
+  bool finds_pairs() const { return own_.finds_pairs(); }
+  // The boxes of a pair of one's own that is solved.
+  const int64_t* own_pair(long row) const { return own_.answer().pairs + 2 * row; }
   // Whether contacts of one's own are those of these pairs already.
   bool holds(const bc_patches& pairs) const { return own_.is_asked(pairs, options_.friction); }
   // Take pairs whose contacts are solved at the start of each advance. Impulses stay.
