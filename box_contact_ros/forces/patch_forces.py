@@ -64,7 +64,7 @@ class Body:
     """
 
     mass: float
-    """[kg]. A body of mass 0 is moved by no force, but may move by its velocity."""
+    """[kg]. A body of mass 0 is moved by no force, but by its velocity, or by the caller."""
     inertia: Sequence[float] | np.ndarray
     """(3,) principal moments about the body's own axes through the centre of mass [kg m²]."""
     centre: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0)
@@ -302,6 +302,8 @@ class PatchForces:
         poses, velocities: at its start. wrenches: all but those of contacts, gravity among them.
         changed: (k,) places of those bodies at rest that may be given otherwise than at the end of
         the last step. The others are not read: they stay where they were. None: all may be.
+        A body of mass 0 without a velocity, given at another pose than it ended with, has the speed
+        of this change. `forget` what is put elsewhere.
         Call `advance` once a step. Steps of less than 1 s may differ in length.
         ValueError: names field and value; nothing changes then.
         """

@@ -33,7 +33,7 @@ extern "C" {
 #endif
 
 typedef struct bc_body {
-  double mass;       /* 1e-50 to 1e50 kg; 0: no force moves it, but it may move by its velocity */
+  double mass;       /* 1e-50 to 1e50 kg; 0: no force moves it, but it may move: see advance */
   double inertia[3]; /* about the body's own axes, through the centre of mass: 1e-50 to 1e50 kg m²,
                         or 0 without a mass; none exceeds the sum of the two others */
   double centre[3];  /* of mass, in the body's own frame, up to 1e50 m */
@@ -165,6 +165,8 @@ BC_API bc_status bc_patch_forces_ahead(const bc_patch_forces* forces, double dt,
 
 /* Advance by `dt` seconds: 1e-50 or more, and less than 1. Steps may differ in length. `outside` are
  * the wrenches beside those of contacts, gravity among them, constant over the step; NULL: none.
+ * A body of mass 0 goes on by its velocity. One without any, given at another pose than it ended with, has the
+ * speed of this change: so a carrier may be moved by its poses alone. Forget what is put elsewhere.
  * Without poses and velocities in `motion`, the wrenches are taken to move the bodies until the next
  * advance, which then removes the speed of pushing out.
  * With both, bodies at rest are laid down: poses as they were given, velocities 0. They wake by a pose,

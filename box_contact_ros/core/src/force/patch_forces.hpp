@@ -46,7 +46,10 @@ class PatchForces : public PatchStore {
                    bc_pose* ahead) const {
     const SubSteps steps = Clock(state_.clock).begin(dt, options_.substeps);
     auto write = [&](size_t k, double time) {
-      ahead[k] = pose_after(time, bodies_[k], poses[k], velocities[k]);
+      ahead[k] = pose_after(time, bodies_[k], poses[k],
+                            bodies_[k].is_free()
+                                ? velocities[k]
+                                : carrier_velocity(k, {poses, velocities, nullptr}));
     };
     for (size_t k = 0; k < bodies_.size(); ++k) write(k, steps.ahead());
     if (!own_.is_used()) return;
@@ -97,7 +100,8 @@ class PatchForces : public PatchStore {
     if (!all.poses) all.poses = poses_.data();
     StepInputs step{next_.clock.begin(dt, options_.substeps), given, all,
                     own_.is_used() ? &own_ : nullptr, solve_pair};
-    BodyStep body_step(bodies_, step.steps, given, all, state_.is_moved_by_wrenches, ended_);
+    for (int32_t k : sleep_.fixed()) carriers_[size_t(k)] = carrier_velocity(size_t(k), given);
+    BodyStep body_step(bodies_, step.steps, given, carriers_, all, state_.is_moved_by_wrenches, ended_);
     if (!is_grouped_) islands_.group(bodies_, sleep_.awake(), next_.patches);
     is_grouped_ = true;
     next_.loads.resize(next_.patches.size());
@@ -117,6 +121,7 @@ class PatchForces : public PatchStore {
     if (!is_in_place || motion.wrenches) sleep_.write_ends(all);
     if (motion.awake) sleep_.write_awake(motion.awake);
     own_.settle();
+    state_.step = dt;
     state_.clock.end(dt);
     state_.has_loads = true;
     state_.is_moved_by_wrenches = motion.wrenches && !motion.poses && !motion.velocities;

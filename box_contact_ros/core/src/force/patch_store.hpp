@@ -24,6 +24,7 @@ struct State {
   std::vector<Patch> patches;  // by pair
   std::vector<Load> loads;     // of the last advance, by pair
   Clock clock;
+  double step = 0.0;      // the last one [s]
   bool has_loads = true;  // none since bodies or boxes were changed, or patches forgotten
   bool is_moved_by_wrenches = false;  // whether the caller moves the bodies since the last advance
 };
@@ -38,6 +39,7 @@ class PatchStore {
         options_(options),
         ended_(bodies_.size()),
         poses_(bodies_.size()),
+        carriers_(bodies_.size()),
         islands_(side) {
     sleep_.set_bodies(bodies_);
     make_room(0);
@@ -60,6 +62,7 @@ class PatchStore {
       if (bodies[k].is_free() != bodies_[k].is_free()) begin_anew(k);
     ended_.resize(bodies.size());
     poses_.resize(bodies.size());
+    carriers_.resize(bodies.size());
     sleep_.change_bodies(bodies, is_changed);
     bodies_ = std::move(bodies);  // last: there may be no memory for the others
     auto count = int32_t(bodies_.size());
@@ -109,6 +112,7 @@ class PatchStore {
     state_.clock = {};
     state_.is_moved_by_wrenches = false;
     ended_.assign(bodies_.size(), {});
+    poses_.assign(bodies_.size(), {});
     sleep_.set_bodies(bodies_);
     is_grouped_ = false;
   }
@@ -169,8 +173,22 @@ class PatchStore {
                        [this](const Patch& patch) { return sleep_.is_asleep(patch); }),
         next_.patches.end());
   }
-  // What is let go, gripped or forgotten has not ended an advance, and needs no shorter sub-steps yet.
-  void begin_anew(size_t body) { ended_[body] = {}; }
+  // What is let go, gripped or forgotten has not ended an advance: it needs no shorter sub-steps yet, and its
+  // pose tells no velocity.
+  void begin_anew(size_t body) {
+    ended_[body] = {};
+    poses_[body] = {};
+  }
+  // The velocity of a body that no force moves, at the start of an advance: the one that is given, or, without
+  // any, by its poses.
+  bc_velocity carrier_velocity(size_t body, const Given& given) const {
+    const bc_velocity& velocity = given.velocities[body];
+    const bc_pose &last = poses_[body], &pose = given.poses[body];
+    bool has_moved = squared_norm(last.quaternion) > 0.0 && !have_same_bits(last, pose);
+    return is_still(velocity) && has_moved
+               ? velocity_between(last, pose, bodies_[body].centre, state_.step)
+               : velocity;
+  }
   bool is_of_boxes(const Patch& patch) const {
     return 0 <= patch.box_a && patch.box_a < patch.box_b && patch.box_b < box_count() &&
            body_of(patch.box_a) == patch.a && body_of(patch.box_b) == patch.b && patch.a >= 0 &&
@@ -219,7 +237,8 @@ class PatchStore {
   Options options_;
   OwnContacts own_;
   std::vector<Ended> ended_;    // of the bodies
-  std::vector<bc_pose> poses_;  // of the bodies at the end of the last advance
+  std::vector<bc_pose> poses_;  // of the bodies at the end of the last advance; none: all zero
+  std::vector<bc_velocity> carriers_;  // of the bodies that no force moves, in an advance
   State state_, next_;          // as the last advance ended, and as the next one will
   std::vector<Patch> woken_;    // of what wakes in this advance, as it was
   Sleep sleep_;                 // patches and loads of what is asleep are there
