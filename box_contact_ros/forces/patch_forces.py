@@ -250,6 +250,15 @@ class PatchForces:
                                None if poses is None else _as_rows(poses, 'poses', 7),
                                bool(find_pairs))
 
+    def set_surface(self, box: int, velocity: ArrayLike) -> None:
+        """Set the velocity (3,) of a box's surface beside that of its body, as of a belt [m/s].
+
+        It is in the common frame, and lasts until it is set again, also under late answers.
+        `surface_velocity` of `hold` is added. ValueError: names the field and its value.
+        """
+        self._native.set_surface(int(as_wholes([box], 'box')[0]),
+                                 as_floats(velocity, 'velocity', 'three numbers', (3,)))
+
     def hold(self, pairs: ArrayLike, contacts: Contacts | None = None,
              poses: ArrayLike | None = None, *,
              friction: ArrayLike | None = None, surface_velocity: ArrayLike | None = None,

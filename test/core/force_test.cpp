@@ -178,6 +178,7 @@ int main() {
   } catch (const std::invalid_argument&) {
   }
   copy.hold(Patches(pair));
+  copy.set_surface(1, {0.0, 0.0, 0.0});
   const long before = allocations;
   for (int step = 0; step < 10; ++step) copy.advance(0.001, poses, velocities, outside);
   Pose ahead[2];

@@ -194,7 +194,7 @@ void move_stacks(Calls& calls) {
   stacks.advance(calls, 2);
 }
 
-// Stacks of which the forces find the pairs fall asleep; a box gets another size, and one is put beside.
+// Stacks of which the forces find the pairs fall asleep; a belt starts, a box gets another size, and one is put aside.
 void find_and_move_stacks(Calls& calls) {
   Stacks stacks;
   auto set_boxes = [&] {
@@ -206,6 +206,8 @@ void find_and_move_stacks(Calls& calls) {
   calls(set_boxes);
   stacks.advance(calls, 40);
   stacks.boxes[6].box.size.extent[0] = 0.9;
+  const double belt[] = {0.5, 0.0, 0.0};
+  calls([&] { return bc_patch_forces_set_surface(stacks.forces, 0, belt); });
   calls(set_boxes);
   stacks.advance(calls, 2);
   stacks.poses[8] = pose_at(1.5, 0.5, 3.0);

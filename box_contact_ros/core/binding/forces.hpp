@@ -136,6 +136,15 @@ inline PyObject* forces_set_boxes(PyObject* self, PyObject* const* args, Py_ssiz
   Py_RETURN_NONE;
 }
 
+inline PyObject* forces_set_surface(PyObject* self, PyObject* const* args, Py_ssize_t count) {
+  if (count != 2) fail(PyExc_TypeError, "set_surface(box, velocity)");
+  long long box = PyLong_AsLongLong(args[0]);
+  if (box == -1 && PyErr_Occurred()) return nullptr;
+  auto velocity = read<double>(args[1], "velocity", {3});
+  check(bc_patch_forces_set_surface(forces_of(self), box, velocity.numbers));
+  Py_RETURN_NONE;
+}
+
 // An array of the numbers of structs.
 template <class Struct>
 Struct* rows_of(const Array<double>& array) {
@@ -246,6 +255,8 @@ inline PyMethodDef forces_methods[] = {
     {"set_boxes", method<forces_set_boxes>(), METH_FASTCALL,
      "set_boxes(sizes, body, poses, find_pairs)\n--\n\nChange the boxes: (m, 3), (m,), (m, 7), bool; None "
      "for body and poses."},
+    {"set_surface", method<forces_set_surface>(), METH_FASTCALL,
+     "set_surface(box, velocity)\n--\n\nSet the velocity of a box's surface (3,)."},
     {"wrenches", method<forces_advance<true>>(), METH_FASTCALL,
      "wrenches(dt, poses, velocities, outside, changed)\n--\n\nReturn wrenches (n, 6), which move the bodies "
      "until the next call.\n\nReturn None, and change nothing, where one is no plain array."},

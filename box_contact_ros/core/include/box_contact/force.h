@@ -144,6 +144,11 @@ BC_API bc_status bc_patch_forces_set_bodies(bc_patch_forces* forces, const bc_bo
 BC_API bc_status bc_patch_forces_set_boxes(bc_patch_forces* forces, const bc_body_box* boxes,
                                            int64_t count, int find_pairs);
 
+/* Set the velocity of a box's surface beside that of its body, as of a belt, in the common frame [m/s]. It
+ * lasts until it is set again, also under answers that are late; `surface` of an answer is added. */
+BC_API bc_status bc_patch_forces_set_surface(bc_patch_forces* forces, int64_t box,
+                                             const double velocity[3]);
+
 /* Forget the patches of bodies, which were put elsewhere, or all patches. */
 BC_API bc_status bc_patch_forces_forget(bc_patch_forces* forces, const int64_t* bodies,
                                         int64_t count);

@@ -109,6 +109,12 @@ class PatchForces {
                                             find_pairs));
   }
 
+  // Set the velocity of a box's surface beside that of its body, as of a belt, in the common frame [m/s].
+  // It lasts until it is set again.
+  void set_surface(std::int64_t box, const double (&velocity)[3]) {
+    detail::check(bc_patch_forces_set_surface(forces_.get(), box, velocity));
+  }
+
   // Take an answer, asked for at `poses`; pairs that are left out are forgotten. Contacts of one's own
   // need set_boxes, and no poses.
   void hold(const Patches& answer, Span<const Pose> poses = {}) {

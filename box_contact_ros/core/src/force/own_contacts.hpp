@@ -26,14 +26,20 @@ class OwnContacts {
   bool finds_pairs() const { return finds_pairs_; }
   bool is_used() const { return finds_pairs_ || count() > 0; }
 
+  // Where memory ends, all is as it was.
   void set_boxes(std::vector<bc_body_box> boxes, bool finds_pairs) {
+    NearPairs near;
+    if (finds_pairs) near.set_boxes(boxes);
+    sizes_.reserve(boxes.size());
+    poses_.reserve(boxes.size());
+    is_placed_.reserve(boxes.size());
+    near_ = std::move(near);
     boxes_ = std::move(boxes);
     finds_pairs_ = finds_pairs;
     sizes_.clear();
     for (const bc_body_box& box : boxes_) sizes_.push_back(box.box.size);
     poses_.resize(boxes_.size());
     is_placed_.resize(boxes_.size());
-    if (finds_pairs) near_.set_boxes(boxes_);
     forget();
   }
   void forget() {

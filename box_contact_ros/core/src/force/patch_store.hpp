@@ -63,10 +63,12 @@ class PatchStore {
     ended_.resize(bodies.size());
     poses_.resize(bodies.size());
     carriers_.resize(bodies.size());
+    surfaces_.reserve(bodies.size());
     sleep_.change_bodies(bodies, is_changed);
     bodies_ = std::move(bodies);  // last: there may be no memory for the others
     auto count = int32_t(bodies_.size());
     make_room(state_.patches.size());
+    if (!surfaces_.empty()) surfaces_.resize(size_t(box_count()));
     drop([this, count](const Patch& patch) {
       return !is_of_boxes(patch) || std::max(patch.a, patch.b) >= count ||
              !(bodies_[size_t(patch.a)].is_free() || bodies_[size_t(patch.b)].is_free());
@@ -90,8 +92,22 @@ class PatchStore {
     wake();
     sleep_.change_bodies(bodies_, is_changed);
     if (finds_pairs) state_.clock.answer_each_step();
+    surfaces_.reserve(boxes.size());
     own_.set_boxes(std::move(boxes), finds_pairs);
+    if (!surfaces_.empty()) surfaces_.resize(size_t(box_count()));
     drop([this](const Patch& patch) { return !is_of_boxes(patch); });
+  }
+  // Set the velocity of a box's surface, which lasts. What touches it wakes, and answers to come add it.
+  void set_surface(int64_t box, const Vec<double>& velocity) {
+    surfaces_.resize(size_t(box_count()));
+    Vec<double>& last = surfaces_[size_t(box)];
+    if (have_same_bits(last, velocity)) return;
+    auto touches = [box](const Patch& patch) { return patch.box_a == box || patch.box_b == box; };
+    sleep_.mark_if(touches);
+    wake();
+    for (Patch& patch : state_.patches)
+      if (touches(patch)) patch.surface += (patch.box_a == box ? -1.0 : 1.0) * (velocity - last);
+    last = velocity;
   }
   // Forget the patches of bodies.
   void forget(const int64_t* bodies, int64_t count) {
@@ -221,7 +237,7 @@ class PatchStore {
                   InThreads& in_threads) {
     std::vector<Patch>& found = next_.patches;
     reader_.read_rows(
-        {answer, poses, bodies_, boxes(), options_.friction},
+        {answer, poses, bodies_, boxes(), surfaces_, options_.friction},
         [&](size_t place) { return is_own ? own_.row(place) : place; }, found,
         [&](long count, const auto& work) { in_threads(options_.threads, count, work); });
     for (const Patch& patch : found)
@@ -236,6 +252,7 @@ class PatchStore {
   std::vector<Body> bodies_;
   Options options_;
   OwnContacts own_;
+  Surfaces surfaces_;
   std::vector<Ended> ended_;    // of the bodies
   std::vector<bc_pose> poses_;  // of the bodies at the end of the last advance; none: all zero
   std::vector<bc_velocity> carriers_;  // of the bodies that no force moves, in an advance

@@ -160,6 +160,21 @@ bc_status bc_patch_forces_set_boxes(bc_patch_forces* forces, const bc_body_box* 
   });
 }
 
+bc_status bc_patch_forces_set_surface(bc_patch_forces* forces, int64_t box,
+                                      const double* velocity) {
+  return guarded([&] {
+    if (!forces || !velocity) return refuse_null(forces ? "velocity" : "forces");
+    PatchForces& self = forces_of(forces);
+    if (box < 0 || box >= self.box_count())
+      return fail(BC_BAD_ARGUMENT, "box: there is no box %lld", (long long)box);
+    if (!are_within(velocity, 3, speed_max))
+      return fail(BC_BAD_ARGUMENT, "velocity (%g, %g, %g) is not finite, or beyond %g",
+                  velocity[0], velocity[1], velocity[2], speed_max);
+    self.set_surface(box, {velocity[0], velocity[1], velocity[2]});
+    return BC_OK;
+  });
+}
+
 bc_status bc_patch_forces_forget(bc_patch_forces* forces, const int64_t* bodies, int64_t count) {
   return guarded([&] {
     if (!forces || (!bodies && count > 0)) return refuse_null(forces ? "bodies" : "forces");
