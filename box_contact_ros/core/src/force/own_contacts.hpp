@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "../kernel.hpp"
+#include "asked_pairs.hpp"
 #include "gaps.hpp"
 #include "near_pairs.hpp"
 
@@ -173,7 +173,7 @@ class OwnContacts {
       for (size_t k = 0; k < boxes_.size(); ++k) place(k);
     else if (!finds_pairs_)
       std::for_each(placed_.begin(), placed_.end(), place);
-    const Pairs& live = chosen();
+    const AskedPairs& live = chosen();
     if (live.count() == 0) return -1;
     auto* numbers = reinterpret_cast<const double*>(poses_.data());
     auto* sizes = reinterpret_cast<const double*>(sizes_.data());
@@ -205,7 +205,7 @@ class OwnContacts {
   size_t row(size_t place) const { return is_all_ ? keys_[place].row : place; }
   // What was solved last.
   bc_patches answer() const {
-    const Pairs& live = chosen();
+    const AskedPairs& live = chosen();
     return {sizeof(bc_patches),
             int64_t(live.count()),
             live.pairs.data(),
@@ -229,50 +229,6 @@ class OwnContacts {
     bool is_new;  // not solved yet, where something slept when it was asked for
     bool operator<(const Key& other) const { return pair < other.pair; }
   };
-  struct Pairs {
-    std::vector<int64_t> pairs;  // (n, 2)
-    std::vector<double> friction, surface, stiffness;
-
-    size_t count() const { return pairs.size() / 2; }
-    void resize(size_t n) {
-      pairs.resize(2 * n);
-      for (auto* column : {&friction, &stiffness}) column->resize(n);
-      surface.resize(3 * n);
-    }
-    void reserve(size_t n) {
-      pairs.reserve(2 * n);
-      for (auto* column : {&friction, &stiffness}) column->reserve(n);
-      surface.reserve(3 * n);
-    }
-    void add(const Pairs& other, size_t k) {
-      pairs.insert(pairs.end(), &other.pairs[2 * k], &other.pairs[2 * k] + 2);
-      friction.push_back(other.friction[k]);
-      stiffness.push_back(other.stiffness[k]);
-      surface.insert(surface.end(), &other.surface[3 * k], &other.surface[3 * k] + 3);
-    }
-  };
-  // Answers to rows.
-  struct Columns {
-    std::vector<double> separation, normal, point, volume, covariance;
-
-    void resize(size_t n) {
-      separation.resize(n);
-      volume.resize(n);
-      for (auto* column : {&normal, &point}) column->resize(3 * n);
-      covariance.resize(9 * n);
-    }
-    detail::Results results(double margin) {
-      return {nullptr,       separation.data(), normal.data(), point.data(),
-              volume.data(), covariance.data(), nullptr,       margin};
-    }
-    // Set the patch to that of a contact; the separation stays.
-    void set_patch(size_t row, const bc_contact& contact) {
-      volume[row] = contact.volume;
-      std::copy_n(contact.normal, 3, &normal[3 * row]);
-      std::copy_n(contact.point, 3, &point[3 * row]);
-      std::copy_n(contact.covariance[0], 9, &covariance[9 * row]);
-    }
-  };
   void resize(size_t n) {
     asked_.resize(n);
     is_all_ = true;
@@ -280,7 +236,7 @@ class OwnContacts {
     found_.resize(n);
     make_room();
   }
-  const Pairs& chosen() const { return is_all_ ? asked_ : live_; }
+  const AskedPairs& chosen() const { return is_all_ ? asked_ : live_; }
   void choose_none() {
     rows_.clear();
     placed_.clear();
@@ -315,7 +271,7 @@ class OwnContacts {
   }
   // Give pairs that are apart, but near, the patches that they have once moved together along the normal.
   long solve_near(const Gaps& gaps, SolvePair solve) {
-    const Pairs& live = chosen();
+    const AskedPairs& live = chosen();
     for (size_t k = 0; k < live.count(); ++k) {
       double apart = found_.separation[k];
       Vec<double> normal = vector_at(&found_.normal[3 * k]);
@@ -336,14 +292,14 @@ class OwnContacts {
   std::vector<bc_body_box> boxes_;
   std::vector<bc_size> sizes_;  // of the boxes
   std::vector<bc_pose> poses_;  // of the boxes, in the common frame
-  Pairs asked_;
+  AskedPairs asked_;
   bool is_any_new_ = false, finds_pairs_ = false;
   NearPairs near_;
   // Those that are solved, by pair, unless all are.
   static constexpr int64_t none_chosen = -1;
   int64_t chosen_for_ = none_chosen;
   bool is_all_ = true;
-  Pairs live_;
+  AskedPairs live_;
   std::vector<size_t> rows_;    // theirs among those that are asked for
   std::vector<size_t> placed_;  // their boxes
   std::vector<uint8_t> is_placed_;
