@@ -3,9 +3,9 @@
 
 """From contacts to forces: the patches of all pairs as velocity constraints.
 
-A simulator asks for contacts, at every physics step or less often. `PatchForces` takes each answer
-with the poses of the question. At every physics step it then moves all bodies, or gives the
-wrenches that move them. One load on fixed boxes is a scene like any other.
+`PatchForces` finds the contacts of boxes at every physics step, or takes answers of others with the
+poses of the question. It moves all bodies, or gives the wrenches that move them. One load on fixed
+boxes is a scene like any other.
 
 It is a face of code in libbox_contact; docs/explanation/force.md describes the method, sequential
 impulses (Catto, 2005).
@@ -195,14 +195,11 @@ class PatchForces:
     (n, 6) are linear, of the centre of mass, then angular. Wrenches (n, 6) are a force, then a
     torque about the centre of mass. All are in the common frame.
 
-    With contacts of one's own, for boxes of `sizes` of which some are `fixed`, where nothing moves
-    by more than 0.1 m in a step::
+    It may find the pairs of boxes that touch by itself::
 
         forces = PatchForces(bodies)
-        forces.set_boxes(sizes)
+        forces.set_boxes(sizes, find_pairs=True)
         while True:
-            pairs, _ = contacts_of(sizes, poses, fixed=fixed, margin=0.1)
-            forces.hold(pairs)
             poses, velocities, _, awake = forces.advance(dt, poses, velocities, gravity)
 
     To take a body out of the middle, put the last one in its place, `forget` both, and
@@ -274,7 +271,8 @@ class PatchForces:
         friction: μ (k,).
         surface_velocity: (k, 3) of B's surface relative to A's [m/s], as of a belt. That of the
         bodies is added.
-        stiffness: (k,) [N/m], up to what step and answers bear. 0 stands for that.
+        stiffness: (k,) of springs [N/m]: a weight rests weight / stiffness deep. Steps and late
+        answers limit it. 0: as stiff as they allow.
         age: how long ago the answer was asked for [s].
         period: from one question to the next [s]. 0 is the least of the last intervals between
         answers.

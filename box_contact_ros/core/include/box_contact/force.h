@@ -3,15 +3,14 @@
 
 /* From contacts to forces, by sequential impulses. For C and C++.
  *
- * A simulator gives each answer to the forces, with the poses for which it was asked. At every
- * physics step they return where the bodies go, or the wrenches that move them.
+ * At every physics step the forces find which boxes touch, and return where the bodies go, or the
+ * wrenches that move them. Or a simulator gives them answers, with the poses for which these were asked.
  *
  *   bc_body bodies[2] = {{20000.0, {2.1e4, 2.6e5, 2.6e5}, {0, 0, 0}}, {0}};   a load, a fixed box
+ *   bc_body_box boxes[2] = {{0, load}, {1, floor}};                           in the bodies' frames
  *   bc_patch_forces* forces;
  *   bc_patch_forces_create(bodies, 2, NULL, &forces);
- *   bc_patches answer = {sizeof(bc_patches), 1, pairs, separation, normal, point, volume,
- *                       covariance, NULL, NULL, NULL, 0.0, 0.0};
- *   bc_patch_forces_hold(forces, &answer, poses);
+ *   bc_patch_forces_set_boxes(forces, boxes, 2, 1);
  *   bc_motion motion = {sizeof(bc_motion), poses, velocities, NULL, NULL};
  *   bc_patch_forces_advance(forces, 0.001, poses, velocities, weights, &motion);
  *
@@ -71,7 +70,8 @@ typedef struct bc_patches {
                                period are 0 to 1e50 */
   const double* surface;    /* (count, 3): velocity of B's surface relative to A's, beside that of the
                                bodies, as of a belt [m/s]; NULL: none */
-  const double* stiffness;  /* [N/m], up to what step and answers bear; 0, or NULL: that */
+  const double* stiffness;  /* of a spring [N/m]: a weight rests weight / stiffness deep. Steps and late
+                               answers limit it; 0, or NULL: as stiff as they allow */
   double age;               /* since the answer was asked for [s] */
   double period;            /* from one question to the next [s]; 0: the least of the last
                                intervals between answers */
