@@ -194,7 +194,8 @@ void move_stacks(Calls& calls) {
   stacks.advance(calls, 2);
 }
 
-// Stacks of which the forces find the pairs fall asleep; a belt starts, a box gets another size, and one is put aside.
+// Stacks of which the forces find the pairs fall asleep; a belt starts, a box gets another size, and one
+// is put aside.
 void find_and_move_stacks(Calls& calls) {
   Stacks stacks;
   auto set_boxes = [&] {

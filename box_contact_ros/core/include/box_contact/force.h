@@ -19,8 +19,8 @@
  * angular. They and wrenches are in the common frame, at and about the centre of mass.
  * docs/explanation/force.md has the equations. One thread at a time may use an object.
  * `bc_patch_forces_hold` allocates no memory once as many pairs have been held, and
- * `bc_patch_forces_advance` by one thread none at all, unless it finds pairs. The bits are the same on all instruction sets,
- * and for any number of threads.
+ * `bc_patch_forces_advance` by one thread none at all, unless it finds pairs. The bits are the same on
+ * all instruction sets, and for any number of threads.
  */
 #ifndef BOX_CONTACT_FORCE_H
 #define BOX_CONTACT_FORCE_H
@@ -170,8 +170,9 @@ BC_API bc_status bc_patch_forces_ahead(const bc_patch_forces* forces, double dt,
 
 /* Advance by `dt` seconds: 1e-50 or more, and less than 1. Steps may differ in length. `outside` are
  * the wrenches beside those of contacts, gravity among them, constant over the step; NULL: none.
- * A body of mass 0 goes on by its velocity. One without any, given at another pose than it ended with, has the
- * speed of this change: so a carrier may be moved by its poses alone. Forget what is put elsewhere.
+ * A body of mass 0 goes on by its velocity. One without any, given at another pose than it ended with,
+ * has the speed of this change: so a carrier may be moved by its poses alone. Forget what is put
+ * elsewhere.
  * Without poses and velocities in `motion`, the wrenches are taken to move the bodies until the next
  * advance, which then removes the speed of pushing out.
  * With both, bodies at rest are laid down: poses as they were given, velocities 0. They wake by a pose,

@@ -127,7 +127,8 @@ class BodyStep {
   bc_pose pose_of(const Moving& moving) const {
     return pose_at(moving.placed, moving.quaternion, bodies_[size_t(moving.body)].centre);
   }
-  // A body that no force moves goes on by the velocity that is given. With none, it keeps its pose to the bit.
+  // A body that no force moves goes on by the velocity that is given. With none, it keeps its pose to
+  // the bit.
   void move_alone(size_t k) const {
     const bc_velocity velocity = given_.velocities[k];
     ended_[k] = {ended_[k].relaxed,

@@ -51,7 +51,6 @@ class OwnContacts {
   // What a copy has no room for, so that an advance takes no memory.
   void make_room() {
     live_.reserve(count());
-    rows_.reserve(count());
     placed_.reserve(2 * count());
   }
 
@@ -121,13 +120,12 @@ class OwnContacts {
       size_t k = key.row;
       auto a = size_t(asked_.pairs[2 * k]), b = size_t(asked_.pairs[2 * k + 1]);
       if (!key.is_new && is_quiet(a) && is_quiet(b)) continue;
-      rows_.push_back(k);
       live_.add(asked_, k);
       note_placed(a, b);
     }
   }
-  // Find the pairs that are solved: see NearPairs. `pose_of(body)` also knows where the others are. Returns the most
-  // patches that they may have.
+  // Find the pairs that are solved: see NearPairs. `pose_of(body)` also knows where the others are.
+  // Returns how many there are.
   template <class EachActive, class PoseOf>
   size_t find(double dt, int64_t revision, const bc_wrench* outside,
               const std::vector<Body>& bodies, const EachActive& each_active,
@@ -162,8 +160,8 @@ class OwnContacts {
   }
 
   // Solve the chosen pairs with the bodies at `poses`. `solve(rows, count, results)` answers rows, and returns
-  // the first that is refused, or −1; so does this, of those of `answer()`. A pair that is apart, but near by `gaps`,
-  // gets the patch that it has once it touches, and keeps its separation above zero.
+  // the first that is refused, or −1; so does this, of the rows of `answer()`.
+  // A pair that is apart, but near by `gaps`, gets the patch that it has once it touches, and keeps its separation above zero.
   template <class Solve>
   long solve(const bc_pose* poses, const Gaps& gaps, const Solve& solve, SolvePair solve_pair) {
     auto place = [&](size_t box) {
@@ -238,7 +236,6 @@ class OwnContacts {
   }
   const AskedPairs& chosen() const { return is_all_ ? asked_ : live_; }
   void choose_none() {
-    rows_.clear();
     placed_.clear();
     std::fill(is_placed_.begin(), is_placed_.end(), uint8_t(0));
     live_.resize(0);
@@ -300,7 +297,6 @@ class OwnContacts {
   int64_t chosen_for_ = none_chosen;
   bool is_all_ = true;
   AskedPairs live_;
-  std::vector<size_t> rows_;    // theirs among those that are asked for
   std::vector<size_t> placed_;  // their boxes
   std::vector<uint8_t> is_placed_;
   Columns found_;

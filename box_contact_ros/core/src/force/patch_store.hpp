@@ -195,8 +195,8 @@ class PatchStore {
     ended_[body] = {};
     poses_[body] = {};
   }
-  // The velocity of a body that no force moves, at the start of an advance: the one that is given, or, without
-  // any, by its poses.
+  // The velocity of a body that no force moves, at the start of an advance: the one that is given, or,
+  // without any, by its poses.
   bc_velocity carrier_velocity(size_t body, const Given& given) const {
     const bc_velocity& velocity = given.velocities[body];
     const bc_pose &last = poses_[body], &pose = given.poses[body];
