@@ -19,7 +19,6 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -88,8 +87,7 @@ class Heap:
         forces = PatchForces(
             [Body.of_box(size, mass) for size, mass in zip(self.sizes, self.masses)],
             substeps=self.substeps, friction=self.friction)
-        forces.set_boxes(self.sizes)
-        forces.hold(list(combinations(range(len(self.masses)), 2)))
+        forces.set_boxes(self.sizes, find_pairs=True)
         weight = np.zeros((len(self.masses), 6))
         weight[:, 2] = -GRAVITY * self.masses
         poses, velocities = self.poses, self.velocities

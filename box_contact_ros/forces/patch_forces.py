@@ -3,9 +3,9 @@
 
 """From contacts to forces: the patches of all pairs as velocity constraints.
 
-A simulator asks for contacts, at every physics step or less often. `PatchForces` takes each answer
-with the poses of the question. At every physics step it then moves all bodies, or gives the
-wrenches that move them. One load on fixed boxes is a scene like any other.
+`PatchForces` finds the contacts of boxes at every physics step, or takes answers of others with the
+poses of the question. It moves all bodies, or gives the wrenches that move them. One load on fixed
+boxes is a scene like any other.
 
 It is a face of code in libbox_contact; docs/explanation/force.md describes the method, sequential
 impulses (Catto, 2005).
@@ -64,7 +64,7 @@ class Body:
     """
 
     mass: float
-    """[kg]. A body of mass 0 is moved by no force, but may move by its velocity."""
+    """[kg]. A body of mass 0 is moved by no force, but by its velocity, or by the caller."""
     inertia: Sequence[float] | np.ndarray
     """(3,) principal moments about the body's own axes through the centre of mass [kg m²]."""
     centre: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0)
@@ -195,14 +195,11 @@ class PatchForces:
     (n, 6) are linear, of the centre of mass, then angular. Wrenches (n, 6) are a force, then a
     torque about the centre of mass. All are in the common frame.
 
-    With contacts of one's own, for boxes of `sizes` of which some are `fixed`, where nothing moves
-    by more than 0.1 m in a step::
+    It may find the pairs of boxes that touch by itself::
 
         forces = PatchForces(bodies)
-        forces.set_boxes(sizes)
+        forces.set_boxes(sizes, find_pairs=True)
         while True:
-            pairs, _ = contacts_of(sizes, poses, fixed=fixed, margin=0.1)
-            forces.hold(pairs)
             poses, velocities, _, awake = forces.advance(dt, poses, velocities, gravity)
 
     To take a body out of the middle, put the last one in its place, `forget` both, and
@@ -235,17 +232,29 @@ class PatchForces:
         self._native.set_bodies(*_columns(bodies))
 
     def set_boxes(self, sizes: ArrayLike, *, body: ArrayLike | None = None,
-                  poses: ArrayLike | None = None) -> None:
+                  poses: ArrayLike | None = None, find_pairs: bool = False) -> None:
         """Say which boxes the bodies have; pairs are then of boxes, and poses of bodies.
 
         sizes: full extents (m, 3) [m]. body: of each box (m,); None: box k is body k. poses: of the
         boxes (m, 7) in the frames of their bodies; None: those frames. Patches of boxes that stay
-        with their body stay; pairs without contacts are forgotten.
+        with their body stay; pairs without contacts are forgotten. find_pairs: each `advance` finds
+        the pairs that touch, and solves them by `exact`; `hold` is refused. Boxes of one body are
+        never a pair.
         ValueError: names the field and its value.
         """
         self._native.set_boxes(_as_rows(sizes, 'sizes', 3),
                                None if body is None else as_wholes(body, 'body'),
-                               None if poses is None else _as_rows(poses, 'poses', 7))
+                               None if poses is None else _as_rows(poses, 'poses', 7),
+                               bool(find_pairs))
+
+    def set_surface(self, box: int, velocity: ArrayLike) -> None:
+        """Set the velocity (3,) of a box's surface beside that of its body, as of a belt [m/s].
+
+        It is in the common frame, and lasts until it is set again, also under late answers.
+        `surface_velocity` of `hold` is added. ValueError: names the field and its value.
+        """
+        self._native.set_surface(int(as_wholes([box], 'box')[0]),
+                                 as_floats(velocity, 'velocity', 'three numbers', (3,)))
 
     def hold(self, pairs: ArrayLike, contacts: Contacts | None = None,
              poses: ArrayLike | None = None, *,
@@ -262,7 +271,8 @@ class PatchForces:
         friction: μ (k,).
         surface_velocity: (k, 3) of B's surface relative to A's [m/s], as of a belt. That of the
         bodies is added.
-        stiffness: (k,) [N/m], up to what step and answers bear. 0 stands for that.
+        stiffness: (k,) of springs [N/m]: a weight rests weight / stiffness deep. Steps and late
+        answers limit it. 0: as stiff as they allow.
         age: how long ago the answer was asked for [s].
         period: from one question to the next [s]. 0 is the least of the last intervals between
         answers.
@@ -299,6 +309,8 @@ class PatchForces:
         poses, velocities: at its start. wrenches: all but those of contacts, gravity among them.
         changed: (k,) places of those bodies at rest that may be given otherwise than at the end of
         the last step. The others are not read: they stay where they were. None: all may be.
+        A body of mass 0 without a velocity, given at another pose than it ended with, has the speed
+        of this change. `forget` what is put elsewhere.
         Call `advance` once a step. Steps of less than 1 s may differ in length.
         ValueError: names field and value; nothing changes then.
         """

@@ -100,7 +100,7 @@ static void check_rest(void) {
     unsigned char awake[2] = {7, 7};
     bc_patch_forces* forces;
     check(bc_patch_forces_create(both, 2, &options, &forces) == BC_OK, "create");
-    check(bc_patch_forces_set_boxes(forces, boxes, 2) == BC_OK, "boxes");
+    check(bc_patch_forces_set_boxes(forces, boxes, 2, 0) == BC_OK, "boxes");
     check(bc_patch_forces_hold(forces, &asked, NULL) == BC_OK, "hold");
     bc_motion motion = {sizeof motion, poses, velocities, NULL, awake};
     for (int step = 0; step < 400; ++step)
@@ -115,6 +115,15 @@ static void check_rest(void) {
     check(fabs(load.pressing - 49.05) < 1e-3, "pressing");
     check(bc_patch_forces_forget(forces, places, 1) == BC_OK, "forget");
     check(bc_patch_forces_loads(forces, &load, 1) == 0, "no loads");
+    const double belt[3] = {1, 0, 0};
+    check(bc_patch_forces_set_surface(forces, 2, belt) == BC_BAD_ARGUMENT, "no box");
+    check(bc_patch_forces_set_surface(forces, 0, NULL) == BC_BAD_ARGUMENT, "no velocity");
+    check(bc_patch_forces_set_surface(forces, 0, belt) == BC_OK, "a belt");
+    check(bc_patch_forces_set_boxes(forces, boxes, 2, 1) == BC_OK, "find pairs");
+    check(bc_patch_forces_hold(forces, &asked, NULL) == BC_BAD_ARGUMENT, "pairs are found");
+    check(!bc_patch_forces_advance(forces, 1 / 240.0, poses, velocities, outside, &motion) &&
+              bc_patch_forces_loads(forces, &load, 1) == 1 && velocities[0].linear[0] < -1e-3,
+          "found, on a belt");
     bc_patch_forces_destroy(forces);
   }
 }

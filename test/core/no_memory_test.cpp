@@ -171,7 +171,7 @@ void move_stacks(Calls& calls) {
     return bc_patch_forces_create(stacks.all.data(), Stacks::bodies - 1, nullptr, &forces);
   });
   calls([&] { return bc_patch_forces_set_bodies(forces, stacks.all.data(), Stacks::bodies); });
-  calls([&] { return bc_patch_forces_set_boxes(forces, stacks.boxes.data(), Stacks::bodies); });
+  calls([&] { return bc_patch_forces_set_boxes(forces, stacks.boxes.data(), Stacks::bodies, 0); });
   stacks.hold(calls, Stacks::bodies - 2);
   stacks.advance(calls, 40);
   stacks.hold(calls, Stacks::bodies - 1);
@@ -189,9 +189,30 @@ void move_stacks(Calls& calls) {
   stacks.all[5].mass = 20.0;
   calls([&] { return bc_patch_forces_set_bodies(forces, stacks.all.data(), Stacks::bodies); });
   stacks.boxes[6].box.size.extent[0] = 0.9;
-  calls([&] { return bc_patch_forces_set_boxes(forces, stacks.boxes.data(), Stacks::bodies); });
+  calls([&] { return bc_patch_forces_set_boxes(forces, stacks.boxes.data(), Stacks::bodies, 0); });
   stacks.hold_answers(calls);
   stacks.advance(calls, 2);
+}
+
+// Stacks of which the forces find the pairs fall asleep; a belt starts, a box gets another size, and one
+// is put aside.
+void find_and_move_stacks(Calls& calls) {
+  Stacks stacks;
+  auto set_boxes = [&] {
+    return bc_patch_forces_set_boxes(stacks.forces, stacks.boxes.data(), Stacks::bodies, 1);
+  };
+  calls([&] {
+    return bc_patch_forces_create(stacks.all.data(), Stacks::bodies, nullptr, &stacks.forces);
+  });
+  calls(set_boxes);
+  stacks.advance(calls, 40);
+  stacks.boxes[6].box.size.extent[0] = 0.9;
+  const double belt[] = {0.5, 0.0, 0.0};
+  calls([&] { return bc_patch_forces_set_surface(stacks.forces, 0, belt); });
+  calls(set_boxes);
+  stacks.advance(calls, 2);
+  stacks.poses[8] = pose_at(1.5, 0.5, 3.0);
+  stacks.advance(calls, 40);
 }
 
 // Let memory end at each allocation in turn.
@@ -215,4 +236,8 @@ int count_faults(const char* name, const Work& work) {
 
 }  // namespace
 
-int main() { return count_faults("pairs", find_pairs) + count_faults("forces", move_stacks) != 0; }
+int main() {
+  return count_faults("pairs", find_pairs) + count_faults("forces", move_stacks) +
+             count_faults("forces that find pairs", find_and_move_stacks) !=
+         0;
+}

@@ -80,14 +80,14 @@ def test_a_tower_beside_others_has_the_bits_that_it_has_alone(kind: str) -> None
         assert motion(kind, [tower]).tobytes() == together[:, [k]].tobytes(), f'tower {k}'
 
 
-def pile(threads: int) -> bytes:
+def pile(threads: int, *, find_pairs: bool = False) -> bytes:
     """Return poses and velocities of boxes that have fallen on each other."""
     random = np.random.default_rng(5)
     rows = [(random.uniform(0.2, 0.5, 3), 10.0 ** random.uniform(0, 1.5),
              (*random.uniform(-0.8, 0.8, 2), 0.4 + 0.12 * k), turned(random.normal(size=3), 2.0))
             for k in range(40)]
     rows = [(size, mass, at, turn / np.linalg.norm(turn)) for size, mass, at, turn in rows]
-    world = World(FLOOR, *rows, threads=threads, rest=False)
+    world = World(FLOOR, *rows, threads=threads, rest=False, find_pairs=find_pairs)
     for _ in range(150):
         world.step(0.01)
     return world.poses.tobytes() + world.velocities.tobytes()
@@ -95,7 +95,7 @@ def pile(threads: int) -> bytes:
 
 def print_hash() -> None:
     every = b''.join(motion(kind, towers(kind)).tobytes() for kind in KINDS)
-    print(hashlib.sha256(every + pile(1)).hexdigest())
+    print(hashlib.sha256(every + pile(1) + pile(1, find_pairs=True)).hexdigest())
 
 
 def test_instruction_sets_have_the_same_bits() -> None:
@@ -110,7 +110,7 @@ def test_instruction_sets_have_the_same_bits() -> None:
 
 
 def test_threads_have_the_same_bits() -> None:
-    assert pile(1) == pile(3)
+    assert pile(1) == pile(3) == pile(3, find_pairs=True)
 
 
 def advance_here_and_in_a_fork() -> None:

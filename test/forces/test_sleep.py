@@ -10,7 +10,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from helpers.worlds import FLOOR, World, turned
+from helpers.worlds import CONTAINER, FLOOR, World, turned
 
 from box_contact_ros import Body, ContactSolver
 from box_contact_ros.forces.patch_forces import GRAVITY
@@ -243,6 +243,25 @@ def test_rest_is_the_poses_that_were_given(twins: tuple[World, World]) -> None:
     expected = GRAVITY * np.array([35.0, 4.0, 10.0, 15.0, 5.0])
     assert loads.pressing == pytest.approx(expected, rel=1e-4)
     assert world.wrenches[1:, :3] == pytest.approx(-world.outside[1:, :3], abs=0.01)
+
+
+@pytest.mark.parametrize('dt', [0.001, 1 / 60])
+def test_loads_at_rest_are_those_awake(dt: float) -> None:
+    """Of containers that land tilted, a tower askew and a bridge: to the bit, and 2 s later."""
+    for rows in (
+            [(CONTAINER, 20e3, (0, 0, CONTAINER[2] * (k + 0.5) + 0.1 * (k + 1)),
+              turned((0, 1, 0), 0.01)) for k in range(4)],
+            [((1, 1, 0.5), 10, (0.1 * (k % 3), 0.07 * k, 0.25 + 0.5 * k)) for k in range(6)],
+            [((0.5, 0.5, 1), 10, (x, 0, 0.5)) for x in (-1, 1)]
+            + [((3, 0.5, 0.2), 20, (0.1, 0, 1.1)), cube(20, 0.3, 0, 1.45)]):
+        resting, awake = (World(FLOOR, *rows, rest=rest, find_pairs=True) for rest in (True, False))
+        while len(asleep(resting.step(dt))) < len(rows):
+            awake.step(dt)
+        loads, most = resting.forces.loads(), GRAVITY * resting.mass.sum()
+        assert np.array_equal(loads.pressing, awake.step(dt).forces.loads().pressing)
+        later = awake.run(2.0, dt).forces.loads()
+        assert loads.pressing == pytest.approx(later.pressing, abs=1e-6 * most)
+        assert loads.corner_loads == pytest.approx(later.corner_loads, abs=1e-5 * most)
 
 
 @pytest.mark.parametrize(('dt', 'speed'), [(1 / 240, 0.02), (1 / 60, 0.07), (0.1, 0.3)])

@@ -30,10 +30,11 @@ class World:
 
     A row is a size, a mass (0: fixed), a position and perhaps a quaternion and a centre of mass.
     pairs: of boxes that may touch; None: all of which one is free; none: contacts are held.
+    find_pairs: the forces find them instead.
     """
 
     def __init__(self, *rows: tuple, pairs: Sequence[tuple[int, int]] | None = None,
-                 **options) -> None:
+                 find_pairs: bool = False, **options) -> None:
         self.size = np.array([row[0] for row in rows], float)
         self.mass = np.array([row[1] for row in rows], float)
         self.poses = np.array([[*row[2], *(row[3] if len(row) > 3 else (0, 0, 0, 1))]
@@ -49,8 +50,9 @@ class World:
         if pairs is None:
             pairs = [(a, b) for a, b in combinations(range(len(rows)), 2)
                      if self.mass[a] or self.mass[b]]
-        if pairs:
-            self.forces.set_boxes(self.size)
+        if find_pairs or pairs:
+            self.forces.set_boxes(self.size, find_pairs=find_pairs)
+        if pairs and not find_pairs:
             self.forces.hold(pairs)
 
     def step(self, dt: float = STEP) -> World:

@@ -39,6 +39,8 @@ FORCES = PatchForces([BODY, BODY])
 CONTACTS = SOLVER.batch(POSES[:1], POSES[1:])
 BOXED = PatchForces([BODY, BODY])
 BOXED.set_boxes([UNIT, UNIT])
+FINDING = PatchForces([BODY, BODY])
+FINDING.set_boxes([UNIT, UNIT], find_pairs=True)
 BOXES = {name: Box(UNIT) for name in 'ab'}
 FIXED = {name: Box(UNIT, POSE) for name in 'ab'}
 PAIR = Pair.between('a', 'b')
@@ -134,6 +136,11 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: BOXED.hold([(0, 1), (1, 0)]), 'pairs', 'twice'),
     (lambda: BOXED.hold([(0, 1)], friction=[-1.0]), 'friction[0]', '-1'),
     (lambda: BOXED.hold([(0, 1)], friction=[1.0, 1.0]), 'friction', '(2,)'),
+    (lambda: FINDING.hold([(0, 1)]), 'hold', 'find their pairs themselves'),
+    (lambda: FINDING.set_surface(2, (1, 0, 0)), 'box', 'no box 2'),
+    (lambda: FINDING.set_surface(0.5, (1, 0, 0)), 'box', '0.5'),
+    (lambda: FINDING.set_surface(0, (1, 0)), 'velocity', '(2,)'),
+    (lambda: FINDING.set_surface(0, (1, NAN, 0)), 'velocity', 'nan'),
     (lambda: hold(poses=POSES[:1]), 'poses', '(1, 7)'),
     (lambda: hold(poses=POSES * [1, 1, 1, 0, 0, 0, 0]), 'poses[0]', '(0, 0, 0, 0)'),
     (lambda: hold(field='normal', value=(0, 0, 2)), 'normal[0]', '(0, 0, 2)'),

@@ -118,7 +118,7 @@ inline PyObject* forces_hold_pairs(PyObject* self, PyObject* const* args, Py_ssi
 }
 
 inline PyObject* forces_set_boxes(PyObject* self, PyObject* const* args, Py_ssize_t count) {
-  if (count != 3) fail(PyExc_TypeError, "set_boxes(sizes, body, poses)");
+  if (count != 4) fail(PyExc_TypeError, "set_boxes(sizes, body, poses, find_pairs)");
   auto sizes = read<double>(args[0], "sizes", {any_length, 3});
   npy_intp n = sizes.length(0);
   auto body = read_given<int64_t>(args[1], "body", {n});
@@ -130,7 +130,18 @@ inline PyObject* forces_set_boxes(PyObject* self, PyObject* const* args, Py_ssiz
     std::memcpy(&box.box.size, sizes.numbers + 3 * k, sizeof box.box.size);
     if (poses.object) std::memcpy(&box.box.pose, poses.numbers + 7 * k, sizeof box.box.pose);
   }
-  check(bc_patch_forces_set_boxes(forces_of(self), boxes.data(), int64_t(n)));
+  int find_pairs = PyObject_IsTrue(args[3]);
+  if (find_pairs < 0) return nullptr;
+  check(bc_patch_forces_set_boxes(forces_of(self), boxes.data(), int64_t(n), find_pairs));
+  Py_RETURN_NONE;
+}
+
+inline PyObject* forces_set_surface(PyObject* self, PyObject* const* args, Py_ssize_t count) {
+  if (count != 2) fail(PyExc_TypeError, "set_surface(box, velocity)");
+  long long box = PyLong_AsLongLong(args[0]);
+  if (box == -1 && PyErr_Occurred()) return nullptr;
+  auto velocity = read<double>(args[1], "velocity", {3});
+  check(bc_patch_forces_set_surface(forces_of(self), box, velocity.numbers));
   Py_RETURN_NONE;
 }
 
@@ -242,8 +253,10 @@ inline PyMethodDef forces_methods[] = {
      "hold_pairs(pairs, friction, surface, stiffness)\n--\n\nTake pairs whose contacts are solved at "
      "each advance; None for the last three."},
     {"set_boxes", method<forces_set_boxes>(), METH_FASTCALL,
-     "set_boxes(sizes, body, poses)\n--\n\nChange the boxes: (m, 3), (m,), (m, 7); None for the last "
-     "two."},
+     "set_boxes(sizes, body, poses, find_pairs)\n--\n\nChange the boxes: (m, 3), (m,), (m, 7), bool; None "
+     "for body and poses."},
+    {"set_surface", method<forces_set_surface>(), METH_FASTCALL,
+     "set_surface(box, velocity)\n--\n\nSet the velocity of a box's surface (3,)."},
     {"wrenches", method<forces_advance<true>>(), METH_FASTCALL,
      "wrenches(dt, poses, velocities, outside, changed)\n--\n\nReturn wrenches (n, 6), which move the bodies "
      "until the next call.\n\nReturn None, and change nothing, where one is no plain array."},

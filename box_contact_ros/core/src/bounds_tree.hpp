@@ -99,6 +99,16 @@ class BoundsTree {
       }
   }
 
+  // Take other bounds of the box at an index of the order.
+  void refit_one(size_t index, const Bounds& bounds) {
+    blocks_[index / width].set(index % width, bounds);
+    for (int level = 1; level < levels_; ++level) {
+      index /= width;
+      blocks_[starts_[level] + index / width].set(index % width,
+                                                  blocks_[starts_[level - 1] + index].around());
+    }
+  }
+
   // Give the boxes other numbers; those below 0 are in the tree no more.
   void renumber(const std::vector<int32_t>& number_of) {
     for (size_t index = 0; index < order_.size(); ++index) {

@@ -32,9 +32,7 @@ int main() {
 
   PatchForces forces(bodies);
   const std::vector<BodyBox> boxes{{0, {here, container}}, {1, {here, container}}};
-  forces.set_boxes(boxes);
-  const std::vector<std::int64_t> pairs{0, 1};
-  forces.hold(Patches(pairs));  // the library solves this pair at each step
+  forces.set_boxes(boxes, true);  // the forces find the pairs at each step
   double speed = 0;
   for (int tick = 1; tick <= 6000; ++tick) {
     forces.advance(step, poses, velocities, weights);

@@ -32,16 +32,12 @@ int main() {
     weights[i].force[2] = -gravity * masses[i];
   }
   std::vector<Velocity> velocities(count);
-  std::vector<std::int64_t> pairs;  // here all of them; a simulator lists those that are near
-  for (std::size_t b = 1; b < count; ++b)
-    for (std::size_t a = 0; a < b; ++a) pairs.insert(pairs.end(), {std::int64_t(a), std::int64_t(b)});
 
   PatchForces forces(bodies);
   std::vector<BodyBox> boxes;
   for (std::size_t i = 0; i < count; ++i)
     boxes.push_back({std::int64_t(i), {{{0, 0, 0}, {0, 0, 0, 1}}, sizes[i]}});
-  forces.set_boxes(boxes);
-  forces.hold(Patches(pairs));  // the library solves these pairs at each step
+  forces.set_boxes(boxes, true);  // the forces find the pairs at each step
   for (int tick = 0; tick < 3000; ++tick) forces.advance(step, poses, velocities, weights);
   forces.wrenches(step, poses, velocities, weights, wrenches);
 

@@ -3,15 +3,14 @@
 
 /* From contacts to forces, by sequential impulses. For C and C++.
  *
- * A simulator gives each answer to the forces, with the poses for which it was asked. At every
- * physics step they return where the bodies go, or the wrenches that move them.
+ * At every physics step the forces find which boxes touch, and return where the bodies go, or the
+ * wrenches that move them. Or a simulator gives them answers, with the poses for which these were asked.
  *
  *   bc_body bodies[2] = {{20000.0, {2.1e4, 2.6e5, 2.6e5}, {0, 0, 0}}, {0}};   a load, a fixed box
+ *   bc_body_box boxes[2] = {{0, load}, {1, floor}};                           in the bodies' frames
  *   bc_patch_forces* forces;
  *   bc_patch_forces_create(bodies, 2, NULL, &forces);
- *   bc_patches answer = {sizeof(bc_patches), 1, pairs, separation, normal, point, volume,
- *                       covariance, NULL, NULL, NULL, 0.0, 0.0};
- *   bc_patch_forces_hold(forces, &answer, poses);
+ *   bc_patch_forces_set_boxes(forces, boxes, 2, 1);
  *   bc_motion motion = {sizeof(bc_motion), poses, velocities, NULL, NULL};
  *   bc_patch_forces_advance(forces, 0.001, poses, velocities, weights, &motion);
  *
@@ -20,8 +19,8 @@
  * angular. They and wrenches are in the common frame, at and about the centre of mass.
  * docs/explanation/force.md has the equations. One thread at a time may use an object.
  * `bc_patch_forces_hold` allocates no memory once as many pairs have been held, and
- * `bc_patch_forces_advance` by one thread none at all. The bits are the same on all instruction sets,
- * and for any number of threads.
+ * `bc_patch_forces_advance` by one thread none at all, unless it finds pairs. The bits are the same on
+ * all instruction sets, and for any number of threads.
  */
 #ifndef BOX_CONTACT_FORCE_H
 #define BOX_CONTACT_FORCE_H
@@ -33,7 +32,7 @@ extern "C" {
 #endif
 
 typedef struct bc_body {
-  double mass;       /* 1e-50 to 1e50 kg; 0: no force moves it, but it may move by its velocity */
+  double mass;       /* 1e-50 to 1e50 kg; 0: no force moves it, but it may move: see advance */
   double inertia[3]; /* about the body's own axes, through the centre of mass: 1e-50 to 1e50 kg m²,
                         or 0 without a mass; none exceeds the sum of the two others */
   double centre[3];  /* of mass, in the body's own frame, up to 1e50 m */
@@ -71,7 +70,8 @@ typedef struct bc_patches {
                                period are 0 to 1e50 */
   const double* surface;    /* (count, 3): velocity of B's surface relative to A's, beside that of the
                                bodies, as of a belt [m/s]; NULL: none */
-  const double* stiffness;  /* [N/m], up to what step and answers bear; 0, or NULL: that */
+  const double* stiffness;  /* of a spring [N/m]: a weight rests weight / stiffness deep. Steps and late
+                               answers limit it; 0, or NULL: as stiff as they allow */
   double age;               /* since the answer was asked for [s] */
   double period;            /* from one question to the next [s]; 0: the least of the last
                                intervals between answers */
@@ -138,9 +138,16 @@ BC_API int64_t bc_patch_forces_bodies(const bc_patch_forces* forces); /* how man
 BC_API bc_status bc_patch_forces_set_bodies(bc_patch_forces* forces, const bc_body* bodies,
                                             int64_t count);
 /* Say which boxes the bodies have: pairs are then of boxes, and poses of bodies. Patches of boxes that
- * stay with their body stay; pairs of contacts of one's own are forgotten. 0 boxes: box k is body k. */
+ * stay with their body stay; pairs of contacts of one's own are forgotten. 0 boxes: box k is body k.
+ * With `find_pairs`, each advance finds the pairs of boxes that touch, and solves them by model `exact`:
+ * nothing is to be held, and bc_patch_forces_hold is refused. Boxes of one body are never a pair. */
 BC_API bc_status bc_patch_forces_set_boxes(bc_patch_forces* forces, const bc_body_box* boxes,
-                                           int64_t count);
+                                           int64_t count, int find_pairs);
+
+/* Set the velocity of a box's surface beside that of its body, as of a belt, in the common frame [m/s]. It
+ * lasts until it is set again, also under answers that are late; `surface` of an answer is added. */
+BC_API bc_status bc_patch_forces_set_surface(bc_patch_forces* forces, int64_t box,
+                                             const double velocity[3]);
 
 /* Forget the patches of bodies, which were put elsewhere, or all patches. */
 BC_API bc_status bc_patch_forces_forget(bc_patch_forces* forces, const int64_t* bodies,
@@ -163,6 +170,9 @@ BC_API bc_status bc_patch_forces_ahead(const bc_patch_forces* forces, double dt,
 
 /* Advance by `dt` seconds: 1e-50 or more, and less than 1. Steps may differ in length. `outside` are
  * the wrenches beside those of contacts, gravity among them, constant over the step; NULL: none.
+ * A body of mass 0 goes on by its velocity. One without any, given at another pose than it ended with,
+ * has the speed of this change: so a carrier may be moved by its poses alone. Forget what is put
+ * elsewhere.
  * Without poses and velocities in `motion`, the wrenches are taken to move the bodies until the next
  * advance, which then removes the speed of pushing out.
  * With both, bodies at rest are laid down: poses as they were given, velocities 0. They wake by a pose,

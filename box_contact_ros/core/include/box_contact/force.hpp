@@ -4,7 +4,7 @@
 // From contacts to forces in C++17, by sequential impulses.
 //
 //   box_contact::PatchForces forces(bodies);
-//   forces.hold(answer, poses);                             // when an answer comes
+//   forces.set_boxes(boxes, true);                          // it finds their pairs
 //   forces.advance(0.001, poses, velocities, weights);      // at every physics step
 //
 // force.h describes the arguments, and docs/explanation/force.md the method. Refused input throws
@@ -34,7 +34,7 @@ struct Patches {
   Results results;                 // separation, normal, point, volume and covariance
   Span<const double> friction{};   // Coulomb's μ of each pair
   Span<const double> surface{};    // velocity of B's surface relative to A's, three numbers a row [m/s]
-  Span<const double> stiffness{};  // of each pair [N/m], up to what step and answers bear; 0: that
+  Span<const double> stiffness{};  // of each pair [N/m]; 0: as stiff as steps and late answers allow
   double age = 0.0;                // since the answer was asked for [s]
   double period = 0.0;             // from one question to the next [s]; 0: by the last answers
 
@@ -102,9 +102,17 @@ class PatchForces {
   }
   void reset() { bc_patch_forces_reset(forces_.get()); }
 
-  // Say which boxes the bodies have: pairs are then of boxes, and poses of bodies.
-  void set_boxes(Span<const BodyBox> boxes) {
-    detail::check(bc_patch_forces_set_boxes(forces_.get(), boxes.data(), std::int64_t(boxes.size())));
+  // Say which boxes the bodies have: pairs are then of boxes, and poses of bodies. find_pairs: each advance
+  // finds the pairs that touch, and nothing is to be held.
+  void set_boxes(Span<const BodyBox> boxes, bool find_pairs = false) {
+    detail::check(bc_patch_forces_set_boxes(forces_.get(), boxes.data(), std::int64_t(boxes.size()),
+                                            find_pairs));
+  }
+
+  // Set the velocity of a box's surface beside that of its body, as of a belt, in the common frame [m/s].
+  // It lasts until it is set again.
+  void set_surface(std::int64_t box, const double (&velocity)[3]) {
+    detail::check(bc_patch_forces_set_surface(forces_.get(), box, velocity));
   }
 
   // Take an answer, asked for at `poses`; pairs that are left out are forgotten. Contacts of one's own

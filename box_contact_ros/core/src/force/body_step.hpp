@@ -47,11 +47,14 @@ inline bc_pose pose_after(double time, const Body& body, const bc_pose& pose,
 
 class BodyStep {
  public:
+  // carriers: velocities of the bodies that no force moves; rows of others say nothing.
   BodyStep(const std::vector<Body>& bodies, const SubSteps& steps, const Given& given,
-           const bc_motion& motion, bool came_by_wrenches, std::vector<Ended>& ended)
+           const std::vector<bc_velocity>& carriers, const bc_motion& motion,
+           bool came_by_wrenches, std::vector<Ended>& ended)
       : bodies_(bodies),
         steps_(steps),
         given_(given),
+        carriers_(carriers),
         motion_(motion),
         came_by_wrenches_(came_by_wrenches),
         ended_(ended) {}
@@ -59,8 +62,9 @@ class BodyStep {
   void begin(Moving& moving) const {
     auto k = size_t(moving.body);
     moving.placed = placed_at(given_.poses[k], bodies_[k].centre);
-    moving.linear = vector(given_.velocities[k].linear);
-    moving.angular = vector(given_.velocities[k].angular);
+    const bc_velocity& velocity = bodies_[k].is_free() ? given_.velocities[k] : carriers_[k];
+    moving.linear = vector(velocity.linear);
+    moving.angular = vector(velocity.angular);
     double scale = 1.0 / std::sqrt(squared_norm(given_.poses[k].quaternion));
     for (int i = 0; i < 4; ++i) moving.quaternion[i] = scale * given_.poses[k].quaternion[i];
     moving.impulse = moving.angular_impulse = {};
@@ -123,10 +127,12 @@ class BodyStep {
   bc_pose pose_of(const Moving& moving) const {
     return pose_at(moving.placed, moving.quaternion, bodies_[size_t(moving.body)].centre);
   }
-  // A body that no force moves goes on by its velocity. One that rests keeps its pose to the bit.
+  // A body that no force moves goes on by the velocity that is given. With none, it keeps its pose to
+  // the bit.
   void move_alone(size_t k) const {
     const bc_velocity velocity = given_.velocities[k];
-    ended_[k] = {ended_[k].relaxed, {vector(velocity.linear), vector(velocity.angular)}, {}, {}};
+    ended_[k] = {ended_[k].relaxed,
+                 {vector(carriers_[k].linear), vector(carriers_[k].angular)}, {}, {}};
     if (motion_.velocities) motion_.velocities[k] = velocity;
     if (motion_.wrenches) motion_.wrenches[k] = {};
     if (!motion_.poses) return;
@@ -146,9 +152,9 @@ class BodyStep {
   void carry(Moving& moving, double part) const {
     auto k = size_t(moving.body);
     const auto& [before, last, fineness, slow] = ended_[k];
-    const bc_velocity& given = given_.velocities[k];
-    moving.linear = carried_at(part, before.linear, last.linear, vector(given.linear));
-    moving.angular = carried_at(part, before.angular, last.angular, vector(given.angular));
+    const bc_velocity& now = carriers_[k];
+    moving.linear = carried_at(part, before.linear, last.linear, vector(now.linear));
+    moving.angular = carried_at(part, before.angular, last.angular, vector(now.angular));
   }
   void write_pose(const Moving& moving) const {
     if (motion_.poses) motion_.poses[size_t(moving.body)] = pose_of(moving);
@@ -161,6 +167,7 @@ class BodyStep {
   const std::vector<Body>& bodies_;
   const SubSteps& steps_;
   const Given& given_;
+  const std::vector<bc_velocity>& carriers_;
   const bc_motion& motion_;
   bool came_by_wrenches_;  // whether those of the last advance moved the bodies
   std::vector<Ended>& ended_;

@@ -4,11 +4,26 @@
 // Bodies that no force moves, within a step: a lift, a turntable, a lorry that brakes.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "rigid_body.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
+
+// The velocity of a body that goes from one pose to another in a time [s].
+inline bc_velocity velocity_between(const bc_pose& from, const bc_pose& to,
+                                    const Vec<double>& centre, double time) {
+  const Placed at = placed_at(from, centre), then = placed_at(to, centre);
+  Vec<double> turn = rotation(at, then);  // sin θ, made θ by its series
+  double squared = dot(turn, turn);
+  Vec<double> linear = (1.0 / time) * (then.position - at.position),
+              angular = ((1.0 + squared * (1.0 / 6.0 + squared * 0.075)) / time) * turn;
+  bc_velocity velocity;
+  std::copy_n(linear.v, 3, velocity.linear);
+  std::copy_n(angular.v, 3, velocity.angular);
+  return velocity;
+}
 
 // The smaller of two changes after each other, where they have one sign (minmod): a jump is none.
 inline Vec<double> least_change_of(const Vec<double>& x, const Vec<double>& y,

@@ -8,8 +8,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "../kernel.hpp"
+#include "asked_pairs.hpp"
 #include "gaps.hpp"
+#include "near_pairs.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
 
@@ -21,9 +22,20 @@ class OwnContacts {
   // The boxes of the bodies; none: box k is body k, and nobody knows its size.
   const std::vector<bc_body_box>& boxes() const { return boxes_; }
   size_t count() const { return asked_.count(); }
+  // Whether pairs are found anew at each advance, instead of asked for.
+  bool finds_pairs() const { return finds_pairs_; }
+  bool is_used() const { return finds_pairs_ || count() > 0; }
 
-  void set_boxes(std::vector<bc_body_box> boxes) {
+  // Where memory ends, all is as it was.
+  void set_boxes(std::vector<bc_body_box> boxes, bool finds_pairs) {
+    NearPairs near;
+    if (finds_pairs) near.set_boxes(boxes);
+    sizes_.reserve(boxes.size());
+    poses_.reserve(boxes.size());
+    is_placed_.reserve(boxes.size());
+    near_ = std::move(near);
     boxes_ = std::move(boxes);
+    finds_pairs_ = finds_pairs;
     sizes_.clear();
     for (const bc_body_box& box : boxes_) sizes_.push_back(box.box.size);
     poses_.resize(boxes_.size());
@@ -39,7 +51,6 @@ class OwnContacts {
   // What a copy has no room for, so that an advance takes no memory.
   void make_room() {
     live_.reserve(count());
-    rows_.reserve(count());
     placed_.reserve(2 * count());
   }
 
@@ -104,22 +115,42 @@ class OwnContacts {
     chosen_for_ = revision;
     is_all_ = !is_any_asleep;
     if (is_all_) return;
-    rows_.clear();
-    placed_.clear();
-    std::fill(is_placed_.begin(), is_placed_.end(), uint8_t(0));
-    live_.resize(0);
+    choose_none();
     for (const Key& key : keys_) {
       size_t k = key.row;
       auto a = size_t(asked_.pairs[2 * k]), b = size_t(asked_.pairs[2 * k + 1]);
       if (!key.is_new && is_quiet(a) && is_quiet(b)) continue;
-      rows_.push_back(k);
       live_.add(asked_, k);
-      for (size_t box : {a, b}) {
-        if (!is_placed_[box]) placed_.push_back(box);
-        is_placed_[box] = 1;
-      }
+      note_placed(a, b);
     }
   }
+  // Find the pairs that are solved: see NearPairs. `pose_of(body)` also knows where the others are.
+  // Returns how many there are.
+  template <class EachActive, class PoseOf>
+  size_t find(double dt, int64_t revision, const bc_wrench* outside,
+              const std::vector<Body>& bodies, const EachActive& each_active,
+              const PoseOf& pose_of) {
+    auto place = [&](int32_t box, double longest) {
+      const auto& [body, own] = boxes_[size_t(box)];
+      const bc_pose& pose = poses_[size_t(box)] = in_common_frame(pose_of(size_t(body)), own.pose);
+      double falls = Gaps(bodies, boxes_, longest, outside).around(box);
+      const double(&q)[4] = pose.quaternion;
+      return detail::bounds_of({vector(pose.position), {q[0], q[1], q[2], q[3]}},
+                               0.5 * vector(own.size.extent) + Vec<double>{falls, falls, falls});
+    };
+    is_all_ = false;
+    if (near_.find(dt, revision, boxes_, bodies, each_active, place)) {
+      choose_none();
+      for (auto [a, b] : near_.pairs()) {
+        live_.pairs.insert(live_.pairs.end(), {a, b});
+        note_placed(size_t(a), size_t(b));
+      }
+      found_.resize(live_.count());
+    }
+    return live_.count();
+  }
+  // An advance was refused, so bodies are not where they were looked at.
+  void cancel() { near_.forget(); }
   // All pairs were solved once.
   void settle() {
     if (!is_any_new_) return;
@@ -129,8 +160,8 @@ class OwnContacts {
   }
 
   // Solve the chosen pairs with the bodies at `poses`. `solve(rows, count, results)` answers rows, and returns
-  // the first that is refused, or −1; so does this. A pair that is apart, but near by `gaps`,
-  // gets the patch that it has once it touches, and keeps its separation above zero.
+  // the first that is refused, or −1; so does this, of the rows of `answer()`.
+  // A pair that is apart, but near by `gaps`, gets the patch that it has once it touches, and keeps its separation above zero.
   template <class Solve>
   long solve(const bc_pose* poses, const Gaps& gaps, const Solve& solve, SolvePair solve_pair) {
     auto place = [&](size_t box) {
@@ -138,16 +169,16 @@ class OwnContacts {
     };
     if (is_all_)
       for (size_t k = 0; k < boxes_.size(); ++k) place(k);
-    else
+    else if (!finds_pairs_)
       std::for_each(placed_.begin(), placed_.end(), place);
-    const Pairs& live = chosen();
+    const AskedPairs& live = chosen();
     if (live.count() == 0) return -1;
     auto* numbers = reinterpret_cast<const double*>(poses_.data());
     auto* sizes = reinterpret_cast<const double*>(sizes_.data());
     detail::Rows rows{numbers, numbers, sizes, sizes, 3, 3, live.pairs.data(), long(boxes_.size())};
     long refused = solve(rows, long(live.count()), found_.results(farthest(gaps)));
     if (refused < 0) refused = solve_near(gaps, solve_pair);
-    return refused < 0 || is_all_ ? refused : long(rows_[size_t(refused)]);
+    return refused;
   }
   // Solve the pair of a patch anew, with its bodies at other places. A pair that is apart now keeps its
   // patch, which goes with the bodies.
@@ -172,7 +203,7 @@ class OwnContacts {
   size_t row(size_t place) const { return is_all_ ? keys_[place].row : place; }
   // What was solved last.
   bc_patches answer() const {
-    const Pairs& live = chosen();
+    const AskedPairs& live = chosen();
     return {sizeof(bc_patches),
             int64_t(live.count()),
             live.pairs.data(),
@@ -181,9 +212,9 @@ class OwnContacts {
             found_.point.data(),
             found_.volume.data(),
             found_.covariance.data(),
-            live.friction.data(),
-            live.surface.data(),
-            live.stiffness.data(),
+            finds_pairs_ ? nullptr : live.friction.data(),
+            finds_pairs_ ? nullptr : live.surface.data(),
+            finds_pairs_ ? nullptr : live.stiffness.data(),
             0.0,
             0.0};
   }
@@ -196,50 +227,6 @@ class OwnContacts {
     bool is_new;  // not solved yet, where something slept when it was asked for
     bool operator<(const Key& other) const { return pair < other.pair; }
   };
-  struct Pairs {
-    std::vector<int64_t> pairs;  // (n, 2)
-    std::vector<double> friction, surface, stiffness;
-
-    size_t count() const { return friction.size(); }
-    void resize(size_t n) {
-      pairs.resize(2 * n);
-      for (auto* column : {&friction, &stiffness}) column->resize(n);
-      surface.resize(3 * n);
-    }
-    void reserve(size_t n) {
-      pairs.reserve(2 * n);
-      for (auto* column : {&friction, &stiffness}) column->reserve(n);
-      surface.reserve(3 * n);
-    }
-    void add(const Pairs& other, size_t k) {
-      pairs.insert(pairs.end(), &other.pairs[2 * k], &other.pairs[2 * k] + 2);
-      friction.push_back(other.friction[k]);
-      stiffness.push_back(other.stiffness[k]);
-      surface.insert(surface.end(), &other.surface[3 * k], &other.surface[3 * k] + 3);
-    }
-  };
-  // Answers to rows.
-  struct Columns {
-    std::vector<double> separation, normal, point, volume, covariance;
-
-    void resize(size_t n) {
-      separation.resize(n);
-      volume.resize(n);
-      for (auto* column : {&normal, &point}) column->resize(3 * n);
-      covariance.resize(9 * n);
-    }
-    detail::Results results(double margin) {
-      return {nullptr,       separation.data(), normal.data(), point.data(),
-              volume.data(), covariance.data(), nullptr,       margin};
-    }
-    // Set the patch to that of a contact; the separation stays.
-    void set_patch(size_t row, const bc_contact& contact) {
-      volume[row] = contact.volume;
-      std::copy_n(contact.normal, 3, &normal[3 * row]);
-      std::copy_n(contact.point, 3, &point[3 * row]);
-      std::copy_n(contact.covariance[0], 9, &covariance[9 * row]);
-    }
-  };
   void resize(size_t n) {
     asked_.resize(n);
     is_all_ = true;
@@ -247,7 +234,18 @@ class OwnContacts {
     found_.resize(n);
     make_room();
   }
-  const Pairs& chosen() const { return is_all_ ? asked_ : live_; }
+  const AskedPairs& chosen() const { return is_all_ ? asked_ : live_; }
+  void choose_none() {
+    placed_.clear();
+    std::fill(is_placed_.begin(), is_placed_.end(), uint8_t(0));
+    live_.resize(0);
+  }
+  void note_placed(size_t a, size_t b) {
+    for (size_t box : {a, b}) {
+      if (!is_placed_[box]) placed_.push_back(box);
+      is_placed_[box] = 1;
+    }
+  }
   // No pair that is solved, and farther apart, is a constraint [m].
   double farthest(const Gaps& gaps) const {
     double most = 0.0;
@@ -270,7 +268,7 @@ class OwnContacts {
   }
   // Give pairs that are apart, but near, the patches that they have once moved together along the normal.
   long solve_near(const Gaps& gaps, SolvePair solve) {
-    const Pairs& live = chosen();
+    const AskedPairs& live = chosen();
     for (size_t k = 0; k < live.count(); ++k) {
       double apart = found_.separation[k];
       Vec<double> normal = vector_at(&found_.normal[3 * k]);
@@ -291,14 +289,14 @@ class OwnContacts {
   std::vector<bc_body_box> boxes_;
   std::vector<bc_size> sizes_;  // of the boxes
   std::vector<bc_pose> poses_;  // of the boxes, in the common frame
-  Pairs asked_;
-  bool is_any_new_ = false;
+  AskedPairs asked_;
+  bool is_any_new_ = false, finds_pairs_ = false;
+  NearPairs near_;
   // Those that are solved, by pair, unless all are.
   static constexpr int64_t none_chosen = -1;
   int64_t chosen_for_ = none_chosen;
   bool is_all_ = true;
-  Pairs live_;
-  std::vector<size_t> rows_;    // theirs among those that are asked for
+  AskedPairs live_;
   std::vector<size_t> placed_;  // their boxes
   std::vector<uint8_t> is_placed_;
   Columns found_;

@@ -63,6 +63,16 @@ struct Kept {
   Vec<T> pressure_arm;                       // from A's centre of mass to its centre [m]
 };
 
+// Velocities of the boxes' surfaces beside those of their bodies, as of belts [m/s]; none: all are 0.
+using Surfaces = std::vector<Vec<double>>;
+
+// Of the higher box of a pair relative to the lower one, with what an answer tells of it.
+inline Vec<double> surface_of(const Surfaces& surfaces, const BoxPair& pair,
+                              const Vec<double>& told) {
+  if (surfaces.empty()) return told;
+  return told + (surfaces[size_t(pair.second)] - surfaces[size_t(pair.first)]);
+}
+
 // The patch of a pair, where it was asked for, and what it gave.
 struct Patch {
   int32_t box_a, box_b;  // box_a < box_b
@@ -74,7 +84,7 @@ struct Patch {
   double most_depth;    // by the thinner box; without sizes: any [m]
   double depth;         // the lesser of volume / area and −separation; below 0: apart [m]
   double friction;      // μ [1]
-  double stiffness;     // [N/m], up to what step and answers bear; 0: that
+  double stiffness;     // [N/m]; 0: as stiff as steps and late answers allow
   Vec<double> surface;  // velocity of B's surface relative to A's, beside the bodies' own [m/s]
   double late;          // from the question to the answer [s]
   double age;           // since the answer came [s]

@@ -19,7 +19,8 @@ struct Answered {
   const bc_pose* poses;
   const std::vector<Body>& bodies;
   const std::vector<bc_body_box>& boxes;  // none: box k is body k, and nobody knows its size
-  double friction;                        // where the answer has none
+  const Surfaces& surfaces;
+  double friction;  // where the answer has none
 
   bool is_stale(int64_t k) const { return answer.separation[k] != answer.separation[k]; }
   // Whether something moves of the pair of row k, which touches, or has a stale contact. Boxes may have
@@ -64,7 +65,9 @@ inline void read(const Answered& all, int64_t k, Patch& patch) {
                      all.boxes[size_t(patch.box_b)].box.size);
   patch.friction = answer.friction ? answer.friction[k] : all.friction;
   patch.stiffness = answer.stiffness ? answer.stiffness[k] : 0.0;
-  if (answer.surface) patch.surface = sign * vector_at(answer.surface + 3 * k);
+  patch.surface = surface_of(
+      all.surfaces, patch.pair(),
+      answer.surface ? sign * vector_at(answer.surface + 3 * k) : Vec<double>{0.0, 0.0, 0.0});
   patch.late = answer.age;
 }
 

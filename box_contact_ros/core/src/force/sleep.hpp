@@ -38,6 +38,10 @@ class Sleep {
   bool is_any_asleep() const { return is_any_asleep_; }
   // Whether a body is where it was, and stays there.
   bool is_quiet(size_t body) const { return is_asleep(body) || of_[body].is_fixed_still; }
+  // Where a body is at the start of an advance: one asleep is where it was laid down.
+  const bc_pose& pose_of(size_t body, const Given& given) const {
+    return is_asleep(body) ? of_[body].pose : given.poses[body];
+  }
   // Changes with what is asleep or quiet.
   int64_t revision() const { return revision_; }
 

@@ -49,7 +49,9 @@ bc_status solve_own(Handled& all, double dt, const Given& given) {
   };
   PatchForces::HoldResult result;
   long refused = all.forces.solve_own(dt, given, solve, solve_exactly, all.threads, result);
-  if (refused >= 0) return fail(BC_BAD_POSE, "pairs[%ld]: a box is beyond 1e50 m", refused);
+  if (const int64_t* pair = refused >= 0 ? all.forces.own_pair(refused) : nullptr)
+    return fail(BC_BAD_POSE, "pairs: box %lld or box %lld is beyond 1e50 m", (long long)pair[0],
+                (long long)pair[1]);
   return explain(result);
 }
 
@@ -147,13 +149,28 @@ bc_status bc_patch_forces_set_bodies(bc_patch_forces* forces, const bc_body* bod
 }
 
 bc_status bc_patch_forces_set_boxes(bc_patch_forces* forces, const bc_body_box* boxes,
-                                    int64_t count) {
+                                    int64_t count, int find_pairs) {
   return guarded([&] {
     if (!forces) return refuse_null("forces");
     std::vector<bc_body_box> read;
     size_t bodies = forces_of(forces).bodies().size();
     if (bc_status status = read_boxes(boxes, count, bodies, read)) return status;
-    forces_of(forces).set_boxes(std::move(read));
+    forces_of(forces).set_boxes(std::move(read), find_pairs != 0);
+    return BC_OK;
+  });
+}
+
+bc_status bc_patch_forces_set_surface(bc_patch_forces* forces, int64_t box,
+                                      const double* velocity) {
+  return guarded([&] {
+    if (!forces || !velocity) return refuse_null(forces ? "velocity" : "forces");
+    PatchForces& self = forces_of(forces);
+    if (box < 0 || box >= self.box_count())
+      return fail(BC_BAD_ARGUMENT, "box: there is no box %lld", (long long)box);
+    if (!are_within(velocity, 3, speed_max))
+      return fail(BC_BAD_ARGUMENT, "velocity (%g, %g, %g) is not finite, or beyond %g",
+                  velocity[0], velocity[1], velocity[2], speed_max);
+    self.set_surface(box, {velocity[0], velocity[1], velocity[2]});
     return BC_OK;
   });
 }
@@ -182,6 +199,10 @@ bc_status bc_patch_forces_hold(bc_patch_forces* forces, const bc_patches* answer
     bc_patches all{};
     if (!read(answer, all)) return fail(BC_BAD_ABI, "answer.size is unknown");
     PatchForces& self = forces_of(forces);
+    if (self.finds_pairs())
+      return fail(BC_BAD_ARGUMENT,
+                  "hold: the forces find their pairs themselves; to hold an answer or pairs, set boxes "
+                  "without find_pairs first");
     if (all.separation && !poses && !self.bodies().empty()) return refuse_null("poses");
     if (!all.separation && self.holds(all)) return BC_OK;
     if (bc_status status = check_answer(all, self, poses)) return status;
