@@ -29,6 +29,7 @@ from ..solver.contacts_of import TooManyNear
 from .crowd import crowded
 from .inspect_plan import inspect_plan
 from .inspection import Inspection
+from .plan import Plan
 from .read_plan import read_any
 
 NOT_READ = 2
@@ -45,10 +46,11 @@ def judged(path: str, options: argparse.Namespace) -> Inspection:
     if options.limit is not None:
         free = np.setdiff1d(np.arange(len(plan)), plan.ground)
         limits[free] = np.minimum(limits[free], options.limit)
+    ignored = ({'mass'} if options.geometry else set()) | ({'order'} if options.order else set())
     plan = dataclasses.replace(
         plan, masses=None if options.geometry else plan.masses, limits=limits,
-        faults=tuple(fault for fault in plan.faults
-                     if not (options.geometry and fault.kind == 'mass')))
+        order=order_of_rows(plan) if options.order else plan.order,
+        faults=tuple(fault for fault in plan.faults if fault.kind not in ignored))
     try:
         return inspect_plan(plan, tolerance=options.tolerance, acceleration=options.acceleration,
                             bears=options.bears or bears)
@@ -57,6 +59,16 @@ def judged(path: str, options: argparse.Namespace) -> Inspection:
     except ValueError as error:
         option = '--' if str(error).startswith('tolerance') else ''
         raise ValueError(f'{path}: {option}{error}') from None
+
+
+def order_of_rows(plan: Plan) -> np.ndarray:
+    """Return the place of each box among those of its stack (n,); a body comes with its first."""
+    first = np.unique(plan.body, return_index=True)[1][plan.body]
+    order = np.zeros(len(plan), int)
+    for stack in np.unique(plan.stack):
+        boxes = np.flatnonzero(plan.stack == stack)
+        order[boxes] = np.arange(1, len(boxes) + 1)
+    return order[first]
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -78,6 +90,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--acceleration', type=float, nargs=3, default=(0.0, 0.0, -9.81),
                         metavar=('X', 'Y', 'Z'), help='what the goods feel, gravity included '
                         '[m/s²]; a lorry that brakes along +x by 0.4 g: 3.92 0 -9.81')
+    parser.add_argument('--order', choices=('rows',), help='boxes come by the order of their rows; '
+                        'else by the column or key `order`, if there is one')
     parser.add_argument('--geometry', action='store_true', help='leave masses out: judge overlaps '
                         'and support alone')
     return parser
@@ -142,6 +156,8 @@ def as_json(found: Inspection) -> dict[str, Any]:
     del fields['plan']
     for pairs in ('overlaps', 'carried_by'):
         fields[pairs] = [[plan.names[a], plan.names[b]] for a, b in fields[pairs].tolist()]
+    fields['steps'] = [{'step': step, 'name': plan.names[box], 'cause': cause, 'until': until}
+                       for step, box, cause, until in found.steps]
     return {'verdict': found.verdict, 'sound': found.sound,
             'names': list(plan.names), 'ground': plan.ground.tolist(),
             'faults': [row._asdict() for row in found.rows()],

@@ -20,6 +20,7 @@ from .meetings import Meetings, beds_of, bodies_of, mass_centres, meetings_of
 from .plan import Fault, Plan
 from .standing import base_areas, heights
 from .statics import Bodies, Rest, settle
+from .steps import falls_of
 from .verdict import verdict_of
 
 MANY = 10_000
@@ -40,8 +41,11 @@ def inspect_plan(plan: Plan, *, tolerance: float | None = None, friction: float 
     on the ground, and on corner castings of the box below.
     sides: whether boxes beside each other carry by friction.
 
+    A plan with an order is judged at each of its steps, too.
+
     Loads need the extra `plans`; a plan without masses does not. Boxes whose loads would take
-    more than 1 GB or about 20 s are not judged, the largest groups first.
+    more than 1 GB or about 20 s are not judged, the largest groups first; nor are steps beyond
+    another 20 s.
     Raises ValueError, with field and value, for bad input, and for too many boxes in one place.
     """
     if not isinstance(plan, Plan):
@@ -57,13 +61,21 @@ def inspect_plan(plan: Plan, *, tolerance: float | None = None, friction: float 
     felt = as_floats(acceleration, 'acceleration', 'a vector (3,)', (3,))
     if not 0.0 < np.abs(felt).max() < np.inf:
         raise ValueError(f'acceleration must have a length, not {short_repr(acceleration)}')
-    meet = meetings_of(plan, tolerances, felt, bool(sides), bears == 'corners')
+    may_meet = meetings_of(plan, tolerances, felt, bool(sides), bears == 'corners')
+    meet = may_meet.among(plan.body, np.ones_like(may_meet.fixed))
     if faults := faults_of(plan, meet.fixed, tolerances):
         plan = replace(plan, faults=(*plan.faults, *faults))
     bodies = bodies_of(plan, meet)
-    return _judged(plan, meet, bodies, None if plan.masses is None else
-                   _loads(plan, meet, bodies, friction),
-                   float(tolerances.max(initial=0.0)))
+    found = _judged(plan, meet, bodies, None if plan.masses is None else
+                    _loads(plan, meet, bodies, friction),
+                    float(tolerances.max(initial=0.0)))
+    steps, unknown = falls_of(plan, may_meet, bodies, None if plan.masses is None else friction)
+    if unknown := [box for box in unknown if found.stands[box]]:
+        plan = replace(found.plan, faults=(*found.plan.faults, Fault(
+            'support', tuple(plan.names[box] for box in unknown),
+            'not judged at each step: too many boxes bear on each other', lacks='judgement')))
+        found = replace(found, plan=plan)
+    return replace(found, steps=steps)
 
 
 def _tolerances(plan: Plan, value: float | None) -> np.ndarray:

@@ -4,7 +4,7 @@
 """Which boxes of a plan meet, which of them bear each other and where, and the bodies they make."""
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,7 +25,7 @@ WEIGHTLESS = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Meetings:
-    """The pairs of boxes that meet, and the k patches of those that bear each other."""
+    """The m pairs of boxes that meet, and the k patches of those that bear each other."""
 
     felt: np.ndarray  # (3,) acceleration [m/s²]
     frame: np.ndarray  # (3, 3) rows: two directions across it, and the one against it
@@ -34,18 +34,46 @@ class Meetings:
     met_separation: np.ndarray  # (m,) [m]
     overlaps: np.ndarray  # (m,) bool
     on_top: np.ndarray  # (m,) bool: the second is on the first
+    row: np.ndarray  # (k,) of all patches
+    of_met: np.ndarray  # (k,) which of all pairs it is of
     pairs: np.ndarray  # (k, 2) the lower and the upper box
     carries: np.ndarray  # (k,) bool: the lower one carries the upper one; else they are beside
-    need: np.ndarray  # (b,) how far the centre of a body must be inside its hull [m]
+    needs: np.ndarray  # (k,) how far a centre that it carries must be inside the hull [m]
     normal: np.ndarray  # (k, 3) from the lower box to the upper one
     patches: FacePatches  # k
     bearings: Bearings  # k
     by_corners: bool
 
+    def need(self, body: np.ndarray) -> np.ndarray:
+        """Return how far the centres of bodies (b,) must be inside their hulls [m]."""
+        need = np.zeros(len(self.fixed))
+        np.maximum.at(need, body[self.pairs[self.carries, 1]], self.needs[self.carries])
+        return need
+
+    def among(self, body: np.ndarray, here: np.ndarray) -> Meetings:
+        """Return those of the bodies that are here (b,), as if there were no others.
+
+        What overlaps a box carries it only if nothing else does.
+        """
+        met = here[body[self.met]].all(axis=1)
+        rows = met[self.of_met]
+        overlaps, upper = self.overlaps[self.of_met], body[self.pairs[:, 1]]
+        carried = np.bincount(upper[rows & self.carries & ~overlaps], minlength=len(here)) > 0
+        rows &= ~overlaps | self.carries & ~carried[upper]
+        return replace(
+            self, met=self.met[met], met_separation=self.met_separation[met],
+            overlaps=self.overlaps[met], on_top=self.on_top[met],
+            of_met=(np.cumsum(met) - 1)[self.of_met[rows]],
+            **{name: getattr(self, name)[rows] for name in (
+                'row', 'pairs', 'carries', 'needs', 'normal', 'patches', 'bearings')})
+
 
 def meetings_of(plan: Plan, tolerances: np.ndarray, felt: np.ndarray, sides: bool, by_corners: bool,
                 ) -> Meetings:
-    """Return which boxes meet; tolerances: (n,) by box [m], felt: (3,) [m/s²]."""
+    """Return which boxes meet, and all patches that may bear, whatever else does.
+
+    tolerances: (n,) by box [m]. felt: (3,) acceleration, gravity included [m/s²].
+    """
     fixed = np.zeros(plan.body.max(initial=-1) + 1, bool)
     fixed[plan.body[plan.ground]] = True
     pairs, contacts = contacts_of(plan.sizes, plan.poses, fixed=fixed[plan.body],
@@ -62,21 +90,17 @@ def meetings_of(plan: Plan, tolerances: np.ndarray, felt: np.ndarray, sides: boo
     tolerance = tolerances[pairs].min(axis=1)
     patches = _patches(plan, pairs, normal, tolerance)
     on_top = np.abs(slope) >= BESIDE
-    # Boxes beside each other may overlap by the tolerance: a strip that wide carries nothing.
-    bears = (patches.width > tolerance) & (on_top | sides)
     overlaps = -contacts.separation > tolerance
-    carried = np.bincount(plan.body[pairs[bears & on_top & ~overlaps, 1]], minlength=len(fixed)) > 0
-    # What overlaps a box carries it only if nothing else does.
-    bear = np.flatnonzero(bears & (~overlaps | on_top & ~carried[plan.body[pairs[:, 1]]]))
-    patches, carries = patches[bear], on_top[bear]
-    held = bear[carries]
+    # Boxes beside each other may overlap by the tolerance: a strip that wide carries nothing.
+    bear = np.flatnonzero((patches.width > tolerance) & (on_top | sides & ~overlaps))
+    patches = patches[bear]
     return Meetings(
         felt, np.stack((across, np.cross(up, across), up)), fixed, pairs, contacts.separation,
-        overlaps, on_top, pairs[bear], carries,
-        needs(plan.sizes, pairs[held], contacts.separation[held], tolerance[held],
-              plan.body[pairs[held, 1]], len(fixed)), normal[bear], patches,
-        on_corners(plan.sizes, plan.poses, pairs[bear], normal[bear], patches, tolerance[bear],
-                   fixed[plan.body]) if by_corners else on_faces(patches), by_corners)
+        overlaps, on_top, np.arange(len(bear)), bear, pairs[bear], on_top[bear],
+        needs(plan.sizes, pairs[bear], contacts.separation[bear], tolerance[bear]), normal[bear],
+        patches, on_corners(plan.sizes, plan.poses, pairs[bear], normal[bear], patches,
+                            tolerance[bear], fixed[plan.body]) if by_corners else
+        on_faces(patches), by_corners)
 
 
 def _patches(plan: Plan, pairs: np.ndarray, normal: np.ndarray, tolerance: np.ndarray,
@@ -112,7 +136,8 @@ def bodies_of(plan: Plan, meet: Meetings) -> Bodies:
     gyration = np.sqrt(sums(masses * ((plan.sizes**2).sum(axis=1) / 12.0 + arm)) / mass)
     heaviest = given[~meet.fixed].max(initial=0.0) or 1.0
     weight = np.linalg.norm(meet.felt) * np.where(given > 0.0, given, WEIGHTLESS * heaviest)
-    return Bodies(weight, centre @ meet.frame.T, gyration, meet.fixed, meet.need)
+    return Bodies(weight, centre @ meet.frame.T, gyration, meet.fixed,
+                  meet.need(plan.body))
 
 
 def beds_of(plan: Plan, meet: Meetings) -> Beds:

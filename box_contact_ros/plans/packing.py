@@ -4,7 +4,8 @@
 """Packing plans: CSV and JSON of our own, and the JSON of two projects.
 
 A row is a box: its name, full extents and centre [m], and, where it has them, its quaternion, mass
-and limit [kg], and whether it is fixed. Where no row is fixed, z = 0 is the ground.
+and limit [kg], whether it is fixed, and a whole number by which it comes. Where no row is fixed,
+z = 0 is the ground.
 msg_schemas/plan.json is the format in JSON; the columns of a CSV file have the same names.
 """
 from __future__ import annotations
@@ -26,7 +27,7 @@ from .plan import Fault, Plan
 
 EXTENTS, PLACE, TURN = ('length', 'width', 'height'), ('x', 'y', 'z'), ('qx', 'qy', 'qz', 'qw')
 NEEDED = ('name', *EXTENTS, *PLACE)
-KEYS = (*NEEDED, *TURN, 'mass', 'limit', 'fixed')
+KEYS = (*NEEDED, *TURN, 'mass', 'limit', 'fixed', 'order')
 DELIMITERS = ',;\t'
 WORDS = {'true': True, '1': True, 'yes': True, 'false': False, '0': False, 'no': False, '': False}
 """What `fixed` may be in a CSV file."""
@@ -40,6 +41,7 @@ GROUND, GROUND_THICKNESS, GROUND_MARGIN = 'ground', 1.0, 1.0
 """Name, thickness, and how far it reaches beyond the boxes [m]."""
 ROOM = 1.0  # between the stacks of one file, which are placed side by side [m]
 MILLIMETRE = 1e-3
+MOST_STEPS = 2**53  # a float64 has all whole numbers up to it
 Row = Mapping[str, Any]
 
 
@@ -119,12 +121,11 @@ def read_packing(document: Any) -> Plan | None:
             return plan_of(enumerate(document['boxes'], 1), unread(
                 {key: value for key, value in document.items() if key != 'boxes'}))
         if isinstance(document.get('containers'), list):
-            return plan_of(enumerate(_side_by_side(map(_placements, document['containers'])), 1))
+            return _side_by_side(map(_placements, document['containers']))
         if document and all(isinstance(order, list) and order and all(
                 isinstance(entry, Mapping) and 'flb_coordinates' in entry for entry in order)
                 for order in document.values()):
-            return plan_of(enumerate(_side_by_side(_order(name, order)
-                                                   for name, order in document.items()), 1))
+            return _side_by_side(_order(name, order) for name, order in document.items())
     return None
 
 
@@ -186,30 +187,33 @@ def _from_corner(name: str, extents: Sequence[Any], corner: Sequence[Any]) -> di
             **{key: value + side / 2.0 for key, value, side in zip(PLACE, low, sides)}}
 
 
-def _side_by_side(stacks: Iterable[Iterable[dict[str, Any]]]) -> Iterator[Row]:
-    """Yield the rows of stacks that each begin at x = 0, one after another along x."""
-    start = 0.0
-    for stack in stacks:
+def _side_by_side(stacks: Iterable[Iterable[dict[str, Any]]]) -> Plan:
+    """Return the plan of stacks that each begin at x = 0, one after another along x."""
+    start, placed, stack_of = 0.0, [], []
+    for number, stack in enumerate(stacks):
         rows = list(stack)
         ends = [row['x'] + row['length'] / 2.0 for row in rows]
-        for row in rows:
-            yield {**row, 'x': row['x'] + start}
+        placed += [{**row, 'x': row['x'] + start} for row in rows]
+        stack_of += [number] * len(rows)
         start += max((end for end in ends if math.isfinite(end)), default=0.0) + ROOM
+    return plan_of(enumerate(placed, 1), stack_of=stack_of)
 
 
-def plan_of(rows: Iterable[tuple[int, Any]], faults: Iterable[Fault] = ()) -> Plan:
-    """Return the plan of numbered rows; those that cannot be placed are left out, and named.
+def plan_of(rows: Iterable[tuple[int, Any]], faults: Iterable[Fault] = (),
+            stack_of: Sequence[int] = ()) -> Plan:
+    """Return the plan of rows by number; those that cannot be placed are left out, and named.
 
-    faults: what is already known to be wrong.
+    faults: what is already known to be wrong. stack_of: the stack of each row; () is one stack.
     Raises ValueError where no row can be placed.
     """
-    faults, boxes = list(faults), []
+    faults, boxes, stack = list(faults), [], []
     others: dict[str, Any] = {}
     for number, row in rows:
         row = row if isinstance(row, Mapping) else {}
         others |= {key: value for key, value in row.items() if key not in KEYS}
         if box := _box(row, number, faults):
             boxes.append(box)
+            stack.append(stack_of[number - 1] if stack_of else 0)
     faults += unread(others)
     if not boxes:
         raise ValueError(f'no box can be placed: {faults[0].text}' if faults else 'it has no box')
@@ -221,6 +225,7 @@ def plan_of(rows: Iterable[tuple[int, Any]], faults: Iterable[Fault] = ()) -> Pl
     for box in boxes:
         if weighed and box.mass is None and not box.fixed:
             faults.append(Fault('mass', (box.name,), 'has no mass: taken as 0'))
+    order = _loading(boxes, faults)
     sizes, poses = np.array([box.size for box in boxes]), np.array([box.pose for box in boxes])
     masses = [box.mass or 0.0 for box in boxes]
     limits = [box.limit for box in boxes]
@@ -229,9 +234,26 @@ def plan_of(rows: Iterable[tuple[int, Any]], faults: Iterable[Fault] = ()) -> Pl
         size, pose = slab_below(sizes, poses)
         sizes, poses = np.vstack((sizes, size)), np.vstack((poses, pose))
         names, masses, limits = [*names, GROUND], [*masses, 0.0], [*limits, math.inf]
+        stack, order = [*stack, 0], order and [*order, 0]
         ground = [len(boxes)]
     return Plan(sizes, poses, masses if weighed else None, ground=ground, names=names,
-                limits=limits, faults=faults)
+                limits=limits, order=order, stack=stack, faults=faults)
+
+
+def _loading(boxes: Sequence[_Box], faults: list[Fault]) -> list[int] | None:
+    """Return the number by which each box comes, or None; name those that have none."""
+    free = [box for box in boxes if not box.fixed]
+    if all(box.order is None for box in free):
+        return None
+    lack = tuple(box.name for box in free if not _is_whole_number(box.order))
+    if lack:
+        faults.append(Fault('order', lack, 'has no whole number: steps are not judged'))
+        return None
+    return [0 if box.fixed else int(box.order or 0) for box in boxes]
+
+
+def _is_whole_number(value: float | None) -> bool:
+    return value is not None and value.is_integer() and abs(value) <= MOST_STEPS
 
 
 def slab_below(sizes: np.ndarray, poses: np.ndarray, height: float = 0.0,
@@ -253,6 +275,7 @@ class _Box:
     mass: float | None
     limit: float
     fixed: bool
+    order: float | None
 
 
 def _box(row: Row, number: int, faults: list[Fault]) -> _Box | None:
@@ -286,7 +309,8 @@ def _box(row: Row, number: int, faults: list[Fault]) -> _Box | None:
         faults.append(Fault('pose', (name,), f'{place}fixed is {short_repr(row["fixed"])}, neither '
                                              'true nor false: left out'))
         return None
-    return _Box(name, size, pose, amounts[0], math.inf if amounts[1] is None else amounts[1], fixed)
+    return _Box(name, size, pose, amounts[0], math.inf if amounts[1] is None else amounts[1], fixed,
+                None if row.get('order') is None else _number(row['order']))
 
 
 def _number(value: Any) -> float:
