@@ -17,7 +17,7 @@ keeps these bits.
 
 With `--heaps N`, N random heaps of boxes are moved by `PatchForces` instead (benchmarks/heaps.py).
 With `--plans N`, a linear programme judges what falls in N random plans (random_plans.py), and with
-`--orders N` a slow loop what falls while N are loaded (random_orders.py).
+`--orders N` slow loops the loading of N (random_orders.py).
 """
 from __future__ import annotations
 
@@ -412,7 +412,7 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--plans', type=within(1), metavar='N',
                         help='judge N plans of boxes by a linear programme, and no pairs')
     parser.add_argument('--orders', type=within(1), metavar='N',
-                        help='judge each step of N plans by a slow loop, and no pairs')
+                        help='judge the loading of N plans by slow loops, and no pairs')
     parser.add_argument('--workers', type=within(1), default=os.cpu_count() or 1,
                         help='processes at once')
     options = parser.parse_args(args)

@@ -31,6 +31,7 @@ from .inspect_plan import inspect_plan
 from .inspection import Inspection
 from .plan import Plan
 from .read_plan import read_any
+from .ways import SIDES
 
 NOT_READ = 2
 STATUSES = {'sound': 0, 'not all judged': 3, 'not sound': 1, 'not read': NOT_READ}
@@ -51,9 +52,14 @@ def judged(path: str, options: argparse.Namespace) -> Inspection:
         plan, masses=None if options.geometry else plan.masses, limits=limits,
         order=order_of_rows(plan) if options.order else plan.order,
         faults=tuple(fault for fault in plan.faults if fault.kind not in ignored))
+    loaded_from = options.loaded_from
+    if loaded_from and plan.order is None:
+        if all(fault.kind != 'order' for fault in plan.faults):
+            raise ValueError(f'{path}: --from needs an order: `order` of each box, or --order rows')
+        loaded_from = None
     try:
         return inspect_plan(plan, tolerance=options.tolerance, acceleration=options.acceleration,
-                            bears=options.bears or bears)
+                            bears=options.bears or bears, loaded_from=loaded_from)
     except TooManyNear as error:
         return crowded(plan, error.pairs, options.tolerance, options.acceleration)
     except ValueError as error:
@@ -92,6 +98,8 @@ def _parser() -> argparse.ArgumentParser:
                         '[m/s²]; a lorry that brakes along +x by 0.4 g: 3.92 0 -9.81')
     parser.add_argument('--order', choices=('rows',), help='boxes come by the order of their rows; '
                         'else by the column or key `order`, if there is one')
+    parser.add_argument('--from', dest='loaded_from', choices=SIDES, help='where boxes come from, '
+                        'each by a straight way that must be free (-x as --from=-x)')
     parser.add_argument('--geometry', action='store_true', help='leave masses out: judge overlaps '
                         'and support alone')
     return parser
@@ -154,7 +162,7 @@ def as_json(found: Inspection) -> dict[str, Any]:
     plan = found.plan
     fields = {field.name: getattr(found, field.name) for field in dataclasses.fields(found)}
     del fields['plan']
-    for pairs in ('overlaps', 'carried_by'):
+    for pairs in ('overlaps', 'carried_by', 'ways'):
         fields[pairs] = [[plan.names[a], plan.names[b]] for a, b in fields[pairs].tolist()]
     fields['steps'] = [{'step': step, 'name': plan.names[box], 'cause': cause, 'until': until}
                        for step, box, cause, until in found.steps]

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ..core import native
 from ..extras import require
 from ..solver.checks import as_floats, as_number, short_repr
+from ..solver.contacts_of import TooManyNear
 from ..solver.faces import TOLERANCE, corner_shares
 from .inspection import OVER, Inspection
 from .judged import faults_of
@@ -22,6 +23,7 @@ from .standing import base_areas, heights
 from .statics import Bodies, Rest, settle
 from .steps import falls_of
 from .verdict import verdict_of
+from .ways import SIDES, blocked_ways
 
 MANY = 10_000
 """With more boxes progress is shown: they take a second or more."""
@@ -29,7 +31,7 @@ MANY = 10_000
 
 def inspect_plan(plan: Plan, *, tolerance: float | None = None, friction: float = 0.5,
                  acceleration: ArrayLike = (0.0, 0.0, -9.81), bears: str = 'faces',
-                 sides: bool = False) -> Inspection:
+                 sides: bool = False, loaded_from: str | None = None) -> Inspection:
     """Return what is wrong with a plan, and what each of its boxes carries.
 
     tolerance: the gap up to which faces touch, and the depth up to which boxes do not overlap [m];
@@ -40,6 +42,8 @@ def inspect_plan(plan: Plan, *, tolerance: float | None = None, friction: float 
     bears: 'faces', or 'corners': a box stands on its corners alone, as a container does. They bear
     on the ground, and on corner castings of the box below.
     sides: whether boxes beside each other carry by friction.
+    loaded_from: 'above', '+x', '-x', '+y' or '-y': where the boxes of a plan with an order come
+    from, each by a straight way; None: ways are not judged.
 
     A plan with an order is judged at each of its steps, too.
 
@@ -54,6 +58,11 @@ def inspect_plan(plan: Plan, *, tolerance: float | None = None, friction: float 
         raise ValueError(f"bears must be 'faces' or 'corners', not {short_repr(bears)}")
     if not isinstance(sides, (bool, np.bool_)):
         raise ValueError(f'sides must be True or False, not {short_repr(sides)}')
+    if loaded_from not in (None, *SIDES):
+        raise ValueError(f'loaded_from must be one of {", ".join(SIDES)}, not '
+                         f'{short_repr(loaded_from)}')
+    if loaded_from is not None and plan.order is None:
+        raise ValueError(f'loaded_from is {loaded_from!r}, but the plan has no order')
     tolerances = _tolerances(plan, tolerance)
     friction = as_number(friction, 'friction')
     if not 0.0 <= friction < np.inf:
@@ -69,13 +78,26 @@ def inspect_plan(plan: Plan, *, tolerance: float | None = None, friction: float 
     found = _judged(plan, meet, bodies, None if plan.masses is None else
                     _loads(plan, meet, bodies, friction),
                     float(tolerances.max(initial=0.0)))
-    steps, unknown = falls_of(plan, may_meet, bodies, None if plan.masses is None else friction)
-    if unknown := [box for box in unknown if found.stands[box]]:
-        plan = replace(found.plan, faults=(*found.plan.faults, Fault(
-            'support', tuple(plan.names[box] for box in unknown),
-            'not judged at each step: too many boxes bear on each other', lacks='judgement')))
-        found = replace(found, plan=plan)
-    return replace(found, steps=steps)
+    return _as_loaded(found, may_meet, bodies, None if plan.masses is None else friction,
+                      tolerances, loaded_from)
+
+
+def _as_loaded(found: Inspection, meet: Meetings, bodies: Bodies, friction: float | None,
+               tolerances: np.ndarray, loaded_from: str | None) -> Inspection:
+    """Return what was found, with the steps and the ways of a plan that has an order."""
+    plan, faults, ways = found.plan, [], found.ways
+    steps, unknown = falls_of(plan, meet, bodies, friction)
+    if names := tuple(plan.names[box] for box in unknown if found.stands[box]):
+        faults.append(Fault('support', names, 'not judged at each step: too many boxes bear on '
+                            'each other', lacks='judgement'))
+    if loaded_from is not None:
+        try:
+            ways = blocked_ways(plan, meet, tolerances, loaded_from)
+        except TooManyNear:
+            faults.append(Fault('way', (), 'not judged: too many boxes are on the ways'))
+    if faults:
+        plan = replace(plan, faults=(*plan.faults, *faults))
+    return replace(found, plan=plan, steps=steps, loaded_from=loaded_from, ways=ways)
 
 
 def _tolerances(plan: Plan, value: float | None) -> np.ndarray:

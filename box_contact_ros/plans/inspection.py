@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import groupby
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -110,12 +111,17 @@ class Inspection:
     """(3,) [m]."""
     steps: tuple[Fall, ...] = ()
     """What falls while the plan is loaded, by step; empty without an order."""
+    loaded_from: str | None = None
+    """Where boxes come from; None: their ways are not judged."""
+    ways: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), int))
+    """(w, 2) a box and another that blocks its way, by index: by steps, and by what it meets first.
+    """
 
     @property
     def verdict(self) -> str:
         """Return 'not sound' for what is certainly wrong, else 'not all judged', or 'sound'."""
         faults = {fault.verdict for fault in self.plan.faults}
-        if len(self.overlaps) or self.steps or (self.cause != '').any():
+        if len(self.overlaps) or self.steps or len(self.ways) or (self.cause != '').any():
             faults.add('not sound')
         return next((verdict for verdict in VERDICTS if verdict in faults), 'sound')
 
@@ -170,7 +176,7 @@ class Inspection:
             a, b = self.overlaps[n].tolist()
             rows.append(Row('overlap', (names[a], names[b]), f'{1e3 * self.depths[n]:.1f} mm deep'))
         rows += self._falls()
-        rows += self._steps()
+        rows += (*self._steps(), *self._ways())
         on_top = self.load / np.linalg.norm(self.acceleration)
         over = np.flatnonzero(on_top > (1.0 + OVER) * plan.limits)
         rows += [Row('overloaded', (names[box],), f'{on_top[box]:.0f} kg on top')
@@ -212,6 +218,16 @@ class Inspection:
             if end or self.cause[box] in ('', 'overloaded'):
                 yield Row('step', (plan.names[box],), f'step {step}: {plan.names[box]} '
                           f'{"is " if cause == "unsupported" else ""}{cause}{end}')
+
+    def _ways(self) -> Iterator[Row]:
+        """Yield rows of the boxes whose ways are blocked."""
+        names, order = self.plan.names, self.plan.order
+        for box, pairs in groupby(self.ways.tolist(), key=lambda pair: pair[0]):
+            assert order is not None
+            first, *others = (names[other] for _, other in pairs)
+            yield Row('way', (names[box],), f'step {order[box]}: the way of {names[box]} from '
+                      f'{self.loaded_from} is blocked by {first}'
+                      f'{f" and {len(others):,} more" if others else ""}')
 
     def _who_comes(self, step: int, stack: int) -> str:
         plan = self.plan

@@ -32,7 +32,7 @@ FAULT_KINDS = {
     'size type': ('not all judged', 'place'), 'dimension': ('not all judged', 'place'),
     'pose': ('not all judged', 'place'), 'mass': ('not all judged', 'weight'),
     'order': ('not all judged', 'order'), 'shape': ('not all judged', 'shape'),
-    'support': ('not all judged', 'support'),
+    'support': ('not all judged', 'support'), 'way': ('not all judged', 'judgement'),
     'column': ('sound', '')}
 """What may be wrong with a row of a file: the best verdict with it, and what it lacks."""
 LACKS = {
