@@ -87,7 +87,7 @@ def _as_loaded(found: Inspection, meet: Meetings, bodies: Bodies, friction: floa
     """Return what was found, with the steps and the ways of a plan that has an order."""
     plan, faults, ways = found.plan, [], found.ways
     steps, unknown = falls_of(plan, meet, bodies, friction)
-    if names := tuple(plan.names[box] for box in unknown if found.stands[box]):
+    if names := tuple(plan.names[box] for box in unknown if found.stands[box] or found.cause[box]):
         faults.append(Fault('support', names, 'not judged at each step: too many boxes bear on '
                             'each other', lacks='judgement'))
     if loaded_from is not None:
