@@ -16,7 +16,8 @@ every instruction set (BOX_CONTACT_INSTRUCTION_SET), and before and after a chan
 keeps these bits.
 
 With `--heaps N`, N random heaps of boxes are moved by `PatchForces` instead (benchmarks/heaps.py).
-With `--plans N`, a linear programme judges what falls in N random plans (random_plans.py).
+With `--plans N`, a linear programme judges what falls in N random plans (random_plans.py), and with
+`--orders N` slow loops the loading of N (random_orders.py).
 """
 from __future__ import annotations
 
@@ -42,7 +43,7 @@ from box_contact_ros.solver.contact import FIELDS, Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix
 
-from . import heaps, judge, output, probes, random_plans
+from . import heaps, judge, output, probes, random_orders, random_plans
 from .pose_sets import (
     CONTAINER,
     HIGH_CUBE,
@@ -410,6 +411,8 @@ def main(args: Sequence[str] | None = None) -> int:
                         help='run N heaps of boxes by the forces, and no pairs')
     parser.add_argument('--plans', type=within(1), metavar='N',
                         help='judge N plans of boxes by a linear programme, and no pairs')
+    parser.add_argument('--orders', type=within(1), metavar='N',
+                        help='judge the loading of N plans by slow loops, and no pairs')
     parser.add_argument('--workers', type=within(1), default=os.cpu_count() or 1,
                         help='processes at once')
     options = parser.parse_args(args)
@@ -418,6 +421,9 @@ def main(args: Sequence[str] | None = None) -> int:
     if options.plans:
         return int(random_plans.fuzz(options.plans, seed=options.seed,
                                      workers=options.workers) > 0)
+    if options.orders:
+        return int(random_orders.fuzz(options.orders, seed=options.seed,
+                                      workers=options.workers) > 0)
     folder = output.results_folder(parser, options)
     require('fuzz', 'report')
     tallies = fuzz(QUICK_PAIRS if options.quick else options.pairs, seed=options.seed,

@@ -28,6 +28,9 @@ class Bearings:
     hull: np.ndarray
     """(k, h, 3) the first points, which span the others; some may come twice [m]."""
 
+    def __getitem__(self, rows: np.ndarray) -> Bearings:
+        return Bearings(self.point[rows], self.stiffness[rows], self.hull[rows])
+
     def in_frame(self, axes: np.ndarray) -> Bearings:
         """Return the same in a frame with these axes, as rows (3, 3)."""
         return replace(self, point=self.point @ axes.T, hull=self.hull @ axes.T)

@@ -9,6 +9,7 @@ place are 2 million pairs, and 1.3 GB.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -67,9 +68,7 @@ def crowded(plan: Plan, pairs: np.ndarray, tolerance: float | None, acceleration
         overlaps, depths = overlaps[:0], depths[:0]
     else:
         faults += (crowd([plan.names[box] for box in overlaps[:1].ravel()], count),)
-    plan = Plan(plan.sizes, plan.poses, plan.masses, ground=plan.ground, names=plan.names,
-                centres=plan.centres, limits=plan.limits, body=plan.body, apart=plan.apart,
-                faults=faults, room=plan.room)
+    plan = replace(plan, faults=faults)
     none, nothing = np.full(count, np.nan), np.zeros(0)
     return Inspection(
         plan=plan, tolerance=tolerance, acceleration=np.asarray(acceleration, float),

@@ -33,6 +33,7 @@ from .inspect_plan import inspect_plan
 from .inspection import Inspection
 from .plan import Fault, Plan
 from .read_plan import read_any
+from .ways import SIDES
 
 NOT_READ = 2
 STATUSES = {'sound': 0, 'not all judged': 3, 'not sound': 1, 'not read': NOT_READ}
@@ -52,15 +53,23 @@ def judged(path: str, options: argparse.Namespace) -> tuple[Inspection, str]:
     if options.limit is not None:
         free = np.setdiff1d(np.arange(len(plan)), plan.ground)
         limits[free] = np.minimum(limits[free], options.limit)
+    ignored = {kind for kind, is_told in (
+        ('mass', options.geometry), ('order', options.order), ('gravity', options.acceleration))
+        if is_told}
     plan = dataclasses.replace(
         plan, masses=None if options.geometry else plan.masses, limits=limits,
-        faults=tuple(fault for fault in plan.faults
-                     if not (options.geometry and fault.kind == 'mass'
-                             or options.acceleration and fault.kind == 'gravity')))
+        order=order_of_rows(plan) if options.order else plan.order,
+        faults=tuple(fault for fault in plan.faults if fault.kind not in ignored))
     felt = options.acceleration or (0.0, 0.0, -9.81)
+    loaded_from = options.loaded_from
+    if loaded_from and plan.order is None:
+        if all(fault.kind != 'order' for fault in plan.faults):
+            raise ValueError(f'{path}: --from needs an order: `order` of each box, or --order rows')
+        loaded_from = None
     try:
         found = inspect_plan(plan, tolerance=options.tolerance, acceleration=felt,
-                             bears=options.bears or bears, sides=options.sides)
+                             bears=options.bears or bears, sides=options.sides,
+                             loaded_from=loaded_from)
     except TooManyNear as error:
         return crowded(plan, error.pairs, options.tolerance, felt), form
     except ValueError as error:
@@ -120,6 +129,16 @@ def _words(given: Given) -> list[str]:
     return words
 
 
+def order_of_rows(plan: Plan) -> np.ndarray:
+    """Return the place of each box among those of its stack (n,); a body comes with its first."""
+    first = np.unique(plan.body, return_index=True)[1][plan.body]
+    order = np.zeros(len(plan), int)
+    for stack in np.unique(plan.stack):
+        boxes = np.flatnonzero(plan.stack == stack)
+        order[boxes] = np.arange(1, len(boxes) + 1)
+    return order[first]
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = program_parser('inspect', __doc__)
     parser.add_argument('files', nargs='+', metavar='FILE')
@@ -143,6 +162,10 @@ def _parser() -> argparse.ArgumentParser:
                         help='what the goods feel, gravity included [m/s²] (default: 0 0 -9.81, '
                         'whatever the file says); a lorry that brakes along +x by 0.4 g: '
                         '3.92 0 -9.81')
+    parser.add_argument('--order', choices=('rows',), help='boxes come by the order of their rows; '
+                        'else by the column or key `order`, if there is one')
+    parser.add_argument('--from', dest='loaded_from', choices=SIDES, help='where boxes come from, '
+                        'each by a straight way that must be free (-x as --from=-x)')
     parser.add_argument('--geometry', action='store_true', help='leave masses out: judge overlaps '
                         'and support alone')
     return parser
@@ -214,8 +237,10 @@ def as_json(found: Inspection) -> dict[str, Any]:
     plan = found.plan
     fields = {field.name: getattr(found, field.name) for field in dataclasses.fields(found)}
     del fields['plan']
-    for pairs in ('overlaps', 'carried_by'):
+    for pairs in ('overlaps', 'carried_by', 'ways'):
         fields[pairs] = [[plan.names[a], plan.names[b]] for a, b in fields[pairs].tolist()]
+    fields['steps'] = [{'step': step, 'name': plan.names[box], 'cause': cause, 'until': until}
+                       for step, box, cause, until in found.steps]
     return {'verdict': found.verdict, 'sound': found.sound,
             'names': list(plan.names), 'ground': plan.ground.tolist(),
             'faults': [row._asdict() for row in found.rows()],

@@ -5,8 +5,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import groupby
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -45,6 +46,19 @@ class Row(NamedTuple):
         if len(self.names) > MOST_NAMES:
             names += f' and {len(self.names) - MOST_NAMES:,} more'
         return printable(f'{self.kind:<20}  {names}{"  " if names else ""}{self.text}')
+
+
+class Fall(NamedTuple):
+    """A box that does not stand from a step of loading on."""
+
+    step: int
+    """The number in the plan's order."""
+    box: int
+    """By index."""
+    cause: str
+    """One of CAUSES, as it falls first."""
+    until: int | None
+    """The step from which on it stands; None: it never does."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,12 +113,20 @@ class Inspection:
     """Of all boxes [kg]."""
     centre_of_mass: np.ndarray
     """(3,) [m]."""
+    steps: tuple[Fall, ...] = ()
+    """What falls while the plan is loaded, by step; empty without an order."""
+    loaded_from: str | None = None
+    """Where boxes come from; None: their ways are not judged."""
+    ways: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), int))
+    """(w, 2) a box and another that blocks its way, by index: by steps, and by what it meets first.
+    """
 
     @property
     def verdict(self) -> str:
         """Return 'not sound' for what is certainly wrong, else 'not all judged', or 'sound'."""
         faults = {fault.verdict for fault in self.plan.faults}
-        if len(self.overlaps) or self.outside.any() or (self.cause != '').any():
+        if (len(self.overlaps) or self.outside.any() or self.steps or len(self.ways)
+                or (self.cause != '').any()):
             faults.add('not sound')
         return next((verdict for verdict in VERDICTS if verdict in faults), 'sound')
 
@@ -165,6 +187,7 @@ class Inspection:
             rows.append(Row('outside', (names[n],), ', '.join(
                 f'{1e3 * reach:.1f} mm beyond {side}' for side, reach in sides if reach)))
         rows += self._falls()
+        rows += (*self._steps(), *self._ways())
         on_top = self.load / np.linalg.norm(self.acceleration)
         over = np.flatnonzero(on_top > (1.0 + OVER) * plan.limits)
         rows += [Row('overloaded', (names[box],), f'{on_top[box]:.0f} kg on top')
@@ -174,6 +197,7 @@ class Inspection:
     def _falls(self) -> Iterator[Row]:
         """Yield rows of the boxes that fall, each before those that go with it."""
         names = self.plan.names
+        since = {fall.box: fall.step for fall in self.steps if fall.until is None}
         order = np.argsort(self.margin, kind='stable').tolist()
         goes: dict[int, list[int]] = {}
         for box in order:
@@ -182,18 +206,45 @@ class Inspection:
         for cause in CAUSES[:CAUSES.index(GOES)]:
             for box in order:
                 if self.cause[box] == cause:
-                    yield Row(cause, (names[box],), self._why(box))
+                    yield Row(cause, (names[box],), self._why(box, since))
                     for other in goes.get(box, ()):
-                        yield Row(GOES, (names[other],), f'with {names[box]}; {self._why(other)}')
+                        yield Row(GOES, (names[other],),
+                                  f'with {names[box]}; {self._why(other, since)}')
         for other in goes.get(-1, ()):
-            yield Row(GOES, (names[other],), self._why(other))
+            yield Row(GOES, (names[other],), self._why(other, since))
 
-    def _why(self, box: int) -> str:
+    def _why(self, box: int, since: Mapping[int, int]) -> str:
+        end = f', from step {since[box]} on' if box in since else ''
         if self.cause[box] == 'hangs':
             height = self.height[box]
             return (f'{1e3 * height:.1f} mm above what is below' if np.isfinite(height) else
-                    'above nothing')
-        return f'share {self.share[box]:.2f}, centre {_side(self.margin[box])}'
+                    'above nothing') + end
+        return f'share {self.share[box]:.2f}, centre {_side(self.margin[box])}{end}'
+
+    def _steps(self) -> Iterator[Row]:
+        """Yield rows of what falls while the plan is loaded, and not in the whole of it."""
+        plan = self.plan
+        for step, box, cause, until in self.steps:
+            end = '' if until is None else f' until {self._who_comes(until, plan.stack[box])}'
+            if end or self.cause[box] in ('', 'overloaded'):
+                yield Row('step', (plan.names[box],), f'step {step}: {plan.names[box]} '
+                          f'{"is " if cause == "unsupported" else ""}{cause}{end}')
+
+    def _ways(self) -> Iterator[Row]:
+        """Yield rows of the boxes whose ways are blocked."""
+        names, order = self.plan.names, self.plan.order
+        for box, pairs in groupby(self.ways.tolist(), key=lambda pair: pair[0]):
+            assert order is not None
+            first, *others = (names[other] for _, other in pairs)
+            yield Row('way', (names[box],), f'step {order[box]}: the way of {names[box]} from '
+                      f'{self.loaded_from} is blocked by {first}'
+                      f'{f" and {len(others):,} more" if others else ""}')
+
+    def _who_comes(self, step: int, stack: int) -> str:
+        plan = self.plan
+        come = np.flatnonzero((plan.order == step) & (plan.stack == stack))
+        first, *others = np.setdiff1d(come, plan.ground).tolist()
+        return plan.names[first] + (f' and {len(others):,} more come' if others else ' comes')
 
     def summary(self) -> str:
         """Return one line on the whole plan."""

@@ -4,9 +4,10 @@
 """Packing plans: CSV and JSON of our own, and the forms of known packers.
 
 A row is a box: its name, full extents, centre or least corner, and, where it has them, its
-quaternion, mass and limit [kg], and whether it is fixed. Lengths are in metres unless the form or
-the caller has another unit. Where no row is fixed and no container has a floor, z = 0 is the
-ground. msg_schemas/plan.json is the format in JSON; the columns of a CSV file have the same names.
+quaternion, mass and limit [kg], whether it is fixed, and a whole number by which it comes. Lengths
+are in metres unless the form or the caller has another unit. Where no row is fixed and no container
+has a floor, z = 0 is the ground. msg_schemas/plan.json is the format in JSON; the columns of a CSV
+file have the same names.
 """
 from __future__ import annotations
 
@@ -46,8 +47,9 @@ from .forms import (
 from .plan import NO_ROOM, UNTURNED, Fault, Plan
 from .room import walls
 
-KEYS = ('name', *(key for way in (*SIZES, *PLACES) for key in way), *TURN, 'mass', 'limit', 'fixed')
-COLUMNS = ('name', *EXTENTS, *PLACE, *TURN, 'mass', 'limit', 'fixed')
+KEYS = ('name', *(key for way in (*SIZES, *PLACES) for key in way), *TURN, 'mass', 'limit', 'fixed',
+        'order')
+COLUMNS = ('name', *EXTENTS, *PLACE, *TURN, 'mass', 'limit', 'fixed', 'order')
 """What a refusal names; the others are other ways to tell sizes and places."""
 DELIMITERS = ',;\t'
 WORDS = {'true': True, '1': True, 'yes': True, 'false': False, '0': False, 'no': False, '': False}
@@ -62,6 +64,7 @@ LONG = 20.0
 """Half of the boxes are longer only where their unit is not the metre [m]."""
 LONG_ROOM, FULL = 30.0, 5.0
 """A container is longer, or shorter than a box by more, only where their units differ [m, 1]."""
+MOST_STEPS = 2**53  # a float64 has all whole numbers up to it
 Row = Mapping[str, Any]
 
 
@@ -267,7 +270,7 @@ def plan_of(packing: Packing, given: Given) -> Read:
         for stack, size in rooms.items()}), way.text)
 
 
-def _on_ground(boxes: Sequence[_Box], poses: np.ndarray, weighed: bool, faults: Iterable[Fault],
+def _on_ground(boxes: Sequence[_Box], poses: np.ndarray, weighed: bool, faults: list[Fault],
                rooms: Mapping[str, np.ndarray]) -> Plan:
     """Return the plan of boxes and of what carries them: rooms (2, 3) by stack, or the ground."""
     sizes = np.array([box.size for box in boxes])
@@ -281,11 +284,16 @@ def _on_ground(boxes: Sequence[_Box], poses: np.ndarray, weighed: bool, faults: 
         sizes = np.vstack((sizes, [size for _, size, _ in slabs]))
         poses = np.vstack((poses, [pose for *_, pose in slabs]))
     count = len(boxes)
+    stacks = {label: number for number, label in enumerate(dict.fromkeys(
+        box.stack for box in boxes))}
+    order = _loading(boxes, faults)
     return Plan(
         sizes, poses, [box.mass or 0.0 for box in boxes] + [0.0] * len(slabs) if weighed else None,
         ground=[*(n for n, box in enumerate(boxes) if box.fixed), *range(count, len(sizes))],
         names=[box.name for box in boxes] + [name for name, *_ in slabs],
-        limits=[box.limit for box in boxes] + [math.inf] * len(slabs), faults=faults,
+        limits=[box.limit for box in boxes] + [math.inf] * len(slabs),
+        order=order and [*order, *[0] * len(slabs)],
+        stack=[*(stacks[box.stack] for box in boxes), *[0] * len(slabs)], faults=faults,
         room=np.array([*(rooms.get(box.stack, NO_ROOM) for box in boxes), *[NO_ROOM] * len(slabs)]))
 
 
@@ -396,6 +404,22 @@ class _Way:
                         '--unit mm or cm, or m if they are')]
 
 
+def _loading(boxes: Sequence[_Box], faults: list[Fault]) -> list[int] | None:
+    """Return the number by which each box comes, or None; name those that have none."""
+    free = [box for box in boxes if not box.fixed]
+    if all(box.order is None for box in free):
+        return None
+    lack = tuple(box.name for box in free if not _is_whole_number(box.order))
+    if lack:
+        faults.append(Fault('order', lack, 'has no whole number: steps are not judged'))
+        return None
+    return [0 if box.fixed else int(box.order or 0) for box in boxes]
+
+
+def _is_whole_number(value: float | None) -> bool:
+    return value is not None and value.is_integer() and abs(value) <= MOST_STEPS
+
+
 def slab_below(sizes: np.ndarray, poses: np.ndarray, height: float = 0.0,
                ) -> tuple[np.ndarray, np.ndarray]:
     """Return full extents (3,) and pose (7,) of a slab under all boxes, its top at a height [m]."""
@@ -416,6 +440,7 @@ class _Box:
     mass: float | None
     limit: float
     fixed: bool
+    order: float | None
 
 
 def _box(item: Item, row: Row, way: _Way, faults: list[Fault]) -> _Box | None:
@@ -459,7 +484,8 @@ def _box(item: Item, row: Row, way: _Way, faults: list[Fault]) -> _Box | None:
                                              'true nor false: left out'))
         return None
     return _Box(name, item.stack, size, pose, amounts[0],
-                math.inf if amounts[1] is None else amounts[1], fixed)
+                math.inf if amounts[1] is None else amounts[1], fixed,
+                None if row.get('order') is None else _number(row['order']))
 
 
 def _not_read(row: Row, key: str) -> str:

@@ -32,7 +32,8 @@ FAULT_KINDS = {
     'cut': ('not all judged', 'part'), 'slot': ('not all judged', 'place'),
     'size type': ('not all judged', 'place'), 'dimension': ('not all judged', 'place'),
     'pose': ('not all judged', 'place'), 'mass': ('not all judged', 'weight'),
-    'shape': ('not all judged', 'shape'), 'support': ('not all judged', 'support'),
+    'order': ('not all judged', 'order'), 'shape': ('not all judged', 'shape'),
+    'support': ('not all judged', 'support'), 'way': ('not all judged', 'judgement'),
     'unit': ('not all judged', 'unit'), 'gravity': ('not all judged', ''),
     'origin': ('not sound', 'origin'), 'column': ('sound', '')}
 """What may be wrong with a row of a file: the best verdict with it, and what it lacks."""
@@ -44,6 +45,7 @@ LACKS = {
     'weight': ('1 has no weight', '{:,} have no weight'),
     'sure weight': ('1 has a doubtful weight', '{:,} have a doubtful weight'),
     'limit': ('1 has no known limit', '{:,} have no known limit'),
+    'order': ('1 has no place in the order', '{:,} have no place in the order'),
     'support': ('support not judged: nothing is fixed',) * 2,
     'judgement': ('1 was not judged', '{:,} were not judged'),
     'unit': ('the unit is doubtful: add --unit',) * 2,
@@ -109,6 +111,12 @@ class Plan:
     """(n,) the most that may rest on each box [kg]; infinity: no limit is known."""
     body: np.ndarray
     """(n,) the number of the body of each box. The boxes of a body hold together."""
+    order: np.ndarray | None
+    """(n,) whole numbers by which boxes come, the least first; None: not known. Boxes of a number
+    come together, and fixed ones are there from the start."""
+    stack: np.ndarray
+    """(n,) the number of the stack of each box. Stacks are loaded each by itself, among all fixed
+    boxes."""
     apart: np.ndarray
     """(a, 2) pairs of boxes, by index, that neither touch nor overlap wherever they are."""
     faults: tuple[Fault, ...]
@@ -120,14 +128,15 @@ class Plan:
     def __init__(self, sizes: ArrayLike, poses: ArrayLike, masses: ArrayLike | None = None, *,
                  ground: ArrayLike = (), names: Sequence[str] | None = None,
                  centres: ArrayLike | None = None, limits: ArrayLike | None = None,
-                 body: ArrayLike | None = None, apart: ArrayLike = (),
+                 body: ArrayLike | None = None, order: ArrayLike | None = None,
+                 stack: ArrayLike | None = None, apart: ArrayLike = (),
                  faults: Iterable[Fault] = (), room: ArrayLike | None = None) -> None:
         """Take what is known; None is what the fields say of what is not.
 
         sizes: full extents (n, 3), or (3,) of all boxes. masses: (n,), or a number for all boxes.
         ground: a box or boxes. names: None are '0', '1', and so on. centres: (n, 3); None are the
-        boxes' own centres. body: (n,); None is a body for each box. room: (n, 2, 3), or (2, 3) of
-        all boxes; None is no room.
+        boxes' own centres. body: (n,); None is a body for each box. order: (n,), one for a body.
+        stack: (n,); None is one stack. room: (n, 2, 3), or (2, 3) of all boxes; None is no room.
 
         Raises ValueError, with field, row and value, for bad input.
         """
@@ -143,8 +152,13 @@ class Plan:
             names=_names(names, count), centres=_centres(centres, count),
             limits=(np.full(count, np.inf) if limits is None else
                     _amounts(limits, 'limits', count, np.inf, 'kg')),
-            body=_bodies(body, count), apart=as_places(apart, 'apart', count),
-            faults=tuple(faults), room=_rooms(room, count))
+            body=_bodies(body, count),
+            order=None if order is None else _numbers(order, 'order', count),
+            stack=_numbers(np.zeros(count, int) if stack is None else stack, 'stack', count),
+            apart=as_places(apart, 'apart', count), faults=tuple(faults),
+            room=_rooms(room, count))
+        for name in 'order', 'stack':
+            self._check_bodies(name)
         for row, fault in enumerate(self.faults):
             if not isinstance(fault, Fault):
                 raise ValueError(f'faults[{row}] must be a Fault, not {short_repr(fault)}')
@@ -164,6 +178,17 @@ class Plan:
     def _set(self, **fields: object) -> None:
         for name, value in fields.items():
             object.__setattr__(self, name, value)
+
+    def _check_bodies(self, name: str) -> None:
+        """Raise ValueError if boxes of a body that moves differ in their order, or their stack."""
+        numbers = getattr(self, name)
+        if numbers is None or not len(self):
+            return
+        first = np.unique(self.body, return_index=True)[1][self.body]
+        differs = (numbers != numbers[first]) & ~np.isin(self.body, self.body[self.ground])
+        for row in np.flatnonzero(differs)[:1]:
+            raise ValueError(f'{name}[{row}] is {numbers[row]}, and {numbers[first[row]]} of '
+                             f'{name}[{first[row]}], a box of the same body')
 
     def __len__(self) -> int:
         """Return how many boxes there are."""
@@ -216,7 +241,11 @@ def _bodies(value: ArrayLike | None, count: int) -> np.ndarray:
     """Return a body's number for each box (n,), counted from 0 by their order."""
     if value is None:
         return np.arange(count)
-    numbers = as_wholes(value, 'body')
+    return np.unique(_numbers(value, 'body', count), return_inverse=True)[1].reshape(count)
+
+
+def _numbers(value: ArrayLike, name: str, count: int) -> np.ndarray:
+    numbers = as_wholes(value, name)
     if len(numbers) != count:
-        raise ValueError(f'body must be {count} whole numbers, not {short_repr(value)}')
-    return np.unique(numbers, return_inverse=True)[1].reshape(count)
+        raise ValueError(f'{name} must be {count} whole numbers, not {short_repr(value)}')
+    return numbers

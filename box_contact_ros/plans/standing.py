@@ -24,17 +24,14 @@ def base_areas(sizes: np.ndarray, poses: np.ndarray, up: np.ndarray) -> np.ndarr
 
 
 def needs(sizes: np.ndarray, pairs: np.ndarray, separation: np.ndarray, tolerance: np.ndarray,
-          upper: np.ndarray, count: int) -> np.ndarray:
-    """Return how far inside its hull each of so many centres must be (n,): tolerance and depth [m].
+          ) -> np.ndarray:
+    """Return how far inside its hull a centre must be that pairs carry (k,): tolerance + depth [m].
 
-    upper: what each pair (k, 2) carries. Boxes that merely touch count as pressed together by the
-    solver's share of the larger one; those that overlap, by the tolerance (k,).
+    Boxes that merely touch count as pressed together by the solver's share of the larger one; those
+    that overlap, by the tolerance (k,).
     """
-    need = np.zeros(count)
-    longest = sizes.max(axis=1)[pairs].max(axis=1)
-    np.maximum.at(need, upper, tolerance + np.maximum(
-        np.minimum(-separation, tolerance), DEPTH_FLOOR * longest))
-    return need
+    longest = sizes.max(axis=1)[pairs].max(axis=1, initial=0.0)
+    return tolerance + np.maximum(np.minimum(-separation, tolerance), DEPTH_FLOOR * longest)
 
 
 def heights(sizes: np.ndarray, poses: np.ndarray, frame: np.ndarray, body: np.ndarray,

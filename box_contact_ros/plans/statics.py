@@ -129,13 +129,14 @@ class Rest:
 
 
 def settle(bodies: Bodies, beds: Beds, friction: float,
-           report: Callable[[int], None] = lambda count: None) -> Rest:
+           report: Callable[[int], None] = lambda count: None, work: Work | None = None) -> Rest:
     """Return what the patches carry.
 
-    Small groups come first. Those that would take more than MOST_WORK then are not solved.
+    Small groups come first. Those that would take more than what is left of the work are not
+    solved; None is a work of MOST_WORK.
     report: is called with the number of bodies that were solved since.
     """
-    work = _Work(MOST_WORK)
+    work = work or Work(MOST_WORK)
     load, centre = np.zeros(len(beds.pairs)), beds.centre.copy()
     own = bodies.centre
     bodies, added = add_up(bodies, beds, friction, load, centre)
@@ -297,7 +298,7 @@ class _TooMuch(Exception):
 
 
 @dataclass
-class _Work:
+class Work:
     """What the programmes may still take."""
 
     left: float
@@ -312,7 +313,7 @@ class _Programme:
     """
 
     def __init__(self, bodies: Bodies, beds: Beds, members: np.ndarray, rows: np.ndarray,
-                 flat: bool, is_tight: np.ndarray, work: _Work) -> None:
+                 flat: bool, is_tight: np.ndarray, work: Work) -> None:
         self.flat, self.members, self.rows, self.beds = flat, members, rows, beds
         self.work = work
         self.unit = bodies.weight[members].mean()
@@ -537,7 +538,7 @@ def pulled_in(points: np.ndarray, start: np.ndarray, inward: np.ndarray, need: f
 
 
 def _least(given: Any, wanted: np.ndarray, cost: np.ndarray, metric: np.ndarray, rubs: _Friction,
-           work: _Work) -> tuple[np.ndarray, np.ndarray]:
+           work: Work) -> tuple[np.ndarray, np.ndarray]:
     """Return f (m,) and what is missing (e,), with the least cost·f² + metric·missing².
 
     given·f + missing = wanted. The last f are those of friction. The others are not negative.

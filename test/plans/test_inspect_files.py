@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from box_contact_ros import Plan
 from box_contact_ros.plans import inspect_files
 from box_contact_ros.plans.inspect_files import STATUSES
 
@@ -280,6 +281,31 @@ def test_json_is_as_its_schema_has_it(judge):
         assert document['sound'] == (status == 0)
         assert STATUSES[document['verdict']] == status
         assert len(document['names']) == len(document['stands']) == len(document['load'])
+
+
+def test_steps_of_a_file(judge):
+    """By a column, by rows, or not at all; in text, CSV and JSON."""
+    jsonschema = pytest.importorskip('jsonschema')
+    rows = ['a,1,1,1,0,0,0.5,3', 'b,1,1,1,0,0,1.5,2']
+    text, told = sheet(*rows, more=',order'), 'step 2: b hangs until a comes'
+    assert judge('p.csv', text)[1][:2] == [f'step                  b  {told}', '2 boxes: not sound']
+    assert judge('p.csv', text, '--csv')[1][1].endswith(f'p.csv,step,b,{told}')
+    status, (line,) = judge('p.csv', text, '--json')
+    document = json.loads(line)
+    assert document['steps'] == [{'step': 2, 'name': 'b', 'cause': 'hangs', 'until': 3}]
+    jsonschema.validate(document, json.loads((ROOT / 'msg_schemas/inspection.json').read_text()))
+    assert status == 1 and judge('p.csv', text, '--order', 'rows')[0] == 0
+    assert judge('p.csv', sheet(*rows[::-1], more=',order'), '--order', 'rows')[1][0].endswith(
+        'step 1: b hangs until a comes')
+    part = sheet(rows[0], rows[1][:-1], more=',order')
+    assert judge('p.csv', part)[0] == 3 and judge('p.csv', part, '--order', 'rows')[0] == 0
+
+
+def test_rows_of_stacks_and_bodies_are_steps():
+    """Each stack begins anew; a body comes with the first of its boxes."""
+    at = [(0, 0, 0, 0, 0, 0, 1)] * 5
+    plan = Plan((1, 1, 1), at, body=[0, 1, 0, 2, 3], stack=[5, 5, 5, 2, 2])
+    assert inspect_files.order_of_rows(plan).tolist() == [1, 2, 1, 1, 2]
 
 
 def test_csv_has_a_row_for_each_fault(judge):

@@ -156,7 +156,7 @@ def test_the_bound_on_pairs_keeps_the_answer(tmp_path, monkeypatch, capsys):
     one_model = world(model('m', ''.join(
         f'<link name="l{n}"><collision name="c"><geometry><box><size>1 1 1</size></box></geometry>'
         '</collision></link>' for n in range(3))))
-    for module in 'bodies', 'crowd', 'inspect_plan':
+    for module in 'bodies', 'crowd', 'meetings':
         monkeypatch.setattr(f'box_contact_ros.plans.{module}.most_near', lambda count: 2)
     for text, name, status in ((touching, 'a.csv', 3), (overlapping, 'b.csv', 1),
                                (one_model, 'c.sdf', 3)):

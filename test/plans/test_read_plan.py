@@ -431,6 +431,21 @@ def test_loads_of_a_container(tmp_path: Path) -> None:
     assert plan.names[:2] == ('1/g/1', '1/g/2')
 
 
+def test_an_order_is_that_of_all_boxes_or_not_read(tmp_path: Path) -> None:
+    """Fixed boxes need none. Orders of BED-BPP are stacks of their own, and have no numbers."""
+    rows = ('a,1,1,1,0,0,0.5,2,', 'b,1,1,1,0,0,1.5,1,', 'g,9,9,1,0,0,-0.5,,yes')
+    plan = read_plan(written(tmp_path, 'a.csv', sheet(*rows, more=',order,fixed')))
+    assert plan.order.tolist() == [2, 1, 0] and not plan.faults
+    for value in '', 'x', '1.5', '1e300':
+        text = sheet(rows[0], f'b,1,1,1,0,0,1.5,{value},', more=',order,fixed')
+        plan = read_plan(written(tmp_path, 'a.csv', text))
+        assert plan.order is None and [fault.names for fault in plan.faults] == [('b',)]
+        assert inspect_plan(plan).summary().endswith('but 1 has no place in the order')
+    plan = read_plan(ROOT / 'docs/examples/pallets/packing_plans.json')
+    stack = [name.split('/')[0] for name in plan.names[:-1]]
+    assert plan.order is None and len({*zip(stack, plan.stack.tolist())}) == len({*stack}) == 5
+
+
 def test_the_schema(tmp_path: Path) -> None:
     """What the schema takes is read without a fault, and what it refuses has one."""
     jsonschema = pytest.importorskip('jsonschema')
@@ -446,7 +461,8 @@ def test_the_schema(tmp_path: Path) -> None:
                 read_plan(written(tmp_path, 'a.json', text))
     for changed, good in (({}, True), ({'mass': 3.5, 'limit': 0, 'fixed': True}, True),
                           ({'qx': 0, 'qy': 0, 'qz': 1, 'qw': 0}, True), ({'length': 0}, False),
-                          ({'z': '1'}, False), ({'qx': 1}, False), ({'mass': -1}, False)):
+                          ({'z': '1'}, False), ({'qx': 1}, False), ({'mass': -1}, False),
+                          ({'order': 1.5}, False)):
         text = document(**changed)
         faults = read_plan(written(tmp_path, 'a.json', text)).faults
         assert jsonschema.Draft202012Validator(schema).is_valid(json.loads(text)) == good

@@ -211,7 +211,7 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: contacts_of(UNIT, POSES * 0), 'poses[0]', 'w=0'),
     (lambda: contacts_of((1, 2, -1), POSES), 'sizes', '(1, 2, -1)'),
     (lambda: contacts_of([UNIT, (1, 2, -1)], POSES), 'sizes[1]', '(1, 2, -1)'),
-    (lambda: contacts_of([UNIT], POSES), 'sizes', '(1, 3)'),
+    (lambda: contacts_of([UNIT], POSES), 'sizes', '1 size, but 2 poses'),
     (lambda: contacts_of(UNIT, POSES, [(0, 2)]), 'pairs[0]', '(0, 2)'),
     (lambda: contacts_of(UNIT, POSES, [(0, 1), (1, 1)]), 'pairs[1]', 'box 1'),
     (lambda: contacts_of(UNIT, POSES, fixed=[0, 1]), 'fixed', '[0, 1]'),
