@@ -170,9 +170,9 @@ BC_API bc_status bc_patch_forces_ahead(const bc_patch_forces* forces, double dt,
 
 /* Advance by `dt` seconds: 1e-50 or more, and less than 1. Steps may differ in length. `outside` are
  * the wrenches beside those of contacts, gravity among them, constant over the step; NULL: none.
- * A body of mass 0 goes on by its velocity. One without any, given at another pose than it ended with,
- * has the speed of this change: so a carrier may be moved by its poses alone. Forget what is put
- * elsewhere.
+ * A body of mass 0 goes on by its velocity. One without any goes from where it ended to the pose that is
+ * given, which is that of the step's end: so a carrier may be moved by its poses alone. Forget what is
+ * put elsewhere.
  * Without poses and velocities in `motion`, the wrenches are taken to move the bodies until the next
  * advance, which then removes the speed of pushing out.
  * With both, bodies at rest are laid down: poses as they were given, velocities 0. They wake by a pose,

@@ -29,6 +29,7 @@ struct Given {
   const bc_pose* poses;
   const bc_velocity* velocities;
   const bc_wrench* outside;  // none: no wrenches
+  const bc_pose* ends = nullptr;  // of bodies that the caller moves by their poses
 };
 
 // Where a body is that goes on for a time [s] by its velocity alone.
@@ -127,8 +128,8 @@ class BodyStep {
   bc_pose pose_of(const Moving& moving) const {
     return pose_at(moving.placed, moving.quaternion, bodies_[size_t(moving.body)].centre);
   }
-  // A body that no force moves goes on by the velocity that is given. With none, it keeps its pose to
-  // the bit.
+  // A body that no force moves goes on by the velocity that is given. With none, it ends where it is
+  // given, to the bit.
   void move_alone(size_t k) const {
     const bc_velocity velocity = given_.velocities[k];
     ended_[k] = {ended_[k].relaxed,
@@ -137,7 +138,7 @@ class BodyStep {
     if (motion_.wrenches) motion_.wrenches[k] = {};
     if (!motion_.poses) return;
     if (is_still(velocity)) {
-      motion_.poses[k] = given_.poses[k];
+      motion_.poses[k] = given_.ends[k];
       return;
     }
     Moving moving{};

@@ -46,10 +46,10 @@ class PatchForces : public PatchStore {
                    bc_pose* ahead) const {
     const SubSteps steps = Clock(state_.clock).begin(dt, options_.substeps);
     auto write = [&](size_t k, double time) {
-      ahead[k] = pose_after(time, bodies_[k], poses[k],
-                            bodies_[k].is_free()
-                                ? velocities[k]
-                                : carrier_velocity(k, {poses, velocities, nullptr}));
+      const Given given{poses, velocities, nullptr};
+      ahead[k] = goes_by_poses(k, given)
+                     ? pose_after(time, bodies_[k], poses_[k], velocity_to(k, poses[k], dt))
+                     : pose_after(time, bodies_[k], poses[k], velocities[k]);
     };
     for (size_t k = 0; k < bodies_.size(); ++k) write(k, steps.ahead());
     if (!own_.is_used()) return;
@@ -67,6 +67,24 @@ class PatchForces : public PatchStore {
     woken_.clear();
     if (!own_.is_used()) next_.patches = state_.patches;
     wake_into(!own_.is_used() ? next_.patches : woken_);
+  }
+  // Return where bodies begin a step `dt`: one that goes by its poses where it ended, so that it is beside what
+  // stands on it, and is where it is given at the end.
+  Given started(double dt, const Given& given) {
+    Given step = given;
+    step.ends = given.poses;
+    for (int32_t body : sleep_.fixed()) {
+      auto k = size_t(body);
+      carriers_[k] = given.velocities[k];
+      if (!goes_by_poses(k, given)) continue;
+      if (step.poses == given.poses) {
+        std::copy_n(given.poses, bodies_.size(), starts_.begin());
+        step.poses = starts_.data();
+      }
+      starts_[k] = poses_[k];
+      carriers_[k] = velocity_to(k, given.poses[k], dt);
+    }
+    return step;
   }
   // Solve the contacts of one's own at the start of a step `dt`, and read them: see OwnContacts::solve.
   template <class Solve, class InThreads>
@@ -100,7 +118,6 @@ class PatchForces : public PatchStore {
     if (!all.poses) all.poses = poses_.data();
     StepInputs step{next_.clock.begin(dt, options_.substeps), given, all,
                     own_.is_used() ? &own_ : nullptr, solve_pair};
-    for (int32_t k : sleep_.fixed()) carriers_[size_t(k)] = carrier_velocity(size_t(k), given);
     BodyStep body_step(bodies_, step.steps, given, carriers_, all, state_.is_moved_by_wrenches, ended_);
     if (!is_grouped_) islands_.group(bodies_, sleep_.awake(), next_.patches);
     is_grouped_ = true;
@@ -121,7 +138,6 @@ class PatchForces : public PatchStore {
     if (!is_in_place || motion.wrenches) sleep_.write_ends(all);
     if (motion.awake) sleep_.write_awake(motion.awake);
     own_.settle();
-    state_.step = dt;
     state_.clock.end(dt);
     state_.has_loads = true;
     state_.is_moved_by_wrenches = motion.wrenches && !motion.poses && !motion.velocities;

@@ -24,7 +24,6 @@ struct State {
   std::vector<Patch> patches;  // by pair
   std::vector<Load> loads;     // of the last advance, by pair
   Clock clock;
-  double step = 0.0;      // the last one [s]
   bool has_loads = true;  // none since bodies or boxes were changed, or patches forgotten
   bool is_moved_by_wrenches = false;  // whether the caller moves the bodies since the last advance
 };
@@ -40,6 +39,7 @@ class PatchStore {
         ended_(bodies_.size()),
         poses_(bodies_.size()),
         carriers_(bodies_.size()),
+        starts_(bodies_.size()),
         islands_(side) {
     sleep_.set_bodies(bodies_);
     make_room(0);
@@ -63,6 +63,7 @@ class PatchStore {
     ended_.resize(bodies.size());
     poses_.resize(bodies.size());
     carriers_.resize(bodies.size());
+    starts_.resize(bodies.size());
     surfaces_.reserve(bodies.size());
     sleep_.change_bodies(bodies, is_changed);
     bodies_ = std::move(bodies);  // last: there may be no memory for the others
@@ -195,15 +196,15 @@ class PatchStore {
     ended_[body] = {};
     poses_[body] = {};
   }
-  // The velocity of a body that no force moves, at the start of an advance: the one that is given, or,
-  // without any, by its poses.
-  bc_velocity carrier_velocity(size_t body, const Given& given) const {
-    const bc_velocity& velocity = given.velocities[body];
-    const bc_pose &last = poses_[body], &pose = given.poses[body];
-    bool has_moved = squared_norm(last.quaternion) > 0.0 && !have_same_bits(last, pose);
-    return is_still(velocity) && has_moved
-               ? velocity_between(last, pose, bodies_[body].centre, state_.step)
-               : velocity;
+  // Whether the caller moves a body that no force moves by its poses alone: from where it ended to the pose
+  // that is given.
+  bool goes_by_poses(size_t body, const Given& given) const {
+    return !bodies_[body].is_free() && is_still(given.velocities[body]) &&
+           squared_norm(poses_[body].quaternion) > 0.0 &&
+           !have_same_bits(poses_[body], given.poses[body]);
+  }
+  bc_velocity velocity_to(size_t body, const bc_pose& pose, double dt) const {
+    return velocity_between(poses_[body], pose, bodies_[body].centre, dt);
   }
   bool is_of_boxes(const Patch& patch) const {
     return 0 <= patch.box_a && patch.box_a < patch.box_b && patch.box_b < box_count() &&
@@ -256,6 +257,7 @@ class PatchStore {
   std::vector<Ended> ended_;    // of the bodies
   std::vector<bc_pose> poses_;  // of the bodies at the end of the last advance; none: all zero
   std::vector<bc_velocity> carriers_;  // of the bodies that no force moves, in an advance
+  std::vector<bc_pose> starts_;        // of all bodies, where one of them goes by its poses
   State state_, next_;          // as the last advance ended, and as the next one will
   std::vector<Patch> woken_;    // of what wakes in this advance, as it was
   Sleep sleep_;                 // patches and loads of what is asleep are there

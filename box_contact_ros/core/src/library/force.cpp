@@ -78,10 +78,12 @@ bc_status advance(bc_patch_forces* forces, double dt, const Given& given, const 
   Advancing advancing{self};
   self.begin(given, changed, all);
   bc_status status = check_given(self, given);
-  if (!status) status = solve_own(handled(forces), dt, given);
+  if (status) return status;
+  const Given step = self.started(dt, given);
+  status = solve_own(handled(forces), dt, step);
   if (!status && self.is_waking()) status = check_given(self, given);
   if (status) return status;
-  int64_t lost = self.advance(dt, given, all, solve_exactly, handled(forces).threads);
+  int64_t lost = self.advance(dt, step, all, solve_exactly, handled(forces).threads);
   advancing.is_done = lost < 0;
   if (advancing.is_done) return BC_OK;
   return fail(
