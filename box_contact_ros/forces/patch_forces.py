@@ -322,7 +322,7 @@ class PatchForces:
 
         Wrenches are constant over the n sub-steps of an `advance`. At the poses themselves, springs
         gain energy; at poses later by (n − 1)/2n · dt, they keep it. Nothing changes, so each step
-        of a load on a rope is::
+        of a load on a rope is as follows; a damper takes `velocities` as they are::
 
             at = forces.ahead(dt, poses, velocities)
             poses, velocities, _, _ = forces.advance(dt, poses, velocities, gravity + rope(at))
