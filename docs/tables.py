@@ -152,9 +152,9 @@ def models() -> str:
             f'{where["processor"]}; in C those in brackets are with the size of the patch, which '
             "Python includes. Off: median and 99th percentile of distances from `exact`'s point, "
             "in % of the smaller box's longest edge, for engines of 1,000 pairs. Of the ways to "
-            'make one point of theirs, the nearest is taken. Some find no contact in pairs shallower '
-            'than 1e-9 of the size. Moving: swaying containers. PyBullet is asked at new poses, '
-            'with five detections; its C is Bullet 3.24 for SSE2. A dash: not measured.\n\n'
+            'make one point of theirs, the nearest is taken. Some find no contact in pairs '
+            'shallower than 1e-9 of the size. Moving: swaying containers. PyBullet is asked at new '
+            'poses, with five detections; its C is Bullet 3.24 for SSE2. A dash: not measured.\n\n'
             f'`exact` is the default. In batches from Python `mlp` takes {batches[0]} of its time '
             f'at rest, {batches[1]} landing and {batches[2]} moving; for one pair it takes longer. '
             f"For one pair, the paper's network takes {by_exact('paper', 'landings', 'call')} of "

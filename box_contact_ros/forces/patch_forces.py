@@ -309,8 +309,8 @@ class PatchForces:
         poses, velocities: at its start. wrenches: all but those of contacts, gravity among them.
         changed: (k,) places of those bodies at rest that may be given otherwise than at the end of
         the last step. The others are not read: they stay where they were. None: all may be.
-        A body of mass 0 without a velocity goes from where it ended to the pose that is given, which
-        is that of the step's end. `forget` what is put elsewhere.
+        A body of mass 0 without a velocity goes from where it ended to the pose that is given:
+        that of the step's end. `forget` what is put elsewhere.
         Call `advance` once a step. Steps of less than 1 s may differ in length.
         ValueError: names field and value; nothing changes then.
         """

@@ -57,7 +57,7 @@ def test_a_load_rides_on_a_carrier_moved_by_its_poses(kind: str, dt: float) -> N
 
 @pytest.mark.parametrize('dt', [1 / 240, 1 / 60])
 def test_a_load_keeps_its_place_in_a_curve(dt: float) -> None:
-    """5 m/s on a circle of 15 m. A load a step late is moved aside by turn · v · dt, 56 mm at 38 degrees."""
+    """5 m/s on a circle of 15 m. A load a step late moves aside by turn · v · dt: 56 mm at 38°."""
     world = loaded(dt)
     stood = aside(world)
     for k in range(round(3.0 / dt)):
@@ -72,7 +72,7 @@ def test_a_load_keeps_its_place_in_a_curve(dt: float) -> None:
 
 @pytest.mark.parametrize('by_poses', [True, False])
 def test_boards_beside_a_load_do_not_push_it(by_poses: bool) -> None:
-    """Boards 5 mm beside a load on a lorry at 8 m/s: 129 kN pressed on one that came a step early."""
+    """Boards 5 mm beside a load on a lorry at 8 m/s: one that came a step early pressed on it."""
     dt, gap = 1 / 60, 0.005
     sizes = [(6.0, 3.0, 1.0), (0.1, 3.0, 0.5), (0.1, 3.0, 0.5), (1.0, 1.0, 0.5)]
     at = [(0, 0, 0), (0.55 + gap, 0, 0.75), (-0.55 - gap, 0, 0.75), (0, 0, 0)]
@@ -121,7 +121,7 @@ def test_velocities_that_are_given_hold() -> None:
 
 
 def test_a_rope_on_a_carrier_moved_by_its_poses_is_taken_ahead() -> None:
-    """As one on a carrier of that velocity: by 3/8 of a step of four sub-steps from where it was."""
+    """As one on a carrier of that velocity: by 3/8 of a step of four sub-steps."""
     dt = 1 / 60
     world = loaded(dt)
     start = world.poses[0, 0]
