@@ -182,9 +182,11 @@ def pyramid(side, *others):
 
 
 @pytest.mark.parametrize('text, status, line', [
-    (slats(440), 3, 'what was read is sound, but 880 were not judged'),
+    pytest.param(slats(440), 3, 'what was read is sound, but 880 were not judged',
+                 marks=pytest.mark.reports),
     (slats(250), 3, 'what was read is sound, but 500 were not judged'),
-    (pyramid(44), 3, 'what was read is sound, but 29,370 were not judged'),
+    pytest.param(pyramid(44), 3, 'what was read is sound, but 29,370 were not judged',
+                 marks=pytest.mark.reports),
     (pyramid(27), 3, 'what was read is sound, but 6,930 were not judged'),
     (pyramid(27, 'a,.1,.1,.1,0,0,9,1'), 1, 'not sound; 6,930 were not judged')])
 def test_loads_that_take_too_much_are_not_judged(text, status, line, tmp_path):

@@ -118,7 +118,8 @@ def test_any_tolerance_lets_flush_boxes_pass(tolerance, degrees):
             [[1, 2]] if degrees and side == '+y' and tolerance != 0.5 else [])
 
 
-@pytest.mark.parametrize('number', range(40))
+@pytest.mark.parametrize('number', [
+    *range(12), *(pytest.param(number, marks=pytest.mark.reports) for number in range(12, 40))])
 def test_ways_are_those_of_a_loop(number):
     """A sample of `python -m benchmarks.fuzz --orders 500`, every second one turned."""
     found = random_orders.examine_ways(1, number)
