@@ -186,11 +186,14 @@ def _benchmark(document: Any) -> Packing | None:
     def read(entry: Any) -> Row:
         return {'name': f'{entry["sku_id"]}/{entry["id"]}', 'mass': entry['weight'],
                 **dict(zip(EXTENTS, map(entry['dimensions'].__getitem__, sides))),
-                **dict(zip(PLACE, map(entry['position'].__getitem__, PLACE)))}
+                **dict(zip(PLACE, map(entry['position'].__getitem__, PLACE))),
+                **_amounts(entry, 'weight'), **_amounts(container)}
     sides = ('width', 'depth', 'height')
+    container = document.get('container')
+    container = container if isinstance(container, Mapping) else {}
     packing = Packing(BENCHMARK, list(_items('', document['boxes'], read)))
-    if isinstance(document.get('container'), Mapping):
-        packing.rooms[''] = [document['container'].get(side) for side in sides]
+    if container:
+        packing.rooms[''] = [container.get(side) for side in sides]
     return packing
 
 
@@ -201,7 +204,8 @@ def _viewer(document: Any) -> Packing | None:
     def read(entry: Any) -> Row:
         goods = entry['stackable']
         return {'name': goods.get('name'), **{key: goods[key] for key in ('dx', 'dy', 'dz')},
-                **dict(zip(LEAST, map(entry.__getitem__, PLACE))), **_amounts(goods)}
+                **dict(zip(LEAST, map(entry.__getitem__, PLACE))), **_amounts(goods),
+                **_amounts(container)}
     items: list[Item] = []
     packing = Packing(VIEWER, items)
     for container in document['containers']:
@@ -243,7 +247,7 @@ def _py3dbp(document: Any) -> Packing | None:
         return {'name': entry.get('partno') or entry['name'], 'mass': entry['weight'],
                 **dict(zip(LEAST, entry['position'])), **dict(zip(EXTENTS, map(
                     extents.__getitem__, ROTATIONS[entry['rotation_type']]))),
-                **_amounts(entry, 'weight')}
+                **_amounts(entry, 'weight'), **_amounts(one, 'max_weight')}
     items: list[Item] = []
     packing = Packing(PY3DBP, items)
     for one in bins:
@@ -265,11 +269,14 @@ def _py3dbp_answer(document: Any) -> Packing | None:
     def read(entry: Any) -> Row:
         return {'name': entry['partNumber'], 'mass': entry['weight'],
                 **dict(zip(EXTENTS, entry['WHD'])), **dict(zip(LEAST, (
-                    place - side // 2 for place, side in zip(entry['position'], entry['WHD']))))}
+                    place - side // 2 for place, side in zip(entry['position'], entry['WHD'])))),
+                **_amounts(entry, 'weight')}
     packing = Packing(PY3DBP, list(_items('', answer['fitItem'], read)),
                       faults=list(_unfitted(answer.get('unfitItem'))))
-    if answer['box']:
-        packing.rooms[''] = answer['box'][0]['WHD']
+    for box in answer['box'][:1]:
+        packing.rooms[''] = box['WHD']
+        if 'weight' in box:
+            packing.most[''] = box['weight']
     return packing
 
 

@@ -321,14 +321,14 @@ def _too_heavy(boxes: Sequence[_Box], most: Mapping[str, Any]) -> list[Fault]:
     """Return a fault for each container that has more in it than it may have."""
     faults = []
     for stack, value in most.items():
-        limit = _number(value)
-        mass = sum(box.mass or 0.0 for box in boxes if box.stack == stack)
-        if math.isnan(limit):
-            faults.append(Fault('mass', (stack,), f'max_weight is {short_repr(value)}: not judged',
-                                lacks='limit'))
-        elif mass > limit:
-            faults.append(Fault('mass', (stack,), f'{mass:g} kg are in it, and its max_weight is '
-                                                  f'{limit:g} kg', verdict='not sound', lacks=''))
+        limit, inside = _number(value), [box.mass for box in boxes if box.stack == stack]
+        mass, name = sum(filter(None, inside)), stack or 'container'
+        if mass > limit:
+            faults.append(Fault('mass', (name,), f'{mass:g} kg are in it, and it may have '
+                                                 f'{limit:g} kg', verdict='not sound', lacks=''))
+        elif math.isnan(limit) or None in inside:
+            faults.append(Fault('mass', (name,), f'whether it has more than {short_repr(value)} kg '
+                                                 'is not judged', lacks='limit'))
     return faults
 
 
