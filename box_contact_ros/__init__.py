@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .models.make_model import make_model
     from .node.contact_node import ContactNode as ContactNode  # noqa: F401
     from .plans.inspect_plan import inspect_plan
-    from .plans.inspection import Inspection, Row
+    from .plans.inspection import Fall, Inspection, Row
     from .plans.plan import Fault, Plan
     from .plans.read_plan import read_plan
     from .scene.path import PathCheck
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from .stream.read_contacts import ReadContacts, read_contacts
 
 __all__ = ['Approach', 'Approaches', 'Body', 'Box', 'Contact', 'ContactSolver', 'Contacts',
-           'FacePatches', 'Fault', 'Frame', 'Inspection', 'Nearest', 'Nearests', 'Pair',
+           'FacePatches', 'Fall', 'Fault', 'Frame', 'Inspection', 'Nearest', 'Nearests', 'Pair',
            'PatchForces', 'PathCheck', 'Plan', 'ReadContacts', 'Row', 'Scene', 'SceneSolver',
            'contacts_of', 'face_patches', 'inspect_plan', 'make_model', 'read_contacts',
            'read_plan', 'read_scene']
@@ -42,7 +42,7 @@ _LOADED_WHEN_USED = {
     'models.make_model': ('make_model',),
     'node.contact_node': ('ContactNode',),
     'plans.inspect_plan': ('inspect_plan',),
-    'plans.inspection': ('Inspection', 'Row'),
+    'plans.inspection': ('Fall', 'Inspection', 'Row'),
     'plans.plan': ('Fault', 'Plan'),
     'plans.read_plan': ('read_plan',),
     'scene.path': ('PathCheck',),

@@ -139,11 +139,15 @@ class Inspection:
     def verdicts(self) -> np.ndarray:
         """Return a word (n,) for each box: 'ground', else 'overlap', its cause, or 'sound'.
 
-        'outside': beyond its room, and without an overlap. 'not judged': whether it stands is not
+        'outside': beyond its room, and without an overlap. 'step', 'way': it stands in the whole
+        plan, but not at each step, or its way is blocked. 'not judged': whether it stands is not
         known.
         """
         words = np.where(self.cause == '', np.where(self.stands, 'sound', 'not judged'),
                          self.cause).astype('U24')
+        for word, boxes in (('way', self.ways[:, 0]), ('step', [fall.box for fall in self.steps])):
+            boxes = np.array(boxes, int)
+            words[boxes[self.cause[boxes] == '']] = word
         words[self.outside.any(axis=(1, 2))] = 'outside'
         words[self.overlaps.ravel()] = 'overlap'
         words[self.plan.ground] = 'ground'

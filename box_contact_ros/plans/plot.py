@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 COLOURS = {'sound': '#dde5ee', 'not judged': '#cdb4db', 'overlap': '#003049',
            'outside': '#0077b6', 'hangs': '#9d0208',
            'unsupported': '#e63946', 'tips under its load': '#c77dff', 'slides': '#5a189a',
-           'goes with what falls': '#f4a261', 'overloaded': '#ffd166', 'ground': '#f2f2f2'}
+           'goes with what falls': '#f4a261', 'overloaded': '#ffd166', 'step': '#fb8b24',
+           'way': '#0a9396', 'ground': '#f2f2f2'}
 """By verdict, in the order of the legend."""
 QUIET = ('sound', 'not judged', 'ground', GOES)
 """Verdicts without labels."""

@@ -4,9 +4,8 @@
 """Is the way of each box free, as the plan is loaded? A straight way from one side to its place.
 
 The way begins just outside of all boxes of its stack. The roof or wall of a container on that side
-is open. The box is smaller on each side by tolerance
-and depth, so what is flush with it, or touches it, is no obstacle. Along an edge of the box the
-way is a longer box.
+is open. The box is smaller on each side by tolerance and depth, so what is flush with it, or
+touches it, is no obstacle. Along an edge of the box the way is a longer box.
 """
 from __future__ import annotations
 

@@ -362,7 +362,8 @@ def test_each_box_has_a_verdict_and_each_verdict_a_colour():
     boxes = [box(0, 1), box(0.9, 1), box(5, 6), box(-5, 0.4)]  # the last one is in the floor
     found = inspect_plan(plan_of(boxes, [1] * 4))
     assert found.verdicts.tolist() == ['ground', 'overlap', 'overlap', 'hangs', 'overlap']
-    assert {*CAUSES, 'overlap', 'outside', 'ground', 'sound', 'not judged'} == set(COLOURS)
+    assert {*CAUSES, 'overlap', 'outside', 'step', 'way', 'ground', 'sound',
+            'not judged'} == set(COLOURS)
 
 
 def test_the_picture_has_the_legend_of_what_it_shows():

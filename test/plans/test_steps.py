@@ -42,6 +42,14 @@ PLANK = (3, 1, 0.1)
 SLOW = (9, 21)  # 8 and 15 s of CPU, most of it by the loop
 
 
+def test_what_falls_while_it_is_loaded_is_not_called_sound():
+    """Nor is it hidden with what is; a box that falls in the whole plan has its cause."""
+    found = inspect_plan(plan_of([1, 3, 2], cube(-1, 0.5), cube(1, 0.5), cube(0, 1.05, PLANK)))
+    assert found.verdicts.tolist() == ['sound', 'sound', 'step', 'ground']
+    found = inspect_plan(plan_of([1], cube(0, 2.5)))
+    assert found.verdicts.tolist() == ['hangs', 'ground']
+
+
 @pytest.mark.parametrize(('order', 'boxes', 'wanted', 'text'), [
     ([1, 2], [cube(0, 0.5), cube(0, 1.5)], [], ''),
     ([2, 1], [cube(0, 0.5), cube(0, 1.5)], [(1, 'b', 'hangs', 2)],

@@ -62,6 +62,7 @@ def test_what_blocks_is_named():
     assert [str(row).split(maxsplit=2) for row in found.rows()] == [
         ['way', 'b', 'step 2: the way of b from +x is blocked by c'],
         ['way', 'a', 'step 3: the way of a from +x is blocked by c and 1 more']]
+    assert found.verdicts.tolist() == ['way', 'way', 'sound', 'ground']
 
 
 def test_a_box_below_a_bridge_does_not_come_from_above():
