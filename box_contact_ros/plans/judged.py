@@ -4,6 +4,8 @@
 """What of a plan cannot be judged, and what is told though nothing is wrong with it."""
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..solver.contacts_of import TooManyNear, contacts_of
@@ -19,7 +21,7 @@ SHORT = 2.0**16
 def faults_of(plan: Plan, fixed: np.ndarray, tolerances: np.ndarray) -> list[Fault]:
     """Return the faults; fixed: by body, tolerances: (n,) by box [m]."""
     is_fixed = fixed[plan.body]
-    faults = _fixed_overlaps(plan, np.flatnonzero(is_fixed), tolerances)
+    faults = [*_fixed_overlaps(plan, np.flatnonzero(is_fixed), tolerances)]
     if len(plan) and not fixed.any():
         faults.append(Fault('support', (), 'not judged: nothing is fixed'))
     free = np.flatnonzero(~is_fixed)
@@ -37,21 +39,23 @@ def faults_of(plan: Plan, fixed: np.ndarray, tolerances: np.ndarray) -> list[Fau
     return faults
 
 
-def _fixed_overlaps(plan: Plan, fixed: np.ndarray, tolerances: np.ndarray) -> list[Fault]:
-    """Return a fault that tells which fixed boxes overlap the deepest, if any do."""
+def _fixed_overlaps(plan: Plan, fixed: np.ndarray, tolerances: np.ndarray) -> Iterator[Fault]:
+    """Yield which fixed boxes overlap the deepest, and which that were only taken as fixed."""
     try:
         pairs, contacts = contacts_of(plan.sizes[fixed], plan.poses[fixed],
                                       most_near=most_near(len(fixed)))
     except TooManyNear:
-        return []
+        return
     pairs = fixed[pairs]
     rows = -contacts.separation > tolerances[pairs].min(axis=1)
     rows &= plan.body[pairs[:, 0]] != plan.body[pairs[:, 1]]
     rows &= ~np.isin(pairs @ (len(plan), 1), np.sort(plan.apart, axis=1) @ (len(plan), 1))
-    if not rows.any():
-        return []
-    depth = -contacts.separation[rows]
-    more = f'; {len(depth) - 1:,} more pairs overlap less' if len(depth) > 1 else ''
-    return [Fault('overlap', tuple(plan.names[box] for box in pairs[rows][depth.argmax()]),
-                  f'{1e3 * depth.max():.1f} mm deep, and both are fixed{more}', verdict='sound',
-                  lacks='')]
+    taken = {name for fault in plan.faults if fault.lacks == 'judgement' for name in fault.names}
+    may_move = np.array([name in taken for name in plan.names], bool)[pairs].any(axis=1)
+    for some, verdict, end in ((rows & may_move, '', ''),
+                               (rows & ~may_move, 'sound', ', and both are fixed')):
+        if some.any():
+            depth = -contacts.separation[some]
+            more = f'; {len(depth) - 1:,} more pairs overlap less' if len(depth) > 1 else ''
+            yield Fault('overlap', tuple(plan.names[box] for box in pairs[some][depth.argmax()]),
+                        f'{1e3 * depth.max():.1f} mm deep{end}{more}', verdict=verdict, lacks='')

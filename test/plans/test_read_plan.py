@@ -557,6 +557,17 @@ def test_what_feels_no_gravity_does_not_hang(name, text, fixed, tmp_path):
         'not all judged' if fixed else 'not sound')
 
 
+@pytest.mark.parametrize(('x', 'rows', 'status'), [
+    (0.5, ['overlap               a  b  500.0 mm deep'], 1), (3.0, [], 3)])
+def test_what_is_taken_as_fixed_may_not_overlap(x, rows, status, tmp_path, capsys):
+    """It is not fixed in the file: 'both are fixed' was false, and the plan not certainly wrong."""
+    pytest.importorskip('mujoco')
+    text = mjcf(body('a', 5.0), body('b', 5.0, x=x), more='<option gravity="0 0 0"/>')
+    assert inspect_files.main([str(written(tmp_path, 'p.xml', text))]) == status
+    lines = capsys.readouterr().out.splitlines()
+    assert [line for line in lines if line.startswith('overlap')] == rows
+
+
 @pytest.mark.parametrize(('name', 'text'), [
     ('p.sdf', world('<gravity>0 -9.81 0</gravity>', A)),
     ('p.xml', mjcf(body('a', 0.5), more='<option gravity="0 -9.81 0"/>'))])
