@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import runpy
 import signal
 import socket
@@ -58,23 +59,38 @@ def _domain_id() -> int:
     for _ in range(each):
         number = (zlib.crc32(run.encode()) + next(_modules)) % each
         domain = 1 + (number * workers + worker) % 101
-        if _is_free(domain):
+        if claim(domain):
             break
     return domain
 
 
-def _is_free(domain: int) -> bool:
-    """Claim a domain, unless a run of these tests has claimed it or a participant is in it."""
-    claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+def _left_in(domain: int) -> dict[Path, int]:
+    """Return the files in shared memory of a domain's participants, with the port of each.
+
+    Those that were killed leave theirs behind, in which later ones may wait for the dead.
+    """
+    numbers = {path: int(re.sub(r'.*port(\d+).*', r'\1', path.name))
+               for path in Path('/dev/shm').glob('*fastrtps_port[0-9]*')}
+    return {path: number for path, number in numbers.items()
+            if 0 <= number - 7400 - 250 * domain < 250}
+
+
+def claim(domain: int) -> bool:
+    """Claim a domain and clear it; False if another run has claimed it, or somebody is in it."""
+    name = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     try:
-        claim.bind(f'\0box_contact_ros domain {domain}')
-        # The first participant of a domain on this host takes this port.
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as port:
-            port.bind(('', 7400 + 250 * domain + 10))
+        name.bind(f'\0box_contact_ros domain {domain}')
+        left = _left_in(domain)
+        # The first participant of a domain on this host takes the first of these ports.
+        for number in {7410 + 250 * domain, *left.values()}:
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as port:
+                port.bind(('', number))
     except OSError:
-        claim.close()
+        name.close()
         return False
-    _claims.append(claim.detach())
+    for path in left:
+        path.unlink(missing_ok=True)
+    _claims.append(name.detach())
     return True
 
 
@@ -156,11 +172,7 @@ def skip_without_extra(missing: str | None) -> None:
 
 @pytest.fixture(scope='module', autouse=True)
 def own_domain() -> None:
-    """Give each module a ROS domain.
-
-    Processes that were killed leave shared memory of theirs behind, in which later ones may wait
-    for the dead.
-    """
+    """Give each module a ROS domain."""
     os.environ['ROS_DOMAIN_ID'] = str(_domain_id())
 
 

@@ -121,10 +121,10 @@ def test_threads_change_no_bit(threads: int, seconds: float) -> None:
     places = [(k % 20 - 10, k // 20 % 30 - 15, 0.26 + 0.52 * (k // 600)) for k in range(1200)]
     rows = [FLOOR, *(((0.5, 0.5, 0.5), 50.0, place, turned((1, 1, 0), 0.01 * (k % 7)))
                      for k, place in enumerate(places))]
+    pairs = [(0, k) for k in range(1, 601)] + [(k, k + 600) for k in range(1, 601)]
     found = []
     for count in (1, threads):
-        world = World(*rows, threads=count)
-        world.forces.hold([(0, k) for k in range(1, 601)] + [(k, k + 600) for k in range(1, 601)])
+        world = World(*rows, pairs=pairs, threads=count)
         found.append(world.run(seconds).poses.tobytes())
     assert len(set(found)) == 1
 

@@ -3,5 +3,5 @@
 
 """The one limit of time in the tests."""
 
-PATIENCE = 600.0
+PATIENCE = 200.0
 """Time [s] for what has to come: a limit against hanging, no more. Machines may be busy."""

@@ -33,6 +33,12 @@ from box_contact_ros.node.rclpy_workarounds import RCLError, shut_down, with_inf
 from box_contact_ros.stream.pairing import RESETS
 
 
+@pytest.fixture(autouse=True)
+def patient(monkeypatch):
+    """Let no slow end of a node in this process end the tests with it."""
+    monkeypatch.setattr(runtime, 'END_SECONDS', PATIENCE)
+
+
 @pytest.fixture
 def run(monkeypatch):
     """`run_node` with the test's own signal handlers, and its threads as they are."""

@@ -6,9 +6,12 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import time
+from pathlib import Path
 
 import pytest
+from conftest import claim
 
 from box_contact_ros import processes
 
@@ -51,3 +54,19 @@ def test_a_domain_of_its_own(given, monkeypatch):
     domain = processes.keep_to_this_host()
     assert domain == given or given is None and int(domain) in processes.DOMAINS
     assert os.environ == {'ROS_DOMAIN_ID': domain, 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+
+
+@pytest.mark.skipif(not Path('/dev/shm').exists(), reason='Linux alone has it')
+@pytest.mark.parametrize('alive', [False, True])
+def test_a_domain_of_tests_has_nothing_of_the_dead(alive):
+    """A participant that was killed leaves files, in which a later one may wait for it."""
+    domain, number = 231, 65349  # of no other test
+    left = Path(f'/dev/shm/fastrtps_port{number}')
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as port:
+        port.bind(('', number if alive else 0))
+        left.touch()
+        try:
+            assert claim(domain) is not alive
+            assert left.exists() is alive
+        finally:
+            left.unlink(missing_ok=True)
