@@ -161,7 +161,22 @@ TIMINGS = (Timing(0.001, 1000.0, 0.0), Timing(0.004, 250.0, 0.0), Timing(FRAME, 
            Timing.uneven((0.003, 0.003, 0.003, FRAME - 0.009)), Timing(0.001, 200.0, 0.0),
            Timing(0.001, 200.0, 0.002), Timing(0.001, 50.0, 0.005),
            Timing(0.001, 50.0, 0.005, lost=0.05, own=True))
-MUJOCO = 'MuJoCo, 1 ms'
+
+
+class Mujoco(NamedTuple):
+    """How MuJoCo moves a scene, with contacts of its own at each step of `STEP`."""
+
+    elliptic: bool = False
+    noslip: int = 0  # iterations of its second solver, of friction alone
+
+    def __str__(self) -> str:
+        cones = f', elliptic cones, impratio {IMPRATIO:g}' if self.elliptic else ''
+        return 'MuJoCo, 1 ms' + cones + (', noslip' if self.noslip else '')
+
+
+IMPRATIO = 10.0  # of friction's stiffness to that of the normal, with elliptic cones
+MUJOCO = (Mujoco(), Mujoco(elliptic=True), Mujoco(elliptic=True, noslip=10))
+"""Its defaults, and what its documentation advises against slip, in part and whole."""
 
 
 def near_pairs(boxes: Boxes, margin: float) -> np.ndarray:
@@ -272,12 +287,15 @@ class Ours:
 class Theirs:
     """The same scene by MuJoCo with contacts of its own."""
 
-    def __init__(self, scene: Scene, step: float) -> None:
+    def __init__(self, scene: Scene, step: float, way: Mujoco = MUJOCO[0]) -> None:
         boxes = self.boxes = scene.boxes
         self.scene, self.step_size = scene, step
         spec = mujoco.MjSpec()
         spec.option.gravity = 0.0, 0.0, -GRAVITY
         spec.option.timestep = step
+        spec.option.noslip_iterations = way.noslip
+        if way.elliptic:
+            spec.option.cone, spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, IMPRATIO
         spec.memory = 2**28
         self.free = boxes.mass > 0
         self.carrier = 0 if scene.drive or scene.belt is not None else boxes.carrier
@@ -348,12 +366,13 @@ class Theirs:
         self.tick += 1
 
 
-def steps(scene: Scene, timing: Timing | None, **options: int) -> Iterator[Ours | Theirs]:
+def steps(scene: Scene, way: Timing | Mujoco, **options: int) -> Iterator[Ours | Theirs]:
     """Run a scene by ours at a timing, or by MuJoCo; yield the loop before each step and last.
 
     The scene's boxes are those of the loop. options: those of `PatchForces`.
     """
-    loop = Ours(scene, timing, **options) if timing else Theirs(scene, STEP)
+    loop = (Ours(scene, way, **options) if isinstance(way, Timing) else
+            Theirs(scene, STEP, way))
     for _ in range(round(scene.seconds / loop.step_size)):
         yield loop
         loop.step()

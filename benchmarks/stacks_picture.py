@@ -34,7 +34,7 @@ def cell(row: dict[str, str], best: dict[str, str]) -> tuple[str, str]:
 
 
 def draw(path: Path, table: Path) -> None:
-    """Draw the map from the CSV: a row per scene, a column per timing, MuJoCo in the last."""
+    """Draw the map from the CSV: a row per scene, a column per timing, then MuJoCo's."""
     from matplotlib.patches import Patch
 
     runs: dict[str, dict[str, dict[str, str]]] = {}
@@ -43,7 +43,7 @@ def draw(path: Path, table: Path) -> None:
     ways = list(next(iter(runs.values())))
     cells = [[cell(of_scene[way], of_scene[ways[0]]) for way in ways]
              for of_scene in runs.values()]
-    figure, axes = output.subplots(1, 1, (9.8, 1.7 + 0.23 * len(runs)))
+    figure, axes = output.subplots(1, 1, (11.6, 1.9 + 0.23 * len(runs)))
     axis = axes[0, 0]
     for place, line in enumerate(cells):
         for column, (text, colour) in enumerate(line):
@@ -57,10 +57,10 @@ def draw(path: Path, table: Path) -> None:
     axis.set(xlim=(-0.5, len(ways) - 0.5), ylim=(len(runs) - 0.5, -0.5))
     axis.tick_params(length=0)
     axis.spines[:].set_visible(False)
-    at_rest = [sum(bool(of_scene[way]['rest']) for of_scene in runs.values()) for way in
-               (ways[0], ways[-1])]
-    axis.set_title(f'Of {len(runs)} scenes, {at_rest[0]} come to rest with answers at each step of '
-                   f'1 ms, and {at_rest[1]} in MuJoCo', fontsize=10)
+    at_rest = {way: sum(bool(of_scene[way]['rest']) for of_scene in runs.values()) for way in ways}
+    theirs = [str(count) for way, count in at_rest.items() if way.startswith('MuJoCo')]
+    axis.set_title(f'Of {len(runs)} scenes, {at_rest[ways[0]]} come to rest with answers at each '
+                   f'step of 1 ms; by MuJoCo {", ".join(theirs)}', fontsize=10)
     bounds = [f'at rest by {most:g} s' for most, _ in REST[:-1]] + ['later']
     figure.legend(
         handles=[Patch(color=colour, label=label) for label, colour in (
