@@ -94,19 +94,22 @@ def two_touches(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size
 
 
 def judge(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
-          found: Contacts) -> Verdict:
-    """Judge answers for poses (n, 7) and full extents (n, 3)."""
+          found: Contacts, *, inside: float = INSIDE) -> Verdict:
+    """Judge answers for poses (n, 7) and full extents (n, 3).
+
+    inside: how far outside a box a point may be, of the size and the coordinates.
+    """
     arrays = [np.asarray(part) for part in (
         pose_a, pose_b, size_a, size_b, found.colliding, found.separation, found.normal,
         found.point)]
-    pieces = [_judge(*(part[start:start + PIECE] for part in arrays))
+    pieces = [_judge(*(part[start:start + PIECE] for part in arrays), inside)
               for start in range(0, max(1, len(pose_a)), PIECE)]
     return Verdict(*(np.concatenate(parts) for parts in zip(*pieces)))
 
 
 def _judge(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
            colliding: np.ndarray, separation: np.ndarray, normal: np.ndarray, point: np.ndarray,
-           ) -> Verdict:
+           inside: float) -> Verdict:
     """Judge one piece."""
     size = np.maximum(size_a, size_b).max(axis=1)
     reach = np.abs(np.hstack([pose_a[:, :3], pose_b[:, :3]])).max(axis=1)
@@ -118,7 +121,7 @@ def _judge(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size_b: n
     with np.errstate(invalid='ignore'):  # NaN is what some of the answers are
         along = _gap_along(normal.T, *corners)
         # The point of a shallow contact is that of boxes pressed in.
-        slack = (INSIDE * (size + reach)
+        slack = (inside * (size + reach)
                  + np.where(separation > -0.34 * PRESSED * size, PRESSED * size, 0.0))
         beyond = np.maximum(_beyond(axes[0], size_a.T, (point - pose_a[:, :3]).T),
                             _beyond(axes[1], size_b.T, (point - pose_b[:, :3]).T))

@@ -1,9 +1,9 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What each model makes of the families of hard poses.
+"""What each model, and other engines, make of the families of hard poses.
 
-`python -m benchmarks.stability` asks every model for every stored case, and writes stability.md and
+`python -m benchmarks.stability` asks all for every stored case, and writes stability.md and
 stability.csv: wrong verdicts and normals, the worst error of depth, point, volume and covariance.
 The truth is stored, in 60 digits. The exit status is 1 if `exact` or `mlp` has a fault; points of
 `mlp` outside the boxes are known of needles.
@@ -21,16 +21,22 @@ from box_contact_ros.extras import require
 from box_contact_ros.solver.contact import Contacts
 
 from . import output
-from .contestant import add_models, ours
+from .contestant import Contestant, add_models, chosen, ours, packages_of
+from .engines import add_leave_out, installed, may_miss
 from .errors import point_errors
 from .hard_poses import Cases, load
-from .judge import NOT_FINITE, NOT_UNIT, OUTSIDE, judge
+from .judge import INSIDE, NOT_FINITE, NOT_UNIT, OUTSIDE, judge
 from .pose_sets import Pairs
 
 GATED = ('exact', 'mlp')  # models that must have no faults
 KNOWN = ('mlp', 'e5_needles', 'outside')
 """A fault that breaks no gate: points of `mlp` are within bounds of the overlap alone."""
 MODELS = (*GATED, 'soup-8')
+ENGINES = ('python-fcl collide', 'MuJoCo mj_collision', 'Coal ComputeCollision',
+           'PyBullet getContactPoints', 'Drake point pair')
+"""One way of each engine, with boxes of its own."""
+TOLERANT = 1e-6
+"""What an engine may be off before its verdict, direction or point counts as wrong, of the size."""
 QUICK = 10  # `--quick` asks every so-many-th family
 FAULTS = ('verdicts', 'normals', 'outside', 'not_finite')
 COUNTED = {'cases': 'cases', 'contacts': 'contacts', 'verdicts': 'wrong verdicts',
@@ -60,18 +66,36 @@ class StabilityRow:
     covariance: float  # the same, % of the trace
 
 
-def examine(model: str, family: str, cases: Cases, solve: Callable[[Pairs], Contacts],
-            ) -> StabilityRow:
-    """Judge the answers of a model to the cases of a family."""
+def answers_of(engine: Contestant) -> Callable[[Pairs], Contacts]:
+    """Return what answers for pairs by an engine: its deepest point, and no volume."""
+    def solve(pairs: Pairs) -> Contacts:
+        found = pairs.contacts()
+        found.volume[:], found.covariance[:] = math.nan, math.nan
+        for row, call in enumerate(engine.prepare(pairs)):
+            answer = engine.read(call())
+            found.colliding[row], found.normal[row], found.point[row] = chosen(
+                answer, engine.choices[0])
+            found.separation[row] = -max(answer.depths, default=math.nan)
+        return found
+    return solve
+
+
+def examine(model: str, family: str, cases: Cases, solve: Callable[[Pairs], Contacts], *,
+            tolerance: float = 0.0) -> StabilityRow:
+    """Judge the answers of a model to the cases of a family.
+
+    tolerance: what it may be off besides rounding, of the size.
+    """
     pairs, gap = cases.pairs, cases.gap
     found = solve(pairs)
-    verdict = judge(*pairs, found)
-    touching = found.colliding & (gap <= verdict.unsure)
+    verdict = judge(*pairs, found, inside=max(INSIDE, tolerance))
+    more = tolerance * pairs.size
+    touching = found.colliding & (gap <= verdict.unsure + more)
     # What the judge settles by its own gap is settled here by the stored one.
     # A contact with NaN counts as that alone.
     wrong = {
-        'verdicts': (found.colliding != (gap <= 0.0)) & (np.abs(gap) > verdict.unsure),
-        'normals': touching & ((verdict.along < gap - verdict.tolerance)
+        'verdicts': (found.colliding != (gap <= 0.0)) & (np.abs(gap) > verdict.unsure + more),
+        'normals': touching & ((verdict.along < gap - verdict.tolerance - more)
                                | (verdict.faults & NOT_UNIT > 0)),
         'outside': touching & (verdict.faults & OUTSIDE > 0),
         'not_finite': touching & (verdict.faults & NOT_FINITE > 0)}
@@ -127,6 +151,7 @@ def main(args: Sequence[str] | None = None) -> int:
     parser = output.report_parser(
         'stability', __doc__, quick=f'every {QUICK}th family', out='stability.md and stability.csv')
     add_models(parser)
+    add_leave_out(parser)
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options, part=bool(options.model))
     require('report', 'soup')
@@ -134,13 +159,17 @@ def main(args: Sequence[str] | None = None) -> int:
     families = list(cases)[::QUICK] if options.quick else list(cases)
     from tqdm import tqdm
 
+    engines, missing = installed()
+    if not (options.quick or may_miss('stability', missing, options.leave_out)):
+        return 2
     rows = []
-    contestants = [*map(ours, MODELS), *map(ours, options.model)]
-    for model, solve in ((one.name, one.solve) for one in contestants):
-        assert solve
-        rows += [examine(model, family, cases[family], solve)
-                 for family in tqdm(families, desc=f'stability, {model}', unit='family')]
-    about = output.machine(('numpy', 'python-fcl'))
+    contestants = [*map(ours, MODELS), *map(ours, options.model),
+                   *(engine for engine in engines if engine.name in ENGINES)]
+    for one in contestants:
+        rows += [examine(one.name, family, cases[family], one.solve or answers_of(one),
+                         tolerance=0.0 if one.solve else TOLERANT)
+                 for family in tqdm(families, desc=f'stability, {one.name}', unit='family')]
+    about = output.machine(packages_of(contestants))
     output.write_csv(folder / 'stability.csv', map(asdict, rows), digits=4, about=about)
     by = {one.name: [row for row in rows if row.model == one.name] for one in contestants}
     summary = table([over_all(mine) for mine in by.values()])
@@ -148,6 +177,7 @@ def main(args: Sequence[str] | None = None) -> int:
     output.write_page(
         folder, 'stability', args, machine=about, summary=summary, shown=MODELS[0],
         families=table(by[MODELS[0]], {'contacts': 'contacts'}),
+        missing=''.join(f' Left out: {line}.' for line in missing),
         verdict=f'Goals missed: {"; ".join(broken)}.' if broken else 'Of `exact` and `mlp`, every '
         'verdict and normal is right. Every point is in both boxes, but some of `mlp` of '
         f'`{KNOWN[1]}`.')

@@ -103,7 +103,8 @@ def _text(numbers: np.ndarray) -> str:
 
 def _model(shape: Shape, flags: str, p: np.ndarray, q: np.ndarray) -> tuple[Any, Any]:
     assets, geoms = zip(shape('a', p), shape('b', q))
-    bodies = ''.join(f'<body><freejoint/>{geom}</body>' for geom in geoms)
+    inertia = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'  # else small boxes are refused
+    bodies = ''.join(f'<body><freejoint/>{inertia}{geom}</body>' for geom in geoms)
     model = mujoco.MjModel.from_xml_string(
         f'<mujoco><option><flag {flags}/></option><asset>{"".join(assets)}</asset>'
         f'<worldbody>{bodies}</worldbody></mujoco>')

@@ -13,6 +13,7 @@ import pytest
 
 from benchmarks import hard_poses, stability
 from benchmarks.contestant import CORE_MODELS, ours
+from benchmarks.engines import installed
 from benchmarks.pose_sets import Pairs
 from box_contact_ros.solver.contact import Contacts
 
@@ -51,6 +52,34 @@ def test_planted_faults_are_counted(fault: str) -> None:
     assert stability.gates([row]) == [f'exact, c1_depths: 1 {fault}']
 
 
+def test_what_an_engine_of_other_tolerances_answers_is_judged_by_these() -> None:
+    """A direction that is off by less than the tolerance is right, and one by more is wrong."""
+    def turned(angle: float) -> int:
+        def solve(pairs: Pairs) -> Contacts:
+            found = pairs.contacts()
+            across = np.cross(found.normal, [0.6, 0.0, 0.8])
+            across /= np.linalg.norm(across, axis=1, keepdims=True)
+            found.normal[:] = np.cos(angle) * found.normal + np.sin(angle) * across
+            return found
+        return stability.examine('engine', 'c1_depths', CASES['c1_depths'], solve,
+                                 tolerance=stability.TOLERANT).normals
+
+    assert turned(1e-8) == 0 < turned(0.01)
+
+
+def test_an_engine_answers_by_its_deepest_point() -> None:
+    """Of two cubes that overlap by .1, FCL's depth and direction are those of `exact`."""
+    engines, _ = installed(('fcl',))
+    if not engines:
+        pytest.skip('FCL is not installed')
+    pairs = Pairs(*(np.array([row], float) for row in (
+        (0, 0, 0, 0, 0, 0, 1), (0.2, 0.1, 0.9, 0, 0, 0, 1), (1, 1, 1), (1, 1, 1))))
+    found = stability.answers_of(engines[0])(pairs)
+    assert found.colliding[0] and found.separation[0] == pytest.approx(-0.1)
+    assert found.normal[0] == pytest.approx([0, 0, 1])
+    assert np.isnan(found.volume).all()
+
+
 def test_planted_errors_are_seen() -> None:
     assert planted('depth').depth > 1e-6
     assert planted('volume').volume > 0.09 > 1e-6 > planted('depth').volume
@@ -64,9 +93,12 @@ def test_the_program(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     with (tmp_path / 'stability.csv').open() as file:
         rows = list(csv.DictReader(file))
     families = list(CASES)[::stability.QUICK]
+    models = list(dict.fromkeys(row['model'] for row in rows))
+    assert models[:3] == list(stability.MODELS) and stability.ENGINES[0] in models[3:]
     assert [(row['model'], row['family']) for row in rows] == [
-        (model, family) for model in stability.MODELS for family in families]
-    assert int(rows[-1]['normals']) > 0 and int(rows[0]['normals']) == 0
+        (model, family) for model in models for family in families]
+    soup = [row for row in rows if row['model'] == stability.MODELS[2]]
+    assert int(soup[-1]['normals']) > 0 and int(rows[0]['normals']) == 0
     assert 'every verdict and normal is right' in (tmp_path / 'stability.md').read_text()
     assert '| `exact` |' in capsys.readouterr().out
 
@@ -75,7 +107,7 @@ def test_the_committed_report_is_complete_and_true() -> None:
     """All families of all models are there, without faults; the core's own rows are made anew."""
     with (ROOT / 'docs' / 'results' / 'stability.csv').open() as file:
         rows = list(csv.DictReader(file))
-    for model in stability.MODELS:
+    for model in (*stability.MODELS, *stability.ENGINES):
         assert [row['family'] for row in rows if row['model'] == model] == list(CASES)
     assert not [row for row in rows if row['model'] in stability.GATED
                 for fault in stability.FAULTS
