@@ -127,6 +127,14 @@ def test_heavy_on_light_comes_to_rest_by_late_answers(timing: Timing, rest: floa
     assert run(partial(ratio, 100.0), timing).rest < rest
 
 
+@pytest.mark.parametrize('make, seconds', [(partial(landed_pallet, ORDERS[-1]), 4.7),
+                                           (card_house, 5.1)])
+def test_rubble_comes_to_rest_by_late_answers(make: Callable[[], Scene], seconds: float) -> None:
+    """What fell at 50 Hz and 5 ms late: a patch does not move its friction from answer to answer."""
+    outcome = run(make, TIMINGS[6])
+    assert outcome.turned > 45.0 and outcome.rest < seconds
+
+
 def test_a_tower_on_a_turntable_does_not_sway() -> None:
     """Three cubes 2 m from the axis, in steps of 4 ms."""
     scene = replace(turntable(), seconds=4.0)

@@ -245,7 +245,7 @@ template <class T>
 BC_INLINE void follow_pressure(const SubSteps& steps, Rows<T>& block) {
   const RectangleOf<T>& shape = block.shape;
   const Vec<T>& pressed = block.normal_impulses;
-  T before = splat<T>(max<double>(0.0, 1.0 - steps.length / pressure_time)) * block.pressure;
+  T before = splat<T>(max<double>(0.0, 1.0 - steps.length / steps.pressure_span())) * block.pressure;
   block.pressure = before + pressed[0];
   Vec<T> moment = before * (block.pressure_arm - block.arm_a) +
                   (pressed[1] * shape.axis_2 - pressed[2] * shape.axis_1);

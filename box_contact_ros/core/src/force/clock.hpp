@@ -54,6 +54,10 @@ struct SubSteps {
   // constant over the sub-steps moves a body by v·dt + a·dt²·(count + 1) / (2·count). Poses that are later by
   // this go on by semi-implicit Euler, under which springs keep their energy.
   double ahead() const { return 0.5 * dt * (count - 1) / count; }
+  // In which time friction's centre follows what presses [s].
+  double pressure_span() const {
+    return std::max(pressure_time, is_late ? pressure_periods * period : 0.0);
+  }
   // Which share of the impulses of a window `before` is given again at first, and which stays in this
   // one [1].
   template <class T>

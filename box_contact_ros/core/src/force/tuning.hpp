@@ -54,6 +54,8 @@ constexpr double least_over_relaxed = 1e-6;
 
 // Friction acts at the mean centre of what pressed in this time [s]: in piles that of one sub-step shakes.
 constexpr double pressure_time = 0.05;
+// With late answers it is so many periods [1], as what one answer finds pressed shakes rubble.
+constexpr double pressure_periods = 30.0;
 
 // --- impacts ---
 // An impact goes on while an iteration changes a closing speed by more than this [m/s], and at most so often.
