@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 TIMED_SETS = {**SETS, 'just apart': apart, 'landings': landings, 'settled': settled.at_rest,
-              'settled cubes': settled.cubes_at_rest}
+              'settled cubes': settled.cubes_at_rest, 'as placed': settled.as_placed}
 IN_SHORT = ('exact', 'mlp', 'paper', 'paper-at-rest', 'soup-1', 'soup-8', 'soup-22')
 """Models in the short table; other sizes of `mlp` are in that of `traded`."""
 QUICK_MODELS = ('exact', 'mlp', 'paper', 'soup-1', 'soup-8')
@@ -189,7 +189,7 @@ def write_page(folder: Path, args: Sequence[str] | None, rows: Sequence[Frontier
         ) or 'None.',
         traded=traded(rows),
         paper=by['paper', 'random cubes'].errors.points['all'].p50,
-        verdict=VERDICT, few_pairs=FEW_PAIRS, timed_pairs=plan.timed_pairs,
+        verdict=VERDICT, shallow=settled.SHALLOW, few_pairs=FEW_PAIRS, timed_pairs=plan.timed_pairs,
         calls=calls_table(engines))
 
 

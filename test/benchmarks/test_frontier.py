@@ -13,7 +13,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from benchmarks import frontier, trials
+from benchmarks import frontier, settled, trials
 from benchmarks.contestant import APART, Contestant, Manifold, chosen, ours
 from benchmarks.engines import installed
 from benchmarks.output import read_csv, write_csv
@@ -37,6 +37,19 @@ def containers() -> Pairs:
 def answers(pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     found = pairs.contacts()
     return found.colliding.copy(), found.normal.copy(), found.point.copy()
+
+
+def test_goods_at_rest_overlap_and_the_others_stand_apart() -> None:
+    """Beyond a billionth of the size, as a simulator settled them; together, all that touch."""
+    rest, others = settled.measured()
+    assert (-rest.contacts().separation > 1e-9 * rest.size).all()
+    touching = settled.touching(learnt=False)
+    assert len(rest.size) > 2000 and len(rest.size) + len(others.size) == len(touching.size)
+    placed = others.contacts().separation <= -1e-9 * others.size
+    assert len(others.size) > 500 and placed.mean() < 0.2
+    for make, pairs in ((settled.at_rest, rest), (settled.as_placed, others)):
+        drawn = make(np.random.default_rng(1), 100)
+        assert len(drawn.size) == 100 and set(drawn.pose_a[:, 0]) <= set(pairs.pose_a[:, 0])
 
 
 # --- planted errors -------------------------------------------------------------------------------
@@ -240,7 +253,8 @@ def test_quick_run(tmp_path: Path) -> None:
     core = [row for row in rows if row['contestant'] in ('exact', 'mlp')]
     for row in core:
         assert (row['missed'], row['invented']) == ('0', '0')
-        assert row['set'] in ('just apart', 'touching') or float(row['normal_worst']) == 0.0
+        assert row['set'] in ('just apart', 'touching', 'as placed') or (
+            float(row['normal_worst']) == 0.0)
         assert 0.0 < float(row['call_p50']) <= float(row['call_p99']) <= float(row['call_max'])
         assert float(row['batch_p50']) > 0.0
     assert all(float(row['point_worst']) == 0.0 for row in core
