@@ -1,10 +1,11 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Fill the tables of the README and of docs/ with the figures of docs/results/*.csv.
+"""Fill the README and docs/ with the figures of docs/results/*.csv.
 
 `python docs/tables.py` rewrites each page that has a table between `<!-- table NAME -->` and
-`<!-- end of table -->`, and the sentence of the C++ header that says how far `mlp` is off.
+`<!-- end of table -->` or, in a sentence, a figure between `<!--figure:NAME-->` and `<!--end-->`,
+and the sentence of the C++ header that says how far `mlp` is off.
 `--check` only reports pages whose figures are not those of the CSV files.
 """
 from __future__ import annotations
@@ -21,11 +22,13 @@ from typing import NamedTuple
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.append(str(ROOT))  # where benchmarks/ is, which is not installed
 
+from benchmarks import stacks_picture  # noqa: E402
 from benchmarks.output import markdown_table, number, read_csv  # noqa: E402
 
 RESULTS = ROOT / 'docs' / 'results'
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').rglob('*.md'))]
 BLOCK = re.compile(r'(<!-- table ([\w-]+) -->\n).*?(<!-- end of table -->)', re.DOTALL)
+FIGURE = re.compile(r'(<!--figure:([\w-]+)-->).*?(<!--end-->)', re.DOTALL)
 HEADER = ROOT / 'box_contact_ros' / 'core' / 'include' / 'box_contact' / 'box_contact.hpp'
 PROMISE = re.compile(r'// In 99 of 100 contacts.*?(?=\n//\n)', re.DOTALL)
 """What the header says of the errors of `mlp`."""
@@ -53,6 +56,7 @@ CHOICES = (
 """This package's models, the network of the source paper, and the engines."""
 SHOWN = {'avx512': 'AVX-512', 'avx2': 'AVX2'}
 """Instruction sets as native.csv and frontier.csv call them, the README's first."""
+LATE = '1 ms, 50 Hz, 5 ms late'  # way of stacks.csv
 AT_REST, SWAY = 'settled by PatchForces', 'containers'  # sets of native.csv
 RATIOS = re.compile(r'^quiet: (contact / echo .*)$', re.MULTILINE)
 """What the bench prints first."""
@@ -203,11 +207,48 @@ def mlp_promise() -> str:
         'covariance.', 94, initial_indent='// ', subsequent_indent='// ')
 
 
+def unsettled(way: str) -> int:
+    """Return how many scenes of stacks.csv never rest, or fall, by a timing."""
+    best = {row['scene']: row for row in rows('stacks.csv', way='1 ms, each step')}
+    return sum(not stacks_picture.cell(row, best[row['scene']])[0].endswith(' s')
+               for row in rows('stacks.csv', way=way))
+
+
+def placed() -> str:
+    """Return the time of a batch of `mlp` on goods as placed, divided by that of `exact`."""
+    ratios = sorted(float(row['by_exact']) for row in rows('native.csv', set='as placed')
+                    if row['contestant'] in ('mlp volume, batch', 'mlp covariance, batch'))
+    return f'{ratios[0]:.2g} to {ratios[-1]:.2g}'
+
+
+def worst_point(file: str, column: str, **wanted: str) -> str:
+    """Return the largest error of the point of `mlp` in a column [%]."""
+    worst = max(rows(file, **wanted), key=lambda row: float(row[column]))
+    return cell(worst, column, digits=2)
+
+
+def reading() -> str:
+    """Return the time to read a box of the largest scene file [ms]."""
+    row = max(rows('scenes.csv', scene=''), key=lambda row: int(row['boxes']))
+    return number(1e3 * float(row['reading']) / int(row['boxes']), 1)
+
+
 TABLES = {'models': models, 'bench': bench, 'mlp-errors': mlp_errors}
+FIGURES = {
+    'late': lambda: f'{unsettled(LATE)} of {len(rows("stacks.csv", way=LATE))}',
+    'late-own': lambda: str(unsettled(f'{LATE}, 5 % lost, own contacts')),
+    'mlp-placed': placed,
+    'mlp-settled': lambda: worst_point('accuracy.csv', 'worst', model='mlp', set='settled',
+                                       part='all', quantity='point'),
+    'mlp-needles': lambda: worst_point('stability.csv', 'point_worst', model='mlp'),
+    'mlp-step': lambda: worst_point('searched.csv', 'step', quantity='point'),
+    'reading': reading,
+}
 
 
 def filled(text: str) -> str:
-    """Return a page with its tables made from the CSV files."""
+    """Return a page with its tables and figures made from the CSV files."""
+    text = FIGURE.sub(lambda found: f'{found[1]}{FIGURES[found[2]]()}{found[3]}', text)
     return BLOCK.sub(lambda found: f'{found[1]}\n{TABLES[found[2]]()}\n\n{found[3]}', text)
 
 

@@ -220,18 +220,24 @@ def plot(path: Path, table: Path) -> None:
     """Draw, from the CSV, the error of each network that converged over its size."""
     rows = [row for row in read_csv(table) if row['error'] and float(row['error']) < SHOWN]
     names = list(dict.fromkeys(row['search'] for row in rows))
-    figure, panels = subplots(1, len(names), (3.3 * len(names), 3.3), sharey=True)
+    figure, panels = subplots(1, len(names), (3.3 * len(names), 3.6), sharey=True)
+    above = []  # errors of the settings in use, divided by the least ones
     for panel, name in zip(panels[0], names):
         of_search = [row for row in rows if row['search'] == name]
+        shipped = next(row for row in of_search if row['shipped'] == 'True')
+        above.append(float(shipped['error']) / min(
+            float(row['error']) for row in of_search if row['rungs'] == shipped['rungs']))
         for rungs in sorted({row['rungs'] for row in of_search}):
             _scatter(panel, [row for row in of_search if row['rungs'] == rungs], s=5, linewidths=0,
                      color=f'C{rungs}', label=f'left in round {rungs}')
-        _scatter(panel, [row for row in of_search if row['shipped'] == 'True'], s=110, marker='*',
-                 color='black', label='in use')
+        _scatter(panel, [shipped], s=110, marker='*', color='black', label='in use')
         panel.set(title=name.replace('signs +++', 'roll, pitch, yaw > 0'),
                   xlabel='multiply-adds of the network')
     panels[0, 0].set_ylabel('RMSE over the angles [rad]')
     panels[0, 0].legend(fontsize=8, loc='upper right')
+    figure.suptitle('The error of the settings in use is at most '
+                    f'{100.0 * (max(above) - 1.0):.1f} % above that of the best network',
+                    fontsize=11)
     figure.savefig(path, metadata={'Software': None})
 
 

@@ -97,7 +97,7 @@ def main(args: Sequence[str] | None = None) -> int:
     print(f'\n{results}', flush=True)
     if options.out and not (void or stopped):
         picture = options.out.with_suffix('.png')
-        draw(picture, logs[options.beside[0]], block=bench.block)
+        draw(picture, logs[options.beside[0]], model=options.model, block=bench.block)
         options.out.write_text(
             f'# Bench of `{options.model}`\n\n![Latencies of each node]({picture.name})\n\n'
             f'{about}\n\n{results}\n', 'utf-8')

@@ -149,10 +149,10 @@ def _cell(value: object) -> str:
     return '' if math.isnan(value) else f'{value:.3g}'
 
 
-def draw(path: Path, logs: Sequence[AnswerLog], *, block: int) -> None:
+def draw(path: Path, logs: Sequence[AnswerLog], *, model: str, block: int) -> None:
     """Write a PNG, 700 pixels wide: how long each node took to answer. Needs matplotlib.
 
-    block: pairs per block, as of `ratio`.
+    model: of the contact node. block: pairs per block, as of `ratio`.
     """
     from matplotlib.figure import Figure  # only here: an extra
     from matplotlib.ticker import LogLocator
@@ -178,7 +178,8 @@ def draw(path: Path, logs: Sequence[AnswerLog], *, block: int) -> None:
     for node, other in COMPARED:  # the title is the first that ran
         if node in log_of and other in log_of:
             times_as_long = ratio(log_of[node], log_of[other], block=block)[0]
-            figure.suptitle(f'The {node} node takes {times_as_long:.2f} times as long as the '
-                            f'{other} node\n(median of the ratios of blocks in turn)')
+            figure.suptitle(
+                f'With model {model}, the {node} node takes {times_as_long:.2f} times as long as '
+                f'the {other} node\n(median of the ratios of blocks in turn)', fontsize=11)
             break
     figure.savefig(path)

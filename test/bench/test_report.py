@@ -149,7 +149,7 @@ def test_the_picture_is_as_wide_as_a_page(tmp_path):
     dead = AnswerLog('soup', exact())
     heights = []
     for logs in ([played('echo'), played()], [played('echo'), played(delay=3 * MS), dead]):
-        draw(tmp_path / 'bench.png', logs, block=BLOCK)
+        draw(tmp_path / 'bench.png', logs, model='exact', block=BLOCK)
         height, width, _ = image.imread(tmp_path / 'bench.png').shape
         assert width == 700
         heights.append(height)

@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import rclpy
 import yaml
 from conftest import PROGRAMS
 from geometry_msgs.msg import PoseStamped
@@ -314,7 +315,7 @@ def test_the_pages_are_short():
 # --- the rest of the pages ------------------------------------------------------------------------
 
 def examples() -> Iterator[object]:
-    """Yield the Python blocks with the lines that they print.
+    """Yield the Python blocks with the lines that they print, and the page's nodes above them.
 
     A block of text right below says them, or the comments behind the prints.
     """
@@ -326,15 +327,18 @@ def examples() -> Iterator[object]:
                                  re.MULTILINE | re.DOTALL)
                 lines = (shown[1].splitlines() if shown else
                          re.findall(r'^print\(.*\)  # (.*)$', found[2], re.MULTILINE))
-                yield pytest.param(found[2], lines, id=f'{page.name}-{number}')
+                nodes = re.findall(r'^box_contact_contact_node(.*)$', text[:found.start()], re.M)
+                yield pytest.param(found[2], lines, nodes, id=f'{page.name}-{number}')
 
 
-@pytest.mark.parametrize(('text', 'lines'), list(examples()))
-def test_python_example(text, lines, program, tmp_path, monkeypatch):
-    """It runs, next to a node if a client, and prints what the page says."""
+@pytest.mark.parametrize(('text', 'lines', 'nodes'), list(examples()))
+def test_python_example(text, lines, nodes, program, tmp_path, monkeypatch, request):
+    """It runs, a client next to the node that its page starts last, and prints what it says."""
     monkeypatch.chdir(tmp_path)  # some write files
     if 'rclpy' in text:
-        program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready')
+        request.addfinalizer(rclpy.try_shutdown)  # some leave it to the end of their process
+        arguments = shlex.split(nodes[-1]) if nodes else []
+        program('contact_node', *arguments).wait_for_output('ready')
     with contextlib.redirect_stdout(io.StringIO()) as printed:
         exec(compile(text, 'example', 'exec'), {'__name__': 'example'})
     assert printed.getvalue().splitlines() == lines

@@ -25,7 +25,7 @@ constexpr double most_again = 2.0;
 // --- pushing out ---
 // Angular frequency of a soft constraint times the window [1]: a box rests 0.4·g·window² deep.
 constexpr double soft_frequency = 1.57;
-// Its damping ratio [1]: an overlap shrinks by a ninth a step.
+// Its damping ratio [1]: an overlap shrinks by an eighth a sub-step.
 constexpr double soft_damping_ratio = 5.0;
 // The same where answers are late, or a patch has a stiffness of its own.
 constexpr double slow_damping_ratio = 2.0;
