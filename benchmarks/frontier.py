@@ -129,7 +129,7 @@ def odd_answers(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> I
             worst = max(mine, key=lambda row: oddness(row, what))
             amount = oddness(worst, what)
             if amount > (ODD_NORMAL if what == 'normal' else 0.0):
-                by_cause.setdefault(engine.causes.get(what, 'Cause unknown.'), []).append(
+                by_cause.setdefault(engine.causes.get(what) or 'Cause unknown.', []).append(
                     f'{engine.name}, {worst.set}: {what} {amount:.3g}'
                     f'{"°" if what == "normal" else ""}')
     for cause, found in by_cause.items():
@@ -189,7 +189,7 @@ def write_page(folder: Path, args: Sequence[str] | None, rows: Sequence[Frontier
         ) or 'None.',
         traded=traded(rows),
         paper=by['paper', 'random cubes'].errors.points['all'].p50,
-        verdict=VERDICT, shallow=settled.SHALLOW, few_pairs=FEW_PAIRS, timed_pairs=plan.timed_pairs,
+        verdict=VERDICT, few_pairs=FEW_PAIRS, timed_pairs=plan.timed_pairs,
         calls=calls_table(engines))
 
 
