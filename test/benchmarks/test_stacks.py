@@ -130,7 +130,7 @@ def test_heavy_on_light_comes_to_rest_by_late_answers(timing: Timing, rest: floa
 @pytest.mark.parametrize('make, seconds', [(partial(landed_pallet, ORDERS[-1]), 4.7),
                                            (card_house, 5.1)])
 def test_rubble_comes_to_rest_by_late_answers(make: Callable[[], Scene], seconds: float) -> None:
-    """What fell at 50 Hz and 5 ms late: a patch does not move its friction from answer to answer."""
+    """What fell at 50 Hz and 5 ms late: friction does not move from answer to answer."""
     outcome = run(make, TIMINGS[6])
     assert outcome.turned > 45.0 and outcome.rest < seconds
 
