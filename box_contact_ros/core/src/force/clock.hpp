@@ -56,7 +56,8 @@ struct SubSteps {
   double ahead() const { return 0.5 * dt * (count - 1) / count; }
   // In which time friction's centre follows what presses [s].
   double pressure_span() const {
-    return std::max(pressure_time, is_late ? pressure_periods * period : 0.0);
+    double late = is_late ? pressure_periods * period : 0.0;
+    return late > pressure_time ? late : pressure_time;
   }
   // Which share of the impulses of a window `before` is given again at first, and which stays in this
   // one [1].
