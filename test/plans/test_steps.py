@@ -217,14 +217,14 @@ def test_what_stands_takes_little_more_at_each_step(make, weighed, monkeypatch):
     """Of 1,000 boxes no group is solved; a loop would take 500 times the time."""
     plan = make(10)
     plan = plan if weighed else replace(plan, masses=None)
-    taken = {}
+    taken = {True: [], False: []}
     monkeypatch.setattr(steps._Loading, '_solve', None)  # a call would fail
-    for order in (None, plan.order) * 2:
+    for order in (None, plan.order) * 4:
         started = time.process_time()
         found = inspect_plan(replace(plan, order=order))
-        taken[order is None] = time.process_time() - started
+        taken[order is None].append(time.process_time() - started)
         assert found.sound
-    assert taken[False] < MOST_TIMES * taken[True]
+    assert min(taken[False]) < MOST_TIMES * min(taken[True])  # others use the caches, too
 
 
 def test_steps_that_take_too_much_are_not_judged(monkeypatch):
