@@ -129,7 +129,7 @@ def by_exact(contestant: str, of_set: str, what: str) -> str:
     """Return the time of a call, or of a pair of a batch, divided by that of `exact`."""
     row = fastest(rows('frontier.csv', contestant=contestant, set=of_set, **{'class': 'all'}))
     assert row
-    return cell(row, f'{what}_by_exact', digits=2)
+    return f'{float(row[f"{what}_by_exact"]):.2f}'
 
 
 def with_version(name: str, row: Row) -> str:
