@@ -45,8 +45,8 @@ def test_goods_at_rest_overlap_and_the_others_stand_apart() -> None:
     assert (-rest.contacts().separation > 1e-9 * rest.size).all()
     touching = settled.touching(learnt=False)
     assert len(rest.size) > 2000 and len(rest.size) + len(others.size) == len(touching.size)
-    placed = others.contacts().separation <= -1e-9 * others.size
-    assert len(others.size) > 500 and placed.mean() < 0.2
+    assert len(others.size) > 500
+    assert (-others.contacts().separation <= 1e-9 * others.size).all()
     for make, pairs in ((settled.at_rest, rest), (settled.as_placed, others)):
         drawn = make(np.random.default_rng(1), 100)
         assert len(drawn.size) == 100 and set(drawn.pose_a[:, 0]) <= set(pairs.pose_a[:, 0])
