@@ -146,23 +146,29 @@ def in_short(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> str:
                     if (row.name, row.instruction_set) == (name, instruction_set)}
             if 'containers' not in mine:
                 continue
-            shown, rest = mine['containers'], mine.get('settled')
+            shown = mine['containers']
             normals = [row.errors.normal[1] for row in mine.values()
                        if not math.isnan(row.errors.normal[1])]
             lines.append([
                 f'`{name}`, {instruction_set}' if name in CORE_MODELS else name,
                 f'{number(shown.single[0] / 1e3)}, {number(shown.single[1] / 1e3)}',
                 number(shown.batch), shown.best if name in rivals else '–',
-                *[number(row.choices[shown.best].points['all'].p99)
-                  if row and row.choices[shown.best].points else '–' for row in (shown, rest)],
+                *[_off(mine.get(of_set), shown.best)
+                  for of_set in ('containers', 'settled', 'as placed')],
                 number(max(normals, default=math.nan)),
                 f'{sum(row.errors.missed for row in mine.values())} of '
                 f'{sum(row.judged for row in mine.values()):,}',
                 sum(row.errors.invented for row in mine.values())])
     return markdown_table(
         ['', 'single call, p50, p99 [µs]', 'batch [ns per pair]', 'best point',
-         'point error p99, containers [%]', 'settled [%]', 'normal, worst [°]', 'missed',
-         'invented'], lines)
+         'point error p99, answered: containers [%]', 'settled [%]', 'as placed [%]',
+         'normal, worst [°]', 'missed', 'invented'], lines)
+
+
+def _off(row: FrontierRow | None, point: str) -> str:
+    """Return the p99 error of a point, and the share of pairs that have one, as all should [%]."""
+    found = row.choices[point].points.get('all') if row else None
+    return f'{number(found.p99)}, {number(100.0 * found.pairs / row.judged)}' if found else '–'
 
 
 def calls_table(engines: Iterable[Contestant]) -> str:
