@@ -233,8 +233,7 @@ def main(args: Sequence[str] | None = None) -> int:
         return 1
     output.write_csv(folder / 'accuracy.csv', csv_rows(rows), about=output.machine())
     output.write_page(folder, 'accuracy', args, machine=output.machine(), seed=options.seed,
-                      error_table=error_table(rows),
-                      point_classes=class_table(rows))
+                      error_table=error_table(rows), point_classes=class_table(rows))
     draw(folder / 'accuracy.png', folder / 'accuracy.csv')
     print(error_table(rows), class_table(rows), sep='\n\n')
     return 0

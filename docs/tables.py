@@ -248,7 +248,8 @@ FIGURES = {
     'mlp-placed': placed,
     'mlp-settled': lambda: worst_point('accuracy.csv', 'worst', model='mlp', set='settled',
                                        part='all', quantity='point'),
-    'mlp-needles': lambda: worst_point('stability.csv', 'point_worst', model='mlp'),
+    'mlp-needles': lambda: worst_point('stability.csv', 'point_worst', model='mlp',
+                                       family='e5_needles'),
     'mlp-step': lambda: worst_point('searched.csv', 'step', quantity='point'),
     'reading': reading,
 }

@@ -85,11 +85,11 @@ def claim(domain: int) -> bool:
         for number in {7410 + 250 * domain, *left.values()}:
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as port:
                 port.bind(('', number))
-    except OSError:
+        for path in left:
+            path.unlink(missing_ok=True)
+    except OSError:  # also of files that are another user's
         name.close()
         return False
-    for path in left:
-        path.unlink(missing_ok=True)
     _claims.append(name.detach())
     return True
 
