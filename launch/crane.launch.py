@@ -27,6 +27,7 @@ from box_contact_ros.extras import require
 ARGUMENTS = {
     'rate': ('200.0', 'pairs of poses published per second [Hz]'),
     'lockstep': ('false', 'no real time: every tick waits for its answer'),
+    'judge_force': ('false', 'the force must equal the weight, as by model exact'),
     'soup': ('false', 'whether a soup node answers the same poses under soup/'),
     'view': ('false', 'whether boxes and contacts are shown in the browser'),
     'namespace': ('', 'namespace of all nodes and topics'),
@@ -40,7 +41,7 @@ def generate_launch_description() -> LaunchDescription:
                     namespace=LaunchConfiguration('namespace'), **options)
 
     values = {name: ParameterValue(LaunchConfiguration(name), value_type=kind)
-              for name, kind in (('rate', float), ('lockstep', bool))}
+              for name, kind in (('rate', float), ('lockstep', bool), ('judge_force', bool))}
     return LaunchDescription([
         *(DeclareLaunchArgument(name, default_value=default, description=description)
           for name, (default, description) in ARGUMENTS.items()),

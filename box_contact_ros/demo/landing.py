@@ -134,6 +134,8 @@ class Landing:
     static_tilt: float = math.nan  # mean over the window [rad]
     depth: float = math.nan  # largest ever, as a share of the load's height
     gap: float = math.nan  # largest after the first touch [m]
+    force_limit: float = FORCE_LIMIT
+    """Limit of `force_worst`; infinite for models whose force need not equal the weight."""
 
     @property
     def limits(self) -> dict[str, tuple[bool, str]]:
@@ -149,8 +151,10 @@ class Landing:
                              f'{1e3 * self.corner_speed:.3g} mm/s at most '
                              f'(limit {1e3 * CORNER_SPEED_LIMIT:g})'),
             'ropes slack': (self.rope_tension == 0.0, f'{self.rope_tension:.3g} N at most'),
-            'force': (self.force_worst <= FORCE_LIMIT,
-                      f'{self.force_worst:.1g} of the weight off it (limit {FORCE_LIMIT:g})'),
+            'force': (self.force_worst <= self.force_limit,
+                      f'{self.force_worst:.1g} of the weight off it '
+                      + (f'(limit {self.force_limit:g})' if math.isfinite(self.force_limit)
+                         else '(not judged)')),
             'static tilt': (self.static_tilt <= TILT_LIMIT,
                             f'{math.degrees(self.static_tilt):.2g} deg '
                             f'(limit {math.degrees(TILT_LIMIT):g})'),
@@ -161,18 +165,14 @@ class Landing:
         }
 
     @property
-    def at_rest(self) -> bool:
-        """Return whether all limits are met."""
-        return all(met for met, _ in self.limits.values())
+    def missed(self) -> list[str]:
+        """Return the names of the limits that are not met."""
+        return [name for name, (met, _) in self.limits.items() if not met]
 
     @property
-    def carried(self) -> bool:
-        """Return whether the stack carries the load, still for good, though perhaps not flat.
-
-        A load that overhangs a lot cannot lie flat on an elastic stack.
-        """
-        return not math.isnan(self.settled) and all(
-            self.limits[name][0] for name in ('ropes slack', 'depth', 'gap'))
+    def at_rest(self) -> bool:
+        """Return whether all limits are met."""
+        return not self.missed
 
     def __str__(self) -> str:
         """Return a line for each figure, with its limit."""

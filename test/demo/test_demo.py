@@ -96,11 +96,13 @@ def test_its_status_is_that_of_the_crane(status, programs, capfd):
     assert ('Next: ' in capfd.readouterr().out) is (status == 0)
 
 
-@pytest.mark.parametrize(('arguments', 'waits'), [([], True), (['--real-time'], False)])
-def test_time_waits_for_answers_unless_it_is_told_not_to(arguments, waits, programs, capfd):
+@pytest.mark.parametrize(('arguments', 'waits', 'judges'), [
+    ([], True, True), (['--real-time'], False, True), (['--model', 'mlp'], True, False)])
+def test_the_crane_waits_and_judges_as_it_is_told(arguments, waits, judges, programs, capfd):
+    """Time waits unless it is real; the force must equal the weight by model exact alone."""
     programs['demo.crane_node'] = 'print(values)'
     assert demo.main(arguments) == 0
-    assert str({'lockstep': waits, 'paced': waits}) in capfd.readouterr().out
+    assert str({'lockstep': waits, 'paced': waits, 'judge_force': judges}) in capfd.readouterr().out
 
 
 def test_a_view_that_is_ended_as_a_landing_ends_names_nothing_next(programs, monkeypatch, capfd):
