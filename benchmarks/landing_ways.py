@@ -3,7 +3,8 @@
 
 """Which landings are run, what is measured of each, and by which ways of contact and force.
 
-This package's models give patches, whose forces are those of `PatchForces`. MuJoCo's own manifold
+This package's models give patches, whose forces are those of `PatchForces`. `paper` and `soup-8`
+give a point alone, and the whole load stands for its patch, as in the demo. MuJoCo's own manifold
 is the reference to reach: forces of several points, implicit, within the simulator, at every
 physics step.
 
@@ -27,8 +28,10 @@ from box_contact_ros.demo.landing import (
     ClosedLoop,
     Landing,
     LandingRecord,
+    with_patch,
 )
 from box_contact_ros.forces.patch_forces import FRICTION
+from box_contact_ros.models.make_model import make_model
 from box_contact_ros.scene.scene import CONTAINER
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix
@@ -40,7 +43,7 @@ WATCHED, WINDOW = 15.0, 5.0
 
 def solvers(scenario: CraneScenario, model: str) -> list[ContactSolver]:
     """Return a solver of that model for each box of the stack."""
-    return [ContactSolver(scenario.size, size, model=model)
+    return [ContactSolver(scenario.size, size, model=make_model(model))
             for _, size in scenario.stack_boxes.values()]
 
 
@@ -53,8 +56,10 @@ def land(scenario: CraneScenario, solvers: Sequence[ContactSolver], *, rate_hz: 
     loop = ClosedLoop(scenario, rate_hz, watched=WATCHED, window=WINDOW)
     while not loop.record.ended:
         state = loop.ask()
-        loop.answer(state, {name: solver(state.pose, pose) for (name, (pose, _)), solver in zip(
-            scenario.stack_boxes.items(), solvers)}, latency=latency)
+        loop.answer(state, {
+            name: with_patch(solver(state.pose, pose), state.pose, scenario.size)
+            for (name, (pose, _)), solver in zip(scenario.stack_boxes.items(), solvers)},
+            latency=latency)
         loop.step()
     return loop.record
 
@@ -295,6 +300,13 @@ class Way(NamedTuple):
     every: int = 1
     """One of so many landings of the grid is run. Prime to three: every third landing has the same
     overhang."""
+    size: tuple[float, float, float] | None = None
+    """Full extents [m] of the only boxes that the model has weights for; None: it takes any."""
+
+    def lands(self, scenario: CraneScenario) -> bool:
+        """Return whether the model takes load and stack."""
+        sizes = {scenario.size, *(size for _, size in scenario.stack_boxes.values())}
+        return self.size is None or sizes == {self.size}
 
     def timings(self, timings: Sequence[LoopTiming]) -> list[LoopTiming]:
         """Return those at which it is run: all of a model, one of MuJoCo."""
@@ -337,5 +349,7 @@ def own_force(crane: Crane) -> np.ndarray:
 
 
 WAYS = {'exact': Way('exact', 'exact'), 'mlp': Way('mlp', 'mlp', every=5),
+        'paper': Way('paper', 'paper', every=5, size=CONTAINER),
+        'soup-8': Way('soup-8', 'soup-8', every=5),
         'manifold': Way("MuJoCo's manifold, in the simulator", None)}
 """By name: the ways that the table has."""

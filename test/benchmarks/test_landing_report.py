@@ -204,6 +204,23 @@ def test_each_way_has_its_timings():
     assert WAYS['manifold'].timings(timings) == timings[-1:]
 
 
+def test_what_a_model_has_no_weights_for_is_left_out_with_a_dash():
+    """The paper's network lands containers on containers; `exact` lands all."""
+    timing = LoopTiming(200.0, 0.002)
+    jobs = list(landing.landings(['exact', 'paper'], [timing], [*grid(), *ADDED]))
+    by_paper = [planned for way, _, planned in jobs if way == 'paper']
+    assert 0 < len(by_paper) < len(jobs) - len(by_paper) == len(grid()) + len(ADDED)
+    for planned in by_paper:
+        landing_ways.solvers(planned.scenario, 'paper')  # no refusal
+    refused = next(planned for planned in ADDED if planned not in by_paper)
+    with pytest.raises(ValueError, match='no weights for boxes'):
+        landing_ways.solvers(refused.scenario, 'paper')
+    row = landing.added_table([
+        landing.Outcome(way, timing, planned, RESTS) for way, _, planned in jobs
+        if planned in (refused, by_paper[-1])]).splitlines()[2]
+    assert row.endswith(' | – |  |') and '| 1/1 |' in row
+
+
 def falls(way: str, timing: LoopTiming, planned: PlannedLanding) -> landing.Outcome:
     """Stand for `landing.run`, as `stays` does."""
     return landing.Outcome(way, timing, planned, Landed(drop=0.2))
