@@ -111,6 +111,7 @@ reports:
 	for model in exact mlp paper; do
 	    run $(BENCH) --model $$model --beside quiet nice busy --out $(RESULTS)/bench_$$model.md
 	done
+	run $(BENCH) --rate 1000 --nodes echo floor contact --out $(RESULTS)/bench_1000_hz.md
 	if [ $(RESULTS) = docs/results ]; then
 	    for figures in docs/figures/make_*.py; do $(PY) $$figures || failed+=" $$figures"; done
 	    $(PY) docs/tables.py || failed+=' docs/tables.py'

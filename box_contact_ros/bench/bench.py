@@ -16,8 +16,8 @@ priority runs on each of the nodes' cores. With busy, a loop runs on each core o
 
 The first lines of the report say how many times as long a node takes as another one, with 95 %
 intervals. A table has latencies, and answers that are lost or differ from the exact contacts.
-With --out, they are a page, too, under a picture of the latencies in the first surroundings. A run
-that is void, or interrupted, writes none.
+With --out, they are a page, too, under a picture of the latencies in the first surroundings. The
+page of a void run has that in its title. An interrupted run writes none.
 
 The exit status is 0 only if contact and echo node lost nothing, no answer was wrong, and the run is
 not void. It is void if, in quiet surroundings, the bench itself was late by more than a period in
@@ -95,11 +95,12 @@ def main(args: Sequence[str] | None = None) -> int:
     stopped = 'interrupted: figures are of what was sent before' if signals else ''
     results = '\n\n'.join(filter(None, (void, compared, table(rows), *faults, stopped)))
     print(f'\n{results}', flush=True)
-    if options.out and not (void or stopped):
+    if options.out and not stopped:
         picture = options.out.with_suffix('.png')
         draw(picture, logs[options.beside[0]], model=options.model, block=bench.block)
         options.out.write_text(
-            f'# Bench of `{options.model}`\n\n![Latencies of each node]({picture.name})\n\n'
+            f'# Bench of `{options.model}` at {options.rate:g} Hz{", void" if void else ""}\n\n'
+            f'![Latencies of each node]({picture.name})\n\n'
             f'{about}\n\n{results}\n', 'utf-8')
     faulty = any(row['wrong'] or row['lost'] and row['node'] != 'soup' for row in rows)
     return 128 + signals[0] if signals else int(faulty or bool(faults) or bool(void))

@@ -23,7 +23,8 @@ DEPTH_TOLERANCE = 1e-9
 """Largest difference of a right depth from the exact one [m]; all models take it from the same
 separating-axis test. The depths of two ticks differ by a thousand times more."""
 RESAMPLES = 2000  # of the bootstrap
-LATE = 'bench late p99 [ms]'  # a column
+PERCENTILES = {'p50': 50, 'p99': 99}
+LATE = 'bench late p99 [ms]'  # the column by which a run is void
 COMPARED = (('contact', 'echo'), ('contact', 'floor'), ('soup', 'contact'))
 """Which nodes are compared, as far as they run."""
 COLOURS = {'echo': '0.6', 'floor': '0.4', 'contact': '#e6146e', 'soup': '#4678aa'}  # of the picture
@@ -89,9 +90,9 @@ def ratio(log: AnswerLog, baseline: AnswerLog, *, block: int) -> tuple[float, fl
 
 
 def comparison(logs: Sequence[AnswerLog], *, block: int) -> str:
-    """Return the ratios of nodes that are COMPARED: those of `ratio`, and that of the p99.
+    """Return the ratios of nodes that are COMPARED: those of `ratio`, and of p50 and p99.
 
-    Such as `contact / echo 1.18 [1.15, 1.22], p99 1.30`.
+    Such as `contact / echo 1.18 [1.15, 1.22], p50 1.19, p99 1.30`.
     """
     texts, log_of = [], {log.node: log for log in logs}
     for node, other in COMPARED:
@@ -99,9 +100,9 @@ def comparison(logs: Sequence[AnswerLog], *, block: int) -> str:
             continue
         log, before = log_of[node], log_of[other]
         middle, low, high = ratio(log, before, block=block)
-        tails = _percentile(log.latencies, 99) / _percentile(before.latencies, 99)
-        texts.append(f'{log.node} / {before.node} {middle:.2f} [{low:.2f}, {high:.2f}], '
-                     f'p99 {tails:.2f}')
+        texts.append(', '.join([f'{node} / {other} {middle:.2f} [{low:.2f}, {high:.2f}]', *(
+            f'{name} {_percentile(log.latencies, p) / _percentile(before.latencies, p):.2f}'
+            for name, p in PERCENTILES.items())]))
     return '; '.join(texts)
 
 
@@ -110,11 +111,18 @@ def figures(logs: Sequence[AnswerLog]) -> list[dict[str, Any]]:
     return [{
         'node': log.node, 'sent': np.count_nonzero(log.stamps), 'lost': int(log.lost.sum()),
         'wrong': int(log.wrong.sum()),
-        **{f'{name} [ms]': 1e3 * _percentile(log.latencies, percent)
-           for name, percent in (('p50', 50), ('p99', 99), ('max', 100))},
-        'point error [mm]': 1e3 * _percentile(
-            np.linalg.norm(log.points - log.truth.point, axis=1), 100),
-        LATE: 1e3 * _percentile(log.lateness, 99)} for log in logs]
+        **{f'{name} [ms]': 1e3 * _percentile(log.latencies, p) for name, p in PERCENTILES.items()},
+        'worst [ms]': _worst(1e3 * log.latencies),
+        'worst point error [mm]': _worst(
+            1e3 * np.linalg.norm(log.points - log.truth.point, axis=1)),
+        **{f'bench late {name} [ms]': 1e3 * _percentile(log.lateness, p)
+           for name, p in PERCENTILES.items()}} for log in logs]
+
+
+def _worst(values: np.ndarray) -> str:
+    """Return the largest of those values that are not NaN, and how many there are; '' of none."""
+    values = values[~np.isnan(values)]
+    return f'{values.max():.3g} of {len(values):,}' if len(values) else ''
 
 
 def _percentile(values: np.ndarray, percent: float) -> float:
@@ -167,8 +175,7 @@ def draw(path: Path, logs: Sequence[AnswerLog], *, model: str, block: int) -> No
         axis.set(xscale='log', yticks=[])
         axis.spines[['left', 'top', 'right']].set_visible(False)
         words = 'no answer' if not len(times) else '\n'.join(
-            f'{name} {_percentile(times, percent):.3g} ms'
-            for name, percent in (('median', 50), ('p99', 99)))
+            f'{name} {_percentile(times, p):.3g} ms' for name, p in PERCENTILES.items())
         axis.set_ylabel(f'{log.node}\n{words}', rotation=0, horizontalalignment='right',
                         verticalalignment='center')
     axes[-1].xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))

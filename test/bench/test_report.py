@@ -90,9 +90,11 @@ def test_percentiles_are_over_all_answers():
     log.received['normal'][90:] += 7 * MS
     log.points[3, 2] += 0.005
     row, = figures([log])
-    assert (row['p50 [ms]'], row['p99 [ms]'], row['max [ms]']) == pytest.approx((1.0, 8.0, 8.0))
+    assert (row['p50 [ms]'], row['p99 [ms]']) == pytest.approx((1.0, 8.0))
     assert (row['sent'], row['lost'], row['wrong']) == (PAIRS, 0, 0)
-    assert row['point error [mm]'] == pytest.approx(5.0)
+    assert (row['worst [ms]'], row['worst point error [mm]']) == ('8 of 100', '5 of 100')
+    log.received['normal'][3] = 0
+    assert figures([log])[0]['worst [ms]'] == '8 of 99'  # lost ones are no answers
 
 
 def test_ratios_are_paired_by_pose():
@@ -105,11 +107,12 @@ def test_ratios_are_paired_by_pose():
     soup = played('soup', delay=3 * MS)
     soup.received['normal'][:] = soup.stamps + 6 * MS * (1 + np.arange(PAIRS))
     assert comparison([echo, contact, soup], block=BLOCK) == (
-        'contact / echo 1.50 [1.50, 1.50], p99 1.50; soup / contact 2.00 [2.00, 2.00], p99 2.00')
+        'contact / echo 1.50 [1.50, 1.50], p50 1.50, p99 1.50; '
+        'soup / contact 2.00 [2.00, 2.00], p50 2.00, p99 2.00')
     floor = played('floor')
     floor.received['normal'][:] = floor.stamps + MS * (1 + np.arange(PAIRS))
     assert comparison([floor, contact], block=BLOCK) == (
-        'contact / floor 3.00 [3.00, 3.00], p99 3.00')
+        'contact / floor 3.00 [3.00, 3.00], p50 3.00, p99 3.00')
 
 
 def test_the_interval_of_a_ratio_spans_its_blocks():
@@ -140,7 +143,8 @@ def test_a_dead_node_has_a_report():
     assert (rows[1]['lost'], rows[1]['wrong']) == (PAIRS, 0)
     lines = table(rows).splitlines()
     assert len({len(line) for line in lines}) == 1 and 'nan' not in lines[3]
-    assert comparison(logs, block=BLOCK) == 'contact / echo nan [nan, nan], p99 nan'
+    assert comparison(logs, block=BLOCK) == (
+        'contact / echo nan [nan, nan], p50 nan, p99 nan')
 
 
 def test_the_picture_is_as_wide_as_a_page(tmp_path):

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 from itertools import product
 from pathlib import Path
 
@@ -120,6 +121,14 @@ def test_measured_figures_are_filled_in(page: Path) -> None:
 def test_a_typed_figure_is_found() -> None:
     text = '<!--figure:late-->16 of 54<!--end--> in `7 s`, [page](8.md): 1.2 ms, 3,000 or 45 %.'
     assert numbers_of(text) == {'1.2 ms', '3,000', '45 %'}
+
+
+def test_a_void_run_of_the_bench_is_shown_as_void(tmp_path: Path, monkeypatch) -> None:
+    bench = runpy.run_path(str(ROOT / 'docs' / 'tables.py'))['bench']
+    page = (ROOT / 'docs' / 'results' / 'bench_exact.md').read_text('utf-8')
+    (tmp_path / 'bench_exact.md').write_text(page.replace('\n\nquiet:', '\n\nvoid: late\n\nquiet:'))
+    monkeypatch.setitem(bench.__globals__, 'RESULTS', tmp_path)
+    assert bench().endswith(' is void: late.')
 
 
 def test_no_figure_begins_a_line() -> None:
