@@ -42,12 +42,14 @@ class Choice(NamedTuple):
     contestant: str  # of frontier.csv
     native: tuple[str, ...] = ()  # of native.csv, without `, single`; the second: with the patch
     rest: str = 'settled'  # set of goods at rest in frontier.csv
+    resting: str = ''  # the contestant of that set, if it is another
 
 
 CHOICES = (
     Choice('`exact`', 'exact', ('exact volume', 'exact covariance')),
     Choice('`mlp`', 'mlp', ('mlp volume', 'mlp covariance')),
-    Choice("the paper's network, cubes", 'paper', ('paper',), rest='settled cubes'),
+    Choice("the paper's networks; cubes at rest", 'paper', ('paper',), rest='settled cubes',
+           resting='paper-at-rest'),
     Choice('MuJoCo', 'MuJoCo mj_collision', ('mjc_BoxBox',)),
     Choice('PyBullet; in C Bullet', 'PyBullet getContactPoints', ('Bullet btBoxBoxDetector',)),
     Choice('Coal, patch', 'Coal ComputeCollision, contact patch', ('Coal ComputeContactPatch',)),
@@ -110,8 +112,8 @@ def error_rows(choice: Choice) -> list[Row]:
     """Return the rows of a contestant's point at rest and landing: of its ways, the nearest one."""
     if choice.contestant == 'exact':
         return []
-    at_rest, landing = (by_point(choice.contestant, of_set)
-                        for of_set in (choice.rest, 'landings'))
+    at_rest = by_point(choice.resting or choice.contestant, choice.rest)
+    landing = by_point(choice.contestant, 'landings')
     nearest = min(at_rest, key=lambda point: [sum(
         float(of_set[point][column]) for of_set in (at_rest, landing))
         for column in ('point_p99', 'point_p50')])
@@ -146,10 +148,11 @@ def models() -> str:
     """Return what each way to find the contact point costs, and how far it is off."""
     body, shares = [], []
     for choice in CHOICES:
-        call = fastest(rows('frontier.csv', contestant=choice.contestant, set=choice.rest,
-                            **{'class': 'all'}))
+        call = fastest(rows('frontier.csv', contestant=choice.resting or choice.contestant,
+                            set=choice.rest, **{'class': 'all'}))
         assert call
-        errors = [f'{float(row["point_p50"]):.2g}, {float(row["point_p99"]):.2g}'
+        errors = [', '.join(f'{float(f"{float(row[column]):.2g}"):g}'
+                            for column in ('point_p50', 'point_p99'))
                   for row in error_rows(choice)] or ['reference'] * 2
         shares.append(float(call['contacts']) / float(call['judged']))
         body.append([with_version(choice.name, call), cell(call, 'call_p50', 1e3),
@@ -166,8 +169,8 @@ def models() -> str:
             "in % of the smaller box's longest edge, for engines of 1,000 pairs. Of the ways to "
             'make one point of theirs, the nearest is taken. At rest: settled, deeper than 1e-9 of '
             f'the size; {100 * min(shares):.0f} % of them are answered. Moving: swaying '
-            'containers. PyBullet is asked at new poses, with five detections; its C is Bullet '
-            '3.24 for SSE2. A dash: not measured.\n\n'
+            "containers. The paper's networks are trained for each. PyBullet is asked at new "
+            'poses, with five detections; its C is Bullet 3.24 for SSE2. A dash: not measured.\n\n'
             f'`exact` is the default. In batches from Python `mlp` takes {batches[0]} of its time '
             f'at rest, {batches[1]} landing and {batches[2]} moving; for one pair it takes longer. '
             f"For one pair, the paper's network takes {by_exact('paper', 'landings', 'call')} of "
