@@ -47,13 +47,15 @@ def shown(name: str) -> list[str]:
     return lines
 
 
-@pytest.mark.parametrize('name', sorted(path.name for path in EXAMPLES.glob('*.py')
-                                        if path.name != 'record.py'))  # of the test below
-def test_example(name: str, program, tmp_path: Path) -> None:
+@pytest.mark.parametrize(('name', 'model'), [
+    *((path.name, 'exact') for path in sorted(EXAMPLES.glob('*.py'))
+      if path.name != 'record.py'),  # of the test below
+    ('crane_lift.py', 'mlp')])
+def test_example(name: str, model: str, program, tmp_path: Path) -> None:
     """Figures agree to the printed digits; shorter runs print as many lines in the same words."""
     pytest.importorskip(NEEDS.get(name, 'numpy'))
     if name in CLIENTS:
-        given = PARAMETERS.get(name, ('model:=exact',))
+        given = (f'model:={model}', *PARAMETERS.get(name, ()))
         program('contact_node', '--ros-args', *(word for value in given for word in (
             '-p', value))).wait_for_output('ready')
     command = [str(EXAMPLES / name), *ARGUMENTS.get(name, ())]
