@@ -34,6 +34,7 @@ from box_contact_ros.solver.pose import rotation_matrix
 
 from .mlp_samples import draw_samples, mixture
 from .pose_sets import Pairs
+from .weights import mlp_shapes
 
 MODELS = ('exact', 'mlp', 'paper', 'soup-1', 'soup-8', 'soup-22')
 """Our contestants; the soups are the coarsest, and the ends of the paper's Table 3."""
@@ -160,7 +161,7 @@ def ours(model: Any, *, weights: str | None = None, name: str = '') -> Contestan
 def idle_mlp() -> native.Mlp:
     """Return `mlp` with the last layer of its network zeroed: what its geometry alone knows."""
     numbers = mlp_numbers(resource_path('weights', 'mlp.safetensors'))
-    inputs = -(-int(numbers[2]) // INPUTS_TOGETHER) * INPUTS_TOGETHER
+    inputs = sum(-(-int(numbers[k]) // INPUTS_TOGETHER) * INPUTS_TOGETHER for k in (0, 2))
     groups = -(-int(numbers[3]) // GROUP)
     numbers[-groups * GROUP * (1 + inputs):] = 0.0
     return native.Mlp(numbers)
@@ -170,7 +171,7 @@ def idle_mlp() -> native.Mlp:
 def linear_mlp() -> native.Mlp:
     """Return `mlp` whose network is the best linear map of its features, by least squares.
 
-    A rectified unit and its opposite pass a number on, so the two hidden layers bend nothing.
+    The linear path is that map; the hidden layers are one unit each, which is 0.
     """
     samples = draw_samples(mixture, [1, 0], LINEAR_PAIRS)
     root = np.linalg.cholesky(samples.covariance)
@@ -182,14 +183,9 @@ def linear_mlp() -> native.Mlp:
     weight = samples.half.max(axis=1, keepdims=True)
     fitted = np.linalg.lstsq(weight * known, weight * wanted, rcond=None)[0].T
     slopes, bias = fitted[:, :-1], fitted[:, -1]
-    one, nothing = (np.eye(n) for n in slopes.shape[::-1]), np.zeros
-    inputs, outputs = one
-    both = np.block([[slopes, -slopes], [-slopes, slopes]])
-    layers = [(np.vstack([inputs, -inputs]), nothing(2 * len(inputs))),
-              (both, np.concatenate([bias, -bias])),
-              (np.hstack([outputs, -outputs]), nothing(len(outputs)))]
-    return native.Mlp(core_numbers(Network([(w.astype(np.float32), b.astype(np.float32))
-                                            for w, b in layers])))
+    *hidden, last = [(np.zeros(shape), np.zeros(shape[0])) for shape in mlp_shapes((1, 1))]
+    last[0][:, :-1], last[1][:] = slopes, bias
+    return native.Mlp(core_numbers(Network([*hidden, last])))
 
 
 def other_networks() -> list[Contestant]:

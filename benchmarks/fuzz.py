@@ -30,12 +30,11 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import cache
-from itertools import pairwise
 
 import numpy as np
 
 from box_contact_ros.arguments import within
-from box_contact_ros.core import DEPTH_FLOOR, FEATURES, OUTPUTS, UNITS_MAX, native
+from box_contact_ros.core import DEPTH_FLOOR, UNITS_MAX, native
 from box_contact_ros.extras import require
 from box_contact_ros.models.networks import core_numbers
 from box_contact_ros.models.weights_file import Network
@@ -55,6 +54,7 @@ from .pose_sets import (
     turns,
     unit_quaternions,
 )
+from .weights import mlp_shapes
 
 PAIRS, QUICK_PAIRS = 10_000_000, 60_000
 PIECE = 50_000  # pairs that are drawn and judged at a time
@@ -260,10 +260,8 @@ class RandomMlp:
     def __init__(self, *seed: int) -> None:
         rng = np.random.default_rng(seed)
         scale = float(log_uniform(rng, *SCALES, 1)[0])
-        widths = (FEATURES, *rng.integers(1, UNITS_MAX, 2, endpoint=True), OUTPUTS)
-        network = Network([(rng.uniform(-scale, scale, (units, inputs)),
-                            rng.uniform(-scale, scale, units))
-                           for inputs, units in pairwise(widths)])
+        network = Network([(rng.uniform(-scale, scale, shape), rng.uniform(-scale, scale, shape[0]))
+                           for shape in mlp_shapes(rng.integers(1, UNITS_MAX, 2, endpoint=True))])
         self._solver = native.Mlp(core_numbers(network))
 
     def batch(self, pose_a: np.ndarray, pose_b: np.ndarray, *, size_a: np.ndarray,

@@ -18,16 +18,21 @@ from .pose_sets import (
     Pairs,
     Z,
     any_pose,
+    deep,
+    joined,
     laid,
     log_uniform,
     onto,
     quaternion_multiply,
     random_sizes,
     stacked,
+    symmetric,
     turns,
 )
 
 PIECE = 100_000  # pairs that are made at a time
+NEAR_FLIP, MIRRORED = 0.02, 5
+"""How near to 0 a feature that mirrors an axis is near a flip; one of so many gets an image."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,6 +82,28 @@ def describe(pairs: Pairs) -> tuple[MlpSamples, np.ndarray]:
         covariance=covariance / (half[:, :, None] * half[:, None, :])), rows
 
 
+def with_mirror_images(samples: MlpSamples) -> MlpSamples:
+    """Return the samples, and the mirror images of some of those near a flip of an axis.
+
+    Features 0 to 2 mirror the axes by their signs (core/src/mlp/features.hpp). Where one of them
+    passes 0, the network is asked about the mirror image next, and should answer with the image.
+    """
+    corner = np.arange(8)  # +++ ++− … −−−: x, y, z by the bits 4, 2, 1
+    parts = [samples]
+    for axis in range(3):
+        near = samples.part(np.flatnonzero(
+            np.abs(samples.features[:, axis]) < NEAR_FLIP)[::MIRRORED])
+        sign = np.where(np.arange(3) == axis, -1.0, 1.0)
+        features = near.features.copy()
+        features[:, :3] *= sign
+        features[:, 8:11] *= [sign[0] * sign[1], sign[0] * sign[2], sign[1] * sign[2]]
+        features[:, 11:] = features[:, 11 + (corner ^ (4 >> axis))]
+        parts.append(MlpSamples(
+            features=features, half=near.half, volume=near.volume, mean=sign * near.mean,
+            covariance=np.outer(sign, sign) * near.covariance))
+    return MlpSamples.joined(parts)
+
+
 def draw_samples(make: Generator, seed: Sequence[int], n: int, progress: bool = False,
                  ) -> MlpSamples:
     """Return the samples among about n pairs of `make(rng, n)`.
@@ -107,9 +134,10 @@ def mixture(rng: np.random.Generator, n: int) -> Pairs:
 
     Equal cubes and boxes of random sizes have any pose. Cubes, containers and flat boxes are
     stacked, tilted by 1e-6 to 0.3 rad. Boxes of random sizes and bars are laid on each other. Goods
-    at rest are taken from recorded scenes.
+    at rest are taken from recorded scenes. A fifth are deep in each other, and a ninth have
+    a mirror.
     """
-    share = n // 18
+    share = n // 27
     cubes, (size_a, size_b), laid_sizes = (np.ones((2 * share, 3)), random_sizes(rng, 3 * share),
                                            random_sizes(rng, 3 * share))
     bars = np.column_stack([np.ones(share), *log_uniform(rng, 0.03, 0.3, (2, share))])
@@ -121,13 +149,14 @@ def mixture(rng: np.random.Generator, n: int) -> Pairs:
                   quaternion_multiply(turns((1.0, 0.0, 0.0), log_uniform(rng, 1e-5, 0.1, share)),
                                       turns(Z, rng.uniform(-np.pi, np.pi, share))),
                   bars, bars, depths(rng, bars, bars)),
-             nearly_settled(rng, share)]
+             nearly_settled(rng, 2 * share), deep(rng, 5 * share),
+             symmetric(rng, 3 * share)]
     for size, yaw in ((CUBE, np.pi), (CONTAINER, 0.2), (CONTAINER, np.pi),
                       ((1.0, 0.5, 0.3), np.pi)):
         parts.append(stacked(rng, size, log_uniform(rng, 1e-6, 0.3, 2 * share),
                              rng.uniform(-yaw, yaw, 2 * share),
                              min(size) * log_uniform(rng, 1e-5, 0.1, 2 * share)))
-    return Pairs(*(np.concatenate(columns) for columns in zip(*parts)))
+    return joined(parts)
 
 
 def depths(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray) -> np.ndarray:

@@ -9,8 +9,8 @@ which keeps the axis.
 """
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
+from collections.abc import Callable, Sequence
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -67,6 +67,12 @@ class Pairs(NamedTuple):
 
 
 Generator = Callable[[np.random.Generator, int], Pairs]
+
+
+def joined(parts: Sequence[Pairs]) -> Pairs:
+    """Return the pairs of all parts, one part after the other."""
+    return Pairs(*(np.concatenate(columns) for columns in zip(*parts)))
+
 
 
 def unit_quaternions(rng: np.random.Generator, n: int) -> np.ndarray:
@@ -322,6 +328,76 @@ def flush_stacks(rng: np.random.Generator, n: int) -> Pairs:
                  np.hstack([above, quaternion_multiply(whole, half_turn)]), size, size.copy())
 
 
+def plates(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Sizes (n, 3) of plates of aspect to 1:50."""
+    return np.column_stack([rng.uniform(0.3, 1.0, (n, 2)), log_uniform(rng, 0.02, 0.2, n)])
+
+
+def needles(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Sizes (n, 3) of needles of aspect to 1:50."""
+    return np.column_stack([np.ones(n), *log_uniform(rng, 0.02, 0.2, (2, n))])
+
+
+KINDS: dict[str, Callable[[np.random.Generator, int], tuple[np.ndarray, np.ndarray]]] = {
+    'cubes': lambda rng, n: (np.ones((n, 3)), np.ones((n, 3))),
+    'sizes to 1:20': random_sizes,
+    'plates': lambda rng, n: (plates(rng, n), plates(rng, n)),
+    'needles': lambda rng, n: (needles(rng, n), needles(rng, n)),
+}
+"""Sizes of both boxes (n, 3) each, by the kind of pairs that may be deep in each other."""
+
+
+def deep(rng: np.random.Generator, n: int) -> Pairs:
+    """Boxes deep in each other, a quarter of each of `KINDS`, 10–70 % of the shortest edge deep."""
+    parts = []
+    for make in KINDS.values():
+        a, b = make(rng, n // 4)
+        shortest = np.minimum(a.min(axis=1), b.min(axis=1))
+        parts.append(any_pose(rng, a, b, shortest * rng.uniform(0.1, 0.7, n // 4)))
+    return joined(parts)
+
+
+def through(kind: str, rng: np.random.Generator, n: int) -> Pairs:
+    """Boxes of a kind that are through or in each other: centres meet, to a fifth of an edge."""
+    a, b = KINDS[kind](rng, n)
+    turn_a, turn_b = unit_quaternions(rng, n), unit_quaternions(rng, n)
+    reach = 0.2 * np.minimum(a.max(axis=1), b.max(axis=1))[:, None]
+    pairs = Pairs(np.hstack([np.zeros((n, 3)), turn_a]),
+                  np.hstack([reach * rng.uniform(-1.0, 1.0, (n, 3)), turn_b]), a, b)
+    return pairs.rows(pairs.contacts().colliding)
+
+
+def symmetric(rng: np.random.Generator, n: int) -> Pairs:
+    """Pairs with a mirror or a two-fold turn, as plans and plain landings have them.
+
+    A quarter each: pitched alone and off along x alone, rolled alone and off along y alone, centre
+    above centre at any yaw, and flush at rest. A third each of the first three are cubes,
+    containers, and boxes of any two sizes.
+    """
+    share = n // 4
+
+    def sizes() -> tuple[np.ndarray, np.ndarray]:
+        kind = rng.integers(0, 3, (share, 1))
+        a, b = (np.where(kind == 0, CUBE, np.where(kind == 1, CONTAINER, size))
+                for size in random_sizes(rng, share))
+        return a, b
+
+    parts = []
+    for axis in (0, 1, None):  # along which the boxes are off
+        size_a, size_b = sizes()
+        place = np.zeros((share, 3))
+        place[:, 2] = 0.49 * (size_a + size_b)[:, 2]
+        turn = turns(Z, rng.uniform(-np.pi, np.pi, share))
+        if axis is not None:
+            reach = 0.5 * (size_a + size_b)[:, axis]
+            place[:, axis] = 0.98 * reach * rng.uniform(-1.0, 1.0, share)
+            turn = turns(np.eye(3)[1 - axis], log_uniform(rng, 1e-6, 0.1, share)
+                         * rng.choice([-1.0, 1.0], share))
+        lower = np.minimum(size_a.min(axis=1), size_b.min(axis=1))
+        parts.append(onto(place, turn, size_a, size_b, lower * log_uniform(rng, 1e-4, 0.05, share)))
+    return joined([*parts, flush_stacks(rng, share)])
+
+
 def apart(rng: np.random.Generator, n: int) -> Pairs:
     """Boxes 1e-6 to 0.1 m apart: half containers almost stacked, half cubes in any pose."""
     half = n // 2
@@ -331,7 +407,7 @@ def apart(rng: np.random.Generator, n: int) -> Pairs:
                    rng.uniform(-0.1, 0.1, n - half), np.full(n - half, 0.01))
     parts = [at_depth(pairs, -log_uniform(rng, 1e-6, 0.1, len(pairs.size)))
              for pairs in (loose, yard)]
-    both = Pairs(*(np.concatenate(columns) for columns in zip(*parts)))
+    both = joined(parts)
     return both.rows(rng.permutation(len(both.size)))  # the first ones are of both kinds
 
 
@@ -342,6 +418,7 @@ SETS: dict[str, Generator] = {
     'stacks': stacks,
     'tilted stacks': tilted,
     'containers': containers,
+    'deep': deep,
 }
 """The sets of all reports."""
 LOADS: dict[str, Generator] = {
@@ -352,5 +429,8 @@ LOADS: dict[str, Generator] = {
     'landings': landings,
 }
 """Loads on what they stand on: more sets of `accuracy` and `native`."""
+THROUGH: dict[str, Generator] = {f'{kind} through each other': partial(through, kind)
+                                 for kind in KINDS}
+"""More sets of `accuracy`: the network of `mlp` is not trained for them."""
 FLUSH: dict[str, Generator] = {'aligned flush stacks': flush_stacks}
 """One more set of `native`: the slowest for most ways to the overlap."""

@@ -15,10 +15,12 @@ import numpy as np
 
 from box_contact_ros.solver.contact_solver import ContactSolver
 
+from . import probes
 from .errors import departures, lengths
 from .pose_sets import Pairs, quaternion_multiply, turns
 
 SAMPLES, KEPT, BISECTIONS = 200, 4, 45
+NUDGES, NUDGE = 6, 1e-12  # changes of pose at a flip, and how large they are [rad, edge]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +68,29 @@ def largest_steps(solver: ContactSolver, paths: Paths,
         steps.append(_bisected(solver, paths, np.repeat(np.arange(n), KEPT), first, place)
                      .reshape(n, KEPT).max(axis=1))
     return steps[0], steps[1], steps[2]
+
+
+def flip_steps(rng: np.random.Generator, solver: ContactSolver, pairs: Pairs) -> np.ndarray:
+    """Return steps where an axis of the patch box flips, (n, 3) [%]: point, volume, covariance.
+
+    pairs: with a mirror or a two-fold turn, which touch: rounding alone decides how their axes are
+    mirrored. Each is nudged. Nudges after which other edges make the axes do not count.
+    """
+    axes, *_ = probes.patch_boxes(pairs)
+    rows = np.arange(len(axes))
+    steps = np.zeros((len(rows), 3))
+    here = _departures(solver, Paths(pairs=pairs, axes=axes[:, 0], angle=0.0,
+                                     shifts=np.zeros((len(rows), 3))), rows, np.zeros(len(rows)))
+    for _ in range(NUDGES):
+        turn, shift = rng.normal(size=(2, len(rows), 3))
+        nudges = Paths(pairs=pairs, axes=turn, angle=NUDGE,
+                       shifts=NUDGE * pairs.edge[:, None] * shift)
+        there = _departures(solver, nudges, rows, np.ones(len(rows)))
+        nudged, *_ = probes.patch_boxes(nudges.at(rows, np.ones(len(rows))))
+        alike = np.abs(np.einsum('nij,nij->nj', axes, nudged)).min(axis=1) > 1.0 - 1e-6
+        found = np.column_stack([lengths(one - other) for one, other in zip(there, here)])
+        steps = np.maximum(steps, np.where(alike[:, None], found, 0.0))
+    return steps
 
 
 def _bisected(solver: ContactSolver, paths: Paths, rows: np.ndarray, first: np.ndarray,

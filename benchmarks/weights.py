@@ -5,17 +5,26 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from safetensors.numpy import save
 
+from box_contact_ros.core import FEATURES, OUTPUTS
 from box_contact_ros.models.weights_file import Layers
 
 CARD_FIELDS = ('name', 'model', 'architecture', 'inputs', 'outputs', 'sizes', 'data', 'seed',
                'commit', 'metrics')
 """Entries that every model card has: `inputs` with their ranges, `sizes` it was trained for."""
+
+
+def mlp_shapes(hidden: Sequence[int]) -> list[tuple[int, int]]:
+    """Return units and inputs of each layer of `mlp`: the last one reads the features, too."""
+    inputs = [FEATURES, *hidden]
+    inputs[-1] += FEATURES
+    return list(zip((*hidden, OUTPUTS), inputs))
 
 
 def save_weights(path: Path, networks: dict[str, Layers], card: dict[str, Any]) -> None:

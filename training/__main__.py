@@ -44,7 +44,7 @@ HEADER = """// Copyright 2026 The box_contact_ros maintainers
 
 namespace box_contact::detail {
 
-// Inputs, units of both hidden layers, outputs and two flags, then groups of eight units.
+// Inputs, units of both hidden layers, outputs and three flags, then groups of eight units.
 // clang-format off
 constexpr float shipped_network[] = {
 NUMBERS
@@ -65,6 +65,10 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--hidden', type=within(1, UNITS_MAX), nargs=2, metavar='UNITS',
                         help=f'units of the hidden layers of mlp (default: {recipe.HIDDEN[0]} '
                         f'{recipe.HIDDEN[1]}), named in the file')
+    parser.add_argument('--steps', type=within(1), help='steps of each network of mlp (default: '
+                        f'{recipe.MlpRecipe.steps:,})')
+    parser.add_argument('--networks', type=within(1), help='networks of mlp, of which the best is '
+                        f'written (default: {recipe.MlpRecipe.networks})')
     parser.add_argument('--scene', choices=paper.SCENES,
                         help='pose set that paper is trained for; one of cubes needs --out')
     parser.add_argument('--out', type=Path, metavar='DIR',
@@ -109,7 +113,12 @@ def _train_mlp(options: argparse.Namespace, hidden: tuple[int, int] | None = Non
     name = '-'.join((MLP, *map(str, hidden or ())))
     folder = options.out or (OTHER_WEIGHTS if hidden else jobs.SHIPPED)
     path = folder / f'{name}.safetensors'
-    card = recipe.train(path, seed=options.seed, commit=_commit(), quick=options.quick,
+    asked = {field: value for field in ('steps', 'networks')
+             if (value := getattr(options, field)) is not None}
+    planned = recipe.MlpRecipe(**(recipe.QUICK if options.quick else {}) | asked)
+    print(f'{planned.networks} networks of {planned.steps:,} steps: about '
+          f'{planned.minutes():.0f} min, then their errors', flush=True)
+    card = recipe.train(path, planned, seed=options.seed, commit=_commit(),
                         hidden=hidden or recipe.HIDDEN)
     _print(path, card)
     if hidden is None and options.out is None:

@@ -26,11 +26,12 @@ class Kind(NamedTuple):
     inputs: int
     outputs: int
     activation: str  # of the hidden units
+    has_path: bool  # whether the last layer reads the inputs, too
 
 
 MLP, PAPER = 'mlp', 'paper'
-KINDS = {MLP: Kind('patch', FEATURES, OUTPUTS, 'relu'),
-         PAPER: Kind('contact', 6, 4, 'tanh')}
+KINDS = {MLP: Kind('patch', FEATURES, OUTPUTS, 'relu', True),
+         PAPER: Kind('contact', 6, 4, 'tanh', False)}
 """Networks by model.
 
 `mlp` reads what the boxes cut off the patch box, and gives the overlap there. `paper` reads t_x t_y
@@ -49,19 +50,27 @@ def core_numbers(network: Network, *, is_tanh: bool = False, in_half_edges: bool
                  ) -> np.ndarray:
     """Return a network as the core reads it (core/src/mlp/network.hpp): float32 (n,).
 
-    The header has inputs, units of both hidden layers, outputs, and both flags. Each group of
+    The header has inputs, units of both hidden layers, outputs, and three flags. Each group of
     `GROUP` units has its biases, and for each input the units' weights for it. Units that fill a
     group, and inputs that fill a multiple of `INPUTS_TOGETHER`, are zero.
     """
-    numbers = [np.array([*network.widths, is_tanh, in_half_edges], np.float32)]
-    for weight, bias in network.layers:
-        units = -(-len(bias) // GROUP) * GROUP
-        inputs = -(-weight.shape[1] // INPUTS_TOGETHER) * INPUTS_TOGETHER
-        layer = np.zeros((units, 1 + inputs), np.float32)
-        layer[:len(bias), 0] = bias
-        layer[:len(bias), 1:1 + weight.shape[1]] = weight
-        numbers.append(layer.reshape(-1, GROUP, 1 + inputs).swapaxes(1, 2).ravel())
-    return np.concatenate(numbers)
+    numbers = [np.array([*network.widths, is_tanh, in_half_edges, network.has_path], np.float32)]
+    for number, (weight, bias) in enumerate(network.layers):
+        # A last layer with a linear path reads two lists: inputs, and units of the layer before.
+        is_last = number == len(network.layers) - 1
+        lists = np.split(weight, [network.widths[0]] if is_last and network.has_path else [], 1)
+        columns = np.hstack([bias[:, None], *(_filled(part, 1, INPUTS_TOGETHER)
+                                              for part in lists)])
+        layer = _filled(columns, 0, GROUP)
+        numbers.append(layer.reshape(-1, GROUP, layer.shape[1]).swapaxes(1, 2).ravel())
+    return np.concatenate(numbers).astype(np.float32)
+
+
+def _filled(array: np.ndarray, axis: int, multiple: int) -> np.ndarray:
+    """Return an array (n, m) with zeros up to a multiple along an axis."""
+    more = [(0, 0), (0, 0)]
+    more[axis] = (0, -array.shape[axis] % multiple)
+    return np.pad(array, more)
 
 
 def network_of(weights: Weights, model: str) -> Network:
@@ -75,6 +84,9 @@ def network_of(weights: Weights, model: str) -> Network:
     if len(network.widths) != 4 or max(network.widths[1:3]) > UNITS_MAX:
         raise WeightsError(f'{file}: network {kind.network!r} must have two hidden layers, of at '
                            f'most {UNITS_MAX} units')
+    if network.has_path != kind.has_path:
+        raise WeightsError(f'{file}: the last layer of network {kind.network!r} must read '
+                           f'{"inputs and units" if kind.has_path else "units alone"}')
     activation = weights.card.get('activation', 'tanh' if model == PAPER else None)
     if activation != kind.activation:
         raise WeightsError(f"{file}: this version's units are {kind.activation!r}, not "

@@ -5,7 +5,8 @@
 
 Tensors are float32: `<network>.<layer>.weight` (outputs × inputs) and `<network>.<layer>.bias`.
 Layers are counted from 0. Hidden units are rectified, in the paper's networks tanh, and the output
-is linear. Inputs and outputs are in SI units: any scaling is folded into the weights.
+is linear. The last layer of `mlp` reads the inputs before the hidden units, too. Inputs and outputs
+are in SI units: any scaling is folded into the weights.
 The metadata entry `card` is the model card, a JSON object. Its entry `architecture` holds the units
 of each layer, of all networks or by network.
 
@@ -47,6 +48,11 @@ class Network:
     def widths(self) -> tuple[int, ...]:
         """Return the units per layer, inputs first: (6, 20, 18, 4)."""
         return (self.layers[0][0].shape[1], *(len(bias) for _, bias in self.layers))
+
+    @property
+    def has_path(self) -> bool:
+        """Return whether the last layer reads the inputs before the units: a linear path."""
+        return len(self.layers) > 1 and self.layers[-1][0].shape[1] > self.widths[-2]
 
 
 @dataclass(frozen=True)
@@ -134,7 +140,11 @@ def _network(name: str, parts: dict[str, np.ndarray]) -> Network:
     while f'{len(layers)}.weight' in parts:
         number = len(layers)
         weight, bias = parts.pop(f'{number}.weight'), parts.pop(f'{number}.bias', None)
-        fits = weight.ndim == 2 and (not layers or weight.shape[1] == len(layers[-1][1]))
+        fits = weight.ndim == 2
+        if layers and fits:
+            units, inputs = len(layers[-1][1]), layers[0][0].shape[1]
+            is_last = f'{number + 1}.weight' not in parts
+            fits = weight.shape[1] in ((units, inputs + units) if is_last else (units,))
         if not fits or bias is None or bias.shape != weight.shape[:1]:
             raise ValueError(f'layer {number} of {short_repr(name)} does not fit its neighbours')
         layers.append((weight, bias))

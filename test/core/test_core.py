@@ -17,7 +17,6 @@ import tracemalloc
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +28,7 @@ from test_extremes import random_network
 
 import box_contact_ros
 from benchmarks import probes
+from benchmarks.weights import mlp_shapes
 from box_contact_ros import Contact, ContactSolver, make_model
 from box_contact_ros.core import FORCE, instruction_sets, native
 from box_contact_ros.models.networks import core_numbers, mlp_numbers, read_mlp
@@ -442,9 +442,8 @@ def test_references_and_memory_stay(model: str, traced: None) -> None:
 
 def test_networks_are_freed() -> None:
     """Each model has its own numbers, outside of what Python counts; a solver keeps its model."""
-    widths = (native.FEATURES, 64, 64, native.OUTPUTS)
-    numbers = core_numbers(Network([(np.zeros((units, inputs)), np.zeros(units))
-                                    for inputs, units in pairwise(widths)]))  # 24 kB
+    numbers = core_numbers(Network([(np.zeros(shape), np.zeros(shape[0]))
+                                    for shape in mlp_shapes((64, 64))]))  # 25 kB
 
     def make() -> native.PairSolver:
         return native.PairSolver(native.Mlp(numbers))

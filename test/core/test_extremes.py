@@ -7,13 +7,12 @@ Model `mlp` has random weights here: what it promises, it does whatever its weig
 """
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import poses
 import pytest
 from poses import Pairs
 
+from benchmarks.weights import mlp_shapes
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import LENGTH_MAX, LENGTH_MIN, native
 from box_contact_ros.models.networks import core_numbers
@@ -34,8 +33,7 @@ def random_network(rng: np.random.Generator) -> np.ndarray:
     def drawn(*shape: int) -> np.ndarray:
         return rng.uniform(-most, most, shape) * (rng.random(shape) > 1 / 8)
 
-    return core_numbers(Network([(drawn(units, inputs), drawn(units)) for inputs, units in pairwise(
-        (native.FEATURES, *hidden, native.OUTPUTS))]))
+    return core_numbers(Network([(drawn(*shape), drawn(shape[0])) for shape in mlp_shapes(hidden)]))
 
 
 def solver(model: str, rng: np.random.Generator) -> native.Exact | native.Mlp:

@@ -22,16 +22,23 @@ pytest.importorskip('benchmarks.pose_sets')
 from benchmarks import probes, settled
 from benchmarks.contestant import MLP_SIZES, linear_mlp
 from benchmarks.errors import contact_errors
-from benchmarks.pose_sets import LOADS, SETS, Generator, Pairs, at_depth, log_uniform
-from benchmarks.steps import drawn_paths, largest_steps
-from box_contact_ros import ContactSolver, make_model
-from box_contact_ros.core import (
-    FEATURES,
-    NETWORK_FORMAT,
-    OUTPUTS,
-    UNITS_MAX,
-    native,
+from benchmarks.pose_sets import (
+    CONTAINER,
+    LOADS,
+    SETS,
+    THROUGH,
+    Generator,
+    Pairs,
+    at_depth,
+    log_uniform,
+    quaternion_multiply,
+    symmetric,
+    turns,
 )
+from benchmarks.steps import drawn_paths, flip_steps, largest_steps
+from benchmarks.weights import mlp_shapes
+from box_contact_ros import ContactSolver, make_model
+from box_contact_ros.core import FEATURES, NETWORK_FORMAT, OUTPUTS, UNITS_MAX, native
 from box_contact_ros.models.networks import core_numbers, mlp_numbers, read_mlp
 from box_contact_ros.models.weights_file import Network, WeightsError
 from box_contact_ros.resources import resource_path
@@ -135,11 +142,11 @@ ROUNDING, FLOAT_ROUNDING = 2.0**-44, 2.0**-21
 def network(numbers: np.ndarray, hidden: tuple[int, int] = (12, 9)) -> np.ndarray:
     """Return a network of `numbers`, as many as its layers need, as the core reads it."""
     layers, at = [], 0
-    for inputs, outputs in zip((FEATURES, *hidden), (*hidden, OUTPUTS)):
-        weight = numbers[at:at + inputs * outputs].reshape(outputs, inputs)
-        at += inputs * outputs
-        layers.append((weight, numbers[at:at + outputs]))
-        at += outputs
+    for units, inputs in mlp_shapes(hidden):
+        weight = numbers[at:at + inputs * units].reshape(units, inputs)
+        at += inputs * units
+        layers.append((weight, numbers[at:at + units]))
+        at += units
     return core_numbers(Network(layers))
 
 
@@ -265,12 +272,55 @@ def test_box_symmetries(mlp: ContactSolver, named_set: tuple[str, Pairs]) -> Non
             assert_close(other.contacts(mlp), one, pairs)
 
 
+def straight_landings(*, roll: bool) -> Pairs:
+    """Return 180 containers right above another, pitched alone or rolled alone."""
+    tilt, depth = (part.ravel() for part in np.meshgrid(np.geomspace(1e-5, 0.05, 60),
+                                                        (1e-3, 1e-2, 5e-2)))
+    half_x, half_y, half_z = 0.5 * np.array(CONTAINER)
+    height = half_z * (1.0 + np.cos(tilt)) + (half_y if roll else half_x) * np.sin(tilt) - depth
+    n, axis = len(tilt), (1.0, 0.0, 0.0) if roll else (0.0, 1.0, 0.0)
+    pose_b = np.column_stack([np.zeros((n, 2)), height, turns(axis, tilt)])
+    size = np.tile(CONTAINER, (n, 1))
+    return Pairs(np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1)), pose_b, size, size)
+
+
+@pytest.mark.parametrize('roll', [False, True])
+def test_a_straight_landing_is_symmetric(mlp: ContactSolver, roll: bool) -> None:
+    """Pitched alone, y of the point is 0; rolled alone, x. No step as the other tilt begins."""
+    pairs = straight_landings(roll=roll)
+    off = np.abs(pairs.contacts(mlp).point[:, 0 if roll else 1])
+    assert off.max() <= 1e-6 * CONTAINER[0]
+    other = np.array((0.0, 1.0, 0.0) if roll else (1.0, 0.0, 0.0))
+    points = []
+    for way in (-1e-12, 1e-12):
+        pose_b = pairs.pose_b.copy()
+        pose_b[:, 3:] = quaternion_multiply(pose_b[:, 3:], turns(other, np.full(len(off), way)))
+        points.append(pairs._replace(pose_b=pose_b).contacts(mlp).point)
+    assert np.linalg.norm(points[1] - points[0], axis=1).max() <= 1e-4 * CONTAINER[0]
+
+
+def test_mirrored_pairs_have_mirrored_answers(mlp: ContactSolver) -> None:
+    """Where a pair is its own mirror image, or that of a half turn: it steps by no more than this.
+
+    There rounding alone tells how the axes are mirrored.
+    """
+    rng = np.random.default_rng(4)
+    pairs = symmetric(rng, 4 * N)
+    pairs = pairs.rows(pairs.contacts().colliding)
+    steps = flip_steps(rng, mlp, pairs).max(axis=0)
+    print([f'{step:.2g}' for step in steps])
+    assert np.all(steps <= (1.0, 3.0, 5.0))
+
+
 # --- errors and steps -----------------------------------------------------------------------------
 
 LIMITS = {'point': 2.0, 'volume': 12.0, 'covariance': 18.0}
 """99th percentiles of the errors on all sets [%]."""
-HARD_LIMITS = {'stacks': 4.0, 'parcels': 4.0, 'tilted stacks': 4.0}
-"""Those of the point where boxes lie on each other at any yaw."""
+YAWED = {'point': 4.0}
+HARD_LIMITS: dict[str, dict[str, float]] = {
+    'stacks': YAWED, 'parcels': YAWED, 'tilted stacks': YAWED,
+    'deep': {'point': 3.8, 'volume': 15.0}}
+"""Those of boxes that lie on each other at any yaw, and of deep ones."""
 WORST_STEP = 8.0
 """Largest step of the point at a vanishing change of pose [% of the smaller box's longest edge]."""
 
@@ -301,45 +351,40 @@ def test_errors_are_within_the_limits(mlp: ContactSolver, measured: tuple[str, P
     for quantity, limit in LIMITS.items():
         found = getattr(errors, quantity)
         print(name, quantity, f'{np.median(found):.3g} {np.percentile(found, 99):.3g}')
-        if quantity == 'point':
-            limit = HARD_LIMITS.get(name, limit)
-        assert np.percentile(found, 99) <= limit, quantity
+        assert np.percentile(found, 99) <= HARD_LIMITS.get(name, {}).get(quantity, limit), quantity
 
 
 def test_the_network_decides(mlp: ContactSolver, measured: tuple[str, Pairs]) -> None:
     """The best linear map of its features has 1.5 times its 99th percentile of the point or more.
 
-    And it is not a straw man: it knows points within 6 %, and volumes within half.
+    And it is not a straw man: it knows points within 6 %, deep ones 8 %, and volumes within half.
     """
-    _, pairs = measured
+    name, pairs = measured
     truth = pairs.contacts()
     curved, linear = (contact_errors(pairs.contacts(solver), truth, pairs.edge)
                       for solver in (mlp, ContactSolver(model=linear_mlp())))
-    assert 1.5 * np.percentile(curved.point, 99) <= np.percentile(linear.point, 99) <= 6.0
+    most = 8.0 if name == 'deep' else 6.0
+    assert 1.5 * np.percentile(curved.point, 99) <= np.percentile(linear.point, 99) <= most
     assert np.percentile(linear.volume, 99) <= 50.0
 
 
-@pytest.mark.parametrize('shape, limit', [('inside', 30.0), ('plates', 40.0)])
-def test_what_it_has_not_learnt(mlp: ContactSolver, shape: str, limit: float) -> None:
-    """Boxes in each other, and plates through each other, have the errors that mlp.md says."""
-    rng = np.random.default_rng(1)
-    turn_a, turn_b = (poses.unit_quaternions(rng, N) for _ in range(2))
-    if shape == 'inside':
-        size_a, size_b, reach = rng.uniform(2.4, 4, (N, 3)), rng.uniform(0.3, 1, (N, 3)), 0.5
-    else:
-        size_a = np.column_stack([rng.uniform(0.5, 1, (N, 2)), rng.uniform(0.005, 0.03, N)])
-        size_b, reach = size_a[::-1].copy(), 0.2
-    pairs = Pairs(np.hstack([np.zeros((N, 3)), turn_a]),
-                  np.hstack([rng.uniform(-reach, reach, (N, 3)), turn_b]), size_a, size_b)
-    pairs = pairs.rows(pairs.contacts().colliding)
-    worst = contact_errors(pairs.contacts(mlp), pairs.contacts(), pairs.edge).point.max()
-    assert 0.5 * limit < worst < limit
+@pytest.mark.parametrize('name', THROUGH)
+def test_boxes_through_each_other(mlp: ContactSolver, name: str) -> None:
+    """It has not learnt them. Half of the points are good; hardly any is outside of a box."""
+    pairs = THROUGH[name](np.random.default_rng(1), 5 * N)
+    found = pairs.contacts(mlp)
+    off = contact_errors(found, pairs.contacts(), pairs.edge).point
+    outside = pairs.beyond(found.point) > 1e-3 * pairs.edge
+    print(name, np.percentile(off, (50, 99, 100)), 100.0 * outside.mean())
+    assert np.median(off) <= 4.0 and off.max() <= 45.0
+    assert outside.mean() <= 0.005
 
 
 def test_points_are_in_both_boxes(mlp: ContactSolver, measured: tuple[str, Pairs]) -> None:
-    """To a thousandth of the smaller box's longest edge."""
+    """To a thousandth of the smaller box's longest edge, but for one in 10,000."""
     _, pairs = measured
-    assert np.all(pairs.beyond(pairs.contacts(mlp).point) <= 1e-3 * pairs.edge)
+    outside = pairs.beyond(pairs.contacts(mlp).point) > 1e-3 * pairs.edge
+    assert outside.mean() <= 1e-4
 
 
 @pytest.mark.parametrize('name', ALL_SETS)
@@ -367,10 +412,11 @@ def test_the_compiled_network_is_the_shipped_file() -> None:
 
 
 def written(path: Path, widths: tuple[int, ...] = (FEATURES, 4, 4, OUTPUTS), name: str = 'patch',
-            **changes: Any) -> str:
+            path_inputs: int = FEATURES, **changes: Any) -> str:
     """Return a weights file with a network of zeros and a card that fits it, but for `changes`."""
+    read = [*widths[:-2], widths[-2] + path_inputs]
     tensors = {f'{name}.{layer}.{part}': np.zeros(shape, np.float32)
-               for layer, (inputs, outputs) in enumerate(zip(widths, widths[1:]))
+               for layer, (inputs, outputs) in enumerate(zip(read, widths[1:]))
                for part, shape in (('weight', (outputs, inputs)), ('bias', outputs))}
     card = {'format': NETWORK_FORMAT, 'activation': 'relu', 'architecture': list(widths)}
     save_file(tensors, path, metadata={'card': json.dumps(card | changes)})
@@ -392,22 +438,38 @@ def test_a_network_of_zeros_answers_with_the_middle(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.covariance[rows], shape, atol=1e-12)
 
 
+def test_the_last_layer_reads_the_features() -> None:
+    """Of units that are 0, the volume is the square of what the linear path says."""
+    slopes, start = np.linspace(-0.02, 0.03, FEATURES), 0.5
+    *hidden, (last, bias) = [(np.zeros(shape), np.zeros(shape[0])) for shape in mlp_shapes((5, 9))]
+    last[3, :FEATURES], bias[3] = slopes, start
+    pairs = drawn('random cubes')
+    pairs = pairs.rows(pairs.contacts().colliding)
+    found = with_numbers(pairs, core_numbers(Network([*hidden, (last, bias)])))
+    _, _, half, features = probes.patch_boxes(pairs)
+    share = found.volume / np.prod(2.0 * half, axis=1)
+    np.testing.assert_allclose(np.sqrt(share), features @ slopes + start, rtol=1e-4, atol=1e-5)
+
+
 @pytest.mark.parametrize('hidden', [(), (8,), (8, 8, 8), (UNITS_MAX + 1, 8)])
 def test_layers_that_the_core_does_not_have_are_refused(tmp_path: Path, hidden: tuple) -> None:
     """None, one or three hidden layers, or too many units."""
-    weights = written(tmp_path / 'other', (FEATURES, *hidden, OUTPUTS))
+    weights = written(tmp_path / 'other', (FEATURES, *hidden, OUTPUTS),
+                      path_inputs=FEATURES if hidden else 0)
     with pytest.raises(WeightsError, match=f'two hidden layers, of at most {UNITS_MAX} units'):
         make_model('mlp', weights=weights)
 
 
 @pytest.mark.parametrize('change, words', [
-    ({'format': NETWORK_FORMAT - 1}, f'has format 4; this version reads {NETWORK_FORMAT}'),
-    ({'format': '5'}, "has format '5'"), ({'format': True}, 'has format True'),
+    ({'format': NETWORK_FORMAT - 1}, f'has format 5; this version reads {NETWORK_FORMAT}'),
+    ({'format': '6'}, "has format '6'"), ({'format': True}, 'has format True'),
     ({'format': None}, 'has format None'),
     ({'activation': 'softsign'}, "units are 'relu', not 'softsign'"),
     ({'activation': None}, "units are 'relu', not None"),
+    ({'path_inputs': 0}, "last layer of network 'patch' must read inputs and units"),
     ({'name': 'point'}, f"no network 'patch' with {FEATURES} inputs and {OUTPUTS} outputs"),
-    ({'widths': (FEATURES + 1, 4, 4, OUTPUTS)}, f'with {FEATURES} inputs and {OUTPUTS} outputs'),
+    ({'widths': (FEATURES + 1, 4, 4, OUTPUTS), 'path_inputs': FEATURES + 1},
+     f'with {FEATURES} inputs and {OUTPUTS} outputs'),
     ({'widths': (FEATURES, 4, 4, 2)}, f'with {FEATURES} inputs and {OUTPUTS} outputs')])
 def test_weights_with_another_meaning_are_refused(
         tmp_path: Path, change: dict[str, Any], words: str) -> None:

@@ -56,6 +56,20 @@ def test_networks_and_card_are_read(good: Path) -> None:
         np.testing.assert_array_equal(bias, want_bias)
 
 
+def test_the_last_layer_may_read_the_inputs(tmp_path: Path) -> None:
+    """Before the units: a linear path. No other layer may, and no last one reads more."""
+    content = tensors()
+    content['n.2.weight'] = np.hstack([np.ones((4, 6), np.float32), content['n.2.weight']])
+    network = load_weights(write(tmp_path / 'path', content)).networks['n']
+    assert network.has_path and network.widths == WIDTHS
+    more = content | {'n.2.weight': np.hstack([content['n.2.weight'], np.ones((4, 1), np.float32)])}
+    middle = tensors()
+    middle['n.1.weight'] = np.hstack([np.ones((3, 6), np.float32), middle['n.1.weight']])
+    for number, wrong in ((2, more), (1, middle)):
+        with pytest.raises(WeightsError, match=f"layer {number} of 'n' does not fit"):
+            load_weights(write(tmp_path / 'wrong', wrong))
+
+
 @pytest.mark.parametrize('share', [0.0, 0.02, 0.5, 0.999])
 def test_truncated(good: Path, share: float) -> None:
     content = good.read_bytes()

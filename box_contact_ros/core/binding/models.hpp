@@ -67,11 +67,14 @@ inline bool fits(Model model, const std::vector<float>& network) {
   float inputs = is_mlp ? detail::network_features : detail::paper_inputs;
   float outputs = is_mlp ? detail::network_outputs : detail::paper_outputs;
   if (network[0] != inputs || network[3] != outputs) return false;
-  for (int k = 4; k <= 5; ++k)
+  for (int k = 4; k < detail::network_header; ++k)
     if (network[k] != 0.0F && network[k] != 1.0F) return false;
+  auto up_to_fours = [&](int k) { return (long(network[k]) + 3) / 4 * 4; };
   long wanted = detail::network_header;
-  for (int k = 0; k < 3; ++k)
-    wanted += (long(network[k + 1]) + 7) / 8 * 8 * (1 + (long(network[k]) + 3) / 4 * 4);
+  for (int k = 0; k < 3; ++k) {
+    long path = k == 2 && network[6] != 0.0F ? up_to_fours(0) : 0;
+    wanted += (long(network[k + 1]) + 7) / 8 * 8 * (1 + path + up_to_fours(k));
+  }
   return long(network.size()) == wanted;
 }
 

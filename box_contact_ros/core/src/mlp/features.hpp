@@ -9,7 +9,7 @@
 //   0–2: Σ (c⁺ − c⁻) a       3, 4: Σ c, Σ c²       5–7, 8–10: Σ of (c⁺ − c⁻)² a aᵀ, xx yy zz, xy xz yz
 //   11–18: how deep the corners of the box are cut off, +++ ++− +−+ +−− −++ −+− −−+ −−−
 //
-// Axes are mirrored so that 0–2 are not above 0.
+// Axes are mirrored so that 0–2 are not above 0, but for `tie`.
 #pragma once
 
 #include "network.hpp"
@@ -19,6 +19,9 @@ namespace box_contact::BOX_CONTACT_SET::mlp {
 
 // A slope that is a smaller part of the sum of the three counts as 0: the digits of float32 end before it.
 constexpr float least_slope = 1e-8F;
+// Where boxes are centre above centre, features 0–2 are 0 but for rounding. Then Σ c a_i a_j decides how
+// the second axis is mirrored: less than this of a feature, and above its rounding.
+constexpr float tie = 1e-5F;
 
 template <class F>
 struct Features {
@@ -45,9 +48,14 @@ struct Features {
     auto add_products = [&](int i, int j) {
       return add(pull[0][i] * pull[0][j], pull[1][i] * pull[1][j]);
     };
+    auto across = [&](int i, int j) {
+      auto of = [&](int n) { return depth[n] * (slabs[n].slope[i] * slabs[n].slope[j]); };
+      return add(of(0), of(1));
+    };
     for (int i = 0; i < 3; ++i) {
-      F all = add(pull[0][i], pull[1][i]);
-      flip[i] = either<F>(all > F{}, splat<F>(-1.0F), splat<F>(1.0F));
+      F all = add(pull[0][i], pull[1][i]), decides = all;
+      for (int j = 0; j < i; ++j) decides = decides + tie * (flip[j] * across(i, j));
+      flip[i] = either<F>(decides > F{}, splat<F>(-1.0F), splat<F>(1.0F));
       numbers[i] = flip[i] * all;
       numbers[5 + i] = add_products(i, i);
     }

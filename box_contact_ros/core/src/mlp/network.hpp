@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Multilayer perceptrons with two hidden layers, of rectified units or of tanh, and models that ask
-// them. The weights are in memory, so one function runs networks of all sizes.
+// them. The last layer may read the inputs, too. The weights are in memory, so one function runs
+// networks of all sizes.
 #pragma once
 
 #include "../query.hpp"
@@ -17,14 +18,14 @@ using detail::network_units_max;
 // that is not full, and inputs up to a multiple of four, are padded with zeros.
 struct Network {
   int inputs, first, second, outputs;  // units
-  bool is_tanh, in_half_edges;
+  bool is_tanh, in_half_edges, has_path;
   const float* numbers;
 };
 
 // A network in memory: the fields of `Network`, and then the groups of all layers.
 inline Network view(const float* numbers) {
-  return {int(numbers[0]),    int(numbers[1]),    int(numbers[2]),         int(numbers[3]),
-          numbers[4] != 0.0F, numbers[5] != 0.0F, numbers + network_header};
+  return {int(numbers[0]),    int(numbers[1]),    int(numbers[2]),    int(numbers[3]),
+          numbers[4] != 0.0F, numbers[5] != 0.0F, numbers[6] != 0.0F, numbers + network_header};
 }
 
 BC_INLINE constexpr int up_to_fours(int units) { return (units + 3) & ~3; }
@@ -112,13 +113,15 @@ BC_INLINE const float* layer(const float* numbers, const F* inputs, int count, i
 // models share it.
 template <class F>
 [[gnu::noinline]] void answer(const Network& network, const F* inputs, int wanted, F* outputs) {
-  F first[network_units_max], second[network_units_max];
+  F first[network_units_max], last[up_to_fours(detail::network_features) + network_units_max];
   Activation hidden = network.is_tanh ? Activation::tanh : Activation::rectified;
   int count = up_to_fours(network.inputs), units = up_to_fours(network.first);
   const float* numbers = layer(network.numbers, inputs, count, units, hidden, first);
+  int path = network.has_path ? count : 0;
+  for (int k = 0; k < path; ++k) last[k] = inputs[k];
   count = units, units = up_to_fours(network.second);
-  numbers = layer(numbers, first, count, units, hidden, second);
-  layer(numbers, second, units, wanted, Activation::none, outputs);
+  numbers = layer(numbers, first, count, units, hidden, last + path);
+  layer(numbers, last, path + units, wanted, Activation::none, outputs);
 }
 
 // A model that asks a network. `Way<T>` is made of a network and Queries<T>, and has
