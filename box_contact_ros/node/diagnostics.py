@@ -380,7 +380,7 @@ def _period(stamps: np.ndarray) -> float:
     return float(np.median(np.diff(stamps))) if len(stamps) > 1 else math.inf
 
 
-def some_names(names: Sequence[str]) -> str:
+def some_names(names: Sequence[str], most: int = NAMED) -> str:
     """Return the first names, and how many there are besides."""
-    more = len(names) - NAMED
-    return ', '.join(names[:NAMED]) + (f' and {more} more' if more > 0 else '')
+    more = len(names) - most
+    return ', '.join(names[:most]) + (f' and {more} more' if more > 0 else '')

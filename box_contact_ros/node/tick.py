@@ -17,6 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from ..scene.scene import NOWHERE
+from ..scene.scene_check import Row
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import absent_poses, are_poses, pose_fault
 from ..stream.cdr import NANOSECONDS, MessageError
@@ -92,6 +94,44 @@ class PoseQueue:
         return self._turns > 1
 
 
+class LastPoses:
+    """The last pose of each box and body that moves, in messages of one or of all of them."""
+
+    def __init__(self) -> None:
+        self._single: dict[str, tuple[int, Row]] = {}  # stamp [ns] and pose, by name
+        self._names: tuple[str, ...] = ()
+        self._stamps, self._rows = np.zeros(0, np.int64), np.zeros((0, 7))  # of these names
+        self._newest = 0  # stamp of the last message
+
+    def forget(self) -> None:
+        """Forget all poses."""
+        self._single.clear()
+        self._names = ()
+
+    def take(self, name: str, pose: StampedPose) -> None:
+        """Note the pose of one name."""
+        self._single[name] = pose.stamp, pose.numbers
+        self._newest = pose.stamp
+
+    def take_all(self, names: tuple[str, ...], poses: StampedPose, missing: np.ndarray) -> None:
+        """Note the poses (n, 7) of n names but for the rows that are missing (k,)."""
+        rows, stamps = poses.numbers, np.full(len(names), poses.stamp)
+        if len(missing):
+            known = {name: row for row, name in enumerate(self._names)}
+            former = np.array([known.get(names[row], -1) for row in missing.tolist()], np.int64)
+            rows = rows.copy()
+            rows[missing] = np.vstack((self._rows, NOWHERE))[former]
+            stamps[missing] = np.append(self._stamps, 0)[former]
+        self._names, self._stamps, self._rows, self._newest = names, stamps, rows, poses.stamp
+
+    def within(self, max_age: int) -> dict[str, Row]:
+        """Return the poses by name whose stamps are within max_age [ns] of the newest; 0: all."""
+        known = {name: (stamp, tuple(row)) for name, stamp, row in zip(
+            self._names, self._stamps.tolist(), self._rows.tolist()) if row[0] == row[0]}
+        return {name: row for name, (stamp, row) in {**known, **self._single}.items()
+                if not 0 < max_age < abs(self._newest - stamp)}
+
+
 class TickAnswerer:
     """Answers ticks of poses; every pose that is refused is counted and noted, never answered.
 
@@ -109,6 +149,7 @@ class TickAnswerer:
         self.set_solver(solver)
         self.set_times(settings)
         self._queues: dict[str, PoseQueue] = {}  # by box
+        self._last = LastPoses()
         self.active = False
         self.after: Callable[[], None] | None = None
 
@@ -131,6 +172,15 @@ class TickAnswerer:
         self._named = NamedPoses(scene.moving)
         self.pairing.set_partners(scene)
 
+    def reset(self) -> None:
+        """Forget all poses and stamps."""
+        self.pairing.reset()
+        self._last.forget()
+
+    def last_poses(self) -> dict[str, Row]:
+        """Return by name the last poses of what moves, not older than `max_age`."""
+        return self._last.within(self.pairing.max_age)
+
     def set_times(self, settings: Mapping[str, Any]) -> None:
         """Take `tolerance` and `max_age` of checked parameters [s]."""
         self.pairing.tolerance, self.pairing.max_age = (
@@ -139,7 +189,7 @@ class TickAnswerer:
     def callback_of(self, box: str, topic: str) -> PoseCallback:
         """Return the callback for the bytes of a box, or of all; it raises nothing at all."""
         queue = self._queues[box] = PoseQueue(partial(self._topics.publisher_count, box))
-        read = self._read_all if box == ALL_BOXES else read_pose
+        read = self._read_all if box == ALL_BOXES else partial(self._read_one, box)
 
         def callback(data: bytes, info: Mapping[str, Any]) -> None:
             if not self.active:
@@ -170,6 +220,12 @@ class TickAnswerer:
         self._monitor.shared = [box for box, queue in self._queues.items() if queue.is_shared]
         return lost
 
+    def _read_one(self, box: str, data: bytes) -> StampedPose:
+        """Return the pose of a box or body."""
+        pose = read_pose(data)
+        self._last.take(box, pose)
+        return pose
+
     def _read_all(self, data: bytes) -> StampedPose:
         """Return the poses of all that moves; a bad one is counted, and its name absent."""
         moving = self.solver.moving
@@ -189,6 +245,7 @@ class TickAnswerer:
             self._refuse(MessageError('bad pose', f'{pose_fault(poses.numbers[row])}'), moving[row])
         poses.numbers[missing] = np.nan
         self._monitor.absent = [moving[row] for row in missing]
+        self._last.take_all(moving, poses, missing)
         return poses
 
     def _answer(self, tick: TickPoses, arrived: int) -> None:

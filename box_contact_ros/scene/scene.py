@@ -317,12 +317,14 @@ class Scene:
             kinds = np.frombuffer(b''.join(number_of), bool).reshape(-1, kinds.shape[1])
         vars(scene)['_kinds'] = kinds, kind
 
-    def with_boxes(self, boxes: Mapping[str, Box], bodies: Mapping[str, Frame]) -> Scene:
-        """Return the scene of other boxes and bodies, which a changed scene may have.
+    @classmethod
+    def as_changed(cls, **fields: Any) -> Scene:
+        """Return a scene of all these fields as changes may leave it: patterns may match no box.
 
         Raises SceneError.
         """
-        scene = self._with(boxes, bodies)
+        scene = object.__new__(cls)
+        vars(scene).update(fields)
         _check_kinds(scene)
         _check_bodies(scene)
         _check_pairs(scene)

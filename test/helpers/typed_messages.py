@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import chain, repeat
 from typing import Any
 
@@ -25,10 +26,11 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import MultiDOFJointState
 from std_msgs.msg import Header
 
-from box_contact_msgs.msg import Box, BoxPair, Contacts
+from box_contact_msgs.msg import Box, BoxPair, Code, Contacts
 from box_contact_msgs.msg import Contact as ContactMessage
 from box_contact_msgs.msg import Near as NearMessage
 from box_contact_ros.node.messages import make_header
+from box_contact_ros.node.paced_service import refuse
 from box_contact_ros.scene.scene import Pair
 from box_contact_ros.solver.checks import pose_fault
 from box_contact_ros.solver.contact import FIELDS, Contact
@@ -41,6 +43,18 @@ NUMBERS = {'double': 'd', 'int32': 'i', 'uint32': 'I', 'uint64': 'Q'}
 """Formats of `struct` by the kinds of fields."""
 TOLD = FIELDS[:-1]
 """What a message says of a contact: all but its axis."""
+
+
+def answered(request: Any, response: Any, answer: Callable[[Any, Any], Iterable[None] | None],
+             ) -> Any:
+    """Return a response as the node sends it; `answer` fills it in, in steps or at once."""
+    try:
+        deque(answer(request, response) or (), maxlen=0)
+    except ValueError as error:
+        refuse(response, error)
+    else:
+        response.success, response.code.value = True, Code.OK
+    return response
 
 
 def pose_stamped(numbers: Iterable[float], frame_id: str, stamp: int) -> PoseStamped:

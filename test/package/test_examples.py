@@ -29,7 +29,7 @@ CLIENTS = ('check_client.py', 'lockstep_client.py', 'forces_client.py', 'lift.py
 LIFT = f'{ROOT}/config/scenes/lift.yaml'
 PARAMETERS = dict.fromkeys(('lift.py', 'save_yard.py', 'crane_lift.py'),
                            (f'scene:={LIFT}', 'pair_topics:=false'))
-ARGUMENTS = {'save_yard.py': (LIFT, '/tmp/yard.yaml')}
+ARGUMENTS = {'save_yard.py': ('/tmp/yard.yaml',)}
 RUNS = {'lift.py': 10, 'lockstep_client.py': 2}
 """A simulator that is started anew repeats the stamps of its last run, and finds what it left."""
 NEEDS = {'mujoco_loop.py': 'mujoco', 'container_stack.py': 'mujoco',

@@ -88,7 +88,9 @@ class Yard:
     def whole(self) -> Scene:
         """Return the scene as a new one: boxes in the order in which they came first."""
         names = sorted(self.boxes, key=self.first.__getitem__)
-        return self.scene.with_boxes({name: self.boxes[name] for name in names}, self.bodies)
+        fields = {name: getattr(self.scene, name) for name in Scene.__dataclass_fields__}
+        return Scene.as_changed(**fields | {
+            'boxes': {name: self.boxes[name] for name in names}, 'bodies': self.bodies})
 
 
 @pytest.mark.parametrize('margin', [0.0, 0.5])
