@@ -21,10 +21,10 @@ from ..scene.scene_solver import SceneSolver
 from ..solver.checks import absent_poses, are_poses, pose_fault
 from ..stream.cdr import NANOSECONDS, MessageError
 from ..stream.pairing import OVERTAKEN, PAIRINGS, Pairing, StampedPose, TickPoses
-from ..stream.read_poses import NamedPoses, read_pose, read_poses
+from ..stream.read_poses import NamedPoses, read_pose
 from ..stream.streams import ALL_BOXES
 from ..stream.write_contacts import TickWriter
-from .diagnostics import TickMonitor, some_names
+from .diagnostics import TickMonitor
 from .parameters import reason_of
 from .topics import PoseCallback, SceneTopics
 
@@ -172,18 +172,10 @@ class TickAnswerer:
 
     def _read_all(self, data: bytes) -> StampedPose:
         """Return the poses of all that moves; a bad one is counted, and its name absent."""
-        moving = self.solver.moving
-        if self.solver.scene.poses == 'named':
-            poses = self._named(data)
-            self._monitor.unknown = self._named.unknown
-            if self._named.unknown:
-                self._counts[UNKNOWN_NAMES] += len(self._named.unknown)
-        else:
-            poses = read_poses(data)
-            if len(poses.numbers) != len(moving):
-                raise MessageError('wrong number of poses',
-                                   f'{len(poses.numbers)} poses, but {len(moving)} move: '
-                                   f'{some_names(moving)}')
+        moving, poses = self.solver.moving, self._named(data)
+        self._monitor.unknown = self._named.unknown
+        if self._named.unknown:
+            self._counts[UNKNOWN_NAMES] += len(self._named.unknown)
         missing = np.flatnonzero(~are_poses(poses.numbers))
         for row in missing[~absent_poses(poses.numbers[missing])]:
             self._refuse(MessageError('bad pose', f'{pose_fault(poses.numbers[row])}'), moving[row])
@@ -203,7 +195,7 @@ class TickAnswerer:
             points.publish(point)
             normals.publish(normal)
         self._topics.contacts.publish(contacts)
-        # What nobody waits for comes last. A box that an array leaves out is not there: nobody
+        # What nobody waits for comes last. A box that the message leaves out is not there: nobody
         # asks for its pairs.
         age, scene = time.time_ns() - arrived if arrived else 0, self._writer.solver.scene
         open_pairs = [] if scene.in_one_message else [scene.pair_of(*boxes) for boxes in stale]

@@ -51,24 +51,6 @@ def _read_in_python(data: bytes) -> StampedPose:
     return pose
 
 
-def read_poses(data: bytes) -> StampedPose:
-    """Return all poses of a serialised PoseArray, numbers (n, 7), or raise MessageError.
-
-    A row may be no pose: the box of that row has none.
-    """
-    data = bytes(data)
-    order, sec, nanosec, length = parse_head(data, 'PoseArray')
-    count_at = -(-(FRAME_AT + length) // 4) * 4
-    count = struct.unpack_from(f'{order}I', data, count_at)[0] if count_at + 4 <= len(data) else 0
-    at = ENCAPSULATION + -(-count_at // 8) * 8 if count else count_at + 4
-    if not 0 <= len(data) - (at + count * POSE_BYTES) <= PADDING:
-        raise MessageError('not a PoseArray', f'{len(data)} bytes, where {count} poses with a '
-                                              f'frame_id of {length} need '
-                                              f'{at + count * POSE_BYTES}')
-    numbers = np.frombuffer(data, f'{order}f8', 7 * count, at).reshape(count, 7).astype(np.float64)
-    return StampedPose(numbers, parse_frame(data, length, 'PoseArray'), _stamp(sec, nanosec))
-
-
 class NamedPoses:
     """Reads the poses of what moves from MultiDOFJointState messages.
 
@@ -93,21 +75,21 @@ class NamedPoses:
 
     def _read_in_python(self, data: bytes) -> StampedPose:
         order, sec, nanosec, length = parse_head(data, NAMED)
-        frame_id = parse_frame(data, length, NAMED)
         try:
             given, poses = _parse_named(data, order, FRAME_AT + length)
         except struct.error as error:
             raise MessageError(f'not a {NAMED}', f'{len(data)} bytes: {error}') from None
+        frame_id, stamp = parse_frame(data, length, NAMED), _stamp(sec, nanosec)
         row_of = {name: row for row, name in enumerate(self._names)}
         numbers = np.full((len(row_of), 7), np.nan)
         for number, (name, pose) in enumerate(zip(given, poses)):
-            if name in given[:number]:
+            if name in row_of and name in given[:number]:
                 raise MessageError('doubled name', f'joint_names[{number}]: {short_repr(name)} is '
                                                    f'joint_names[{given.index(name)}], too')
             if name in row_of:
                 numbers[row_of[name]] = pose
         self.unknown = tuple(name for name in given if name not in row_of)
-        return StampedPose(numbers, frame_id, _stamp(sec, nanosec))
+        return StampedPose(numbers, frame_id, stamp)
 
 
 def _parse_named(data: bytes, order: str, at: int) -> tuple[list[str], np.ndarray]:
@@ -117,11 +99,13 @@ def _parse_named(data: bytes, order: str, at: int) -> tuple[list[str], np.ndarra
         return struct.unpack_from(f'{order}I', data, at)[0], at + 4
 
     count, at = count_at(at)
-    names = []
+    names: list[str] = []
     for _ in range(count):
         length, at = count_at(at)
         if at + length > len(data):
             raise struct.error(f'a name of {length} bytes ends behind them')
+        if length and data.find(b'\0', at, at + length) != at + length - 1:
+            raise struct.error(f'joint_names[{len(names)}] does not end with its first zero')
         names.append(data[at:at + length].removesuffix(b'\0').decode(errors='backslashreplace'))
         at += length
     poses = np.zeros((0, 7))
