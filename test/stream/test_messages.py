@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import struct
+import time
 from collections import Counter
 from dataclasses import replace
 from functools import partial
@@ -49,6 +50,7 @@ from box_contact_ros.scene.scene_solver import SceneSolver
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contacts_of import TooManyNear
 from box_contact_ros.solver.nearest import Nearests
+from box_contact_ros.stream import read_poses
 from box_contact_ros.stream.cdr import MessageError
 from box_contact_ros.stream.pairing import StampedPose
 from box_contact_ros.stream.read_contacts import read_contacts
@@ -182,7 +184,7 @@ def test_headers_are_checked(change, reason):
 
 def named_bytes(names, rows, *, order='<', frame=b'map\0', padding=b'\0', extra=(0, 0), tail=b''):
     """Return a MultiDOFJointState; extra: how many twists and wrenches it has."""
-    body = b''
+    body = bytearray()
 
     def add(size, data):
         nonlocal body
@@ -200,7 +202,7 @@ def named_bytes(names, rows, *, order='<', frame=b'map\0', padding=b'\0', extra=
         count(number)
         if number:
             add(8, struct.pack(f'{order}{np.size(numbers)}d', *np.ravel(numbers)))
-    return (b'\0\1' if order == '<' else b'\0\0') + b'\0\0' + body + tail
+    return bytes((b'\0\1' if order == '<' else b'\0\0') + b'\0\0' + body + tail)
 
 
 @given(st.lists(st.tuples(st.permutations((*MOVING, 'c333', 'ö')), st.integers(0, 6), FRAMES),
@@ -214,7 +216,7 @@ def test_named_poses_are_read_by_name(messages, padding):
         bytes_of = {'<': named_bytes(list(rows), list(rows.values()), padding=padding),
                     '>': named_bytes(list(rows), list(rows.values()), order='>')}
         for order, data in bytes_of.items():
-            assert (native.NamedPoses(MOVING).read(data) is None) == (order == '>')
+            assert (native.NamedPoses(MOVING, 6).read(data) is None) == (order == '>')
             stamped = read(data)
             assert (stamped.frame_id, stamped.stamp) == ('map', STAMP)
             for row, name in zip(stamped.numbers, MOVING):
@@ -257,6 +259,44 @@ def test_bytes_that_are_no_named_poses_are_refused(data, reason):
         read(data)
     assert refused.value.reason == reason
     assert read(named_bytes(['c1'], [POSE])).numbers[1].tolist() == list(POSE)
+
+
+@pytest.mark.parametrize('order', '<>')
+def test_reading_names_takes_time_by_their_number(order):
+    """Of 20,000 that move, the last one is there twice: which one is told, within .3 s.
+
+    That the time of reading goes by the square of the number made it 3 s.
+    """
+    names = tuple(f'c{number}' for number in range(20_000))
+    given = [*names, names[-1]]
+    data, read = named_bytes(given, np.tile(POSE, (len(given), 1)), order=order), NamedPoses(names)
+    began = time.process_time()
+    with pytest.raises(MessageError, match=r"joint_names\[20000\]: 'c19999' is joint_names\[19999"):
+        read(data)
+    assert time.process_time() - began < 0.3
+
+
+@pytest.mark.parametrize('order', '<>')
+def test_a_count_of_names_is_judged_before_them(order, monkeypatch):
+    """By the bytes that are there, 4 for a name and 56 for its pose, and by the limit."""
+    head = named_bytes([], [], order=order)[:20]
+    data = head + b'\xff' * 4 + bytes(6_000_000)
+    began = time.process_time()
+    with pytest.raises(MessageError, match='4294967295 joint_names and transforms need more'):
+        NamedPoses(MOVING)(data)
+    assert time.process_time() - began < 0.1
+    monkeypatch.setattr(read_poses, 'MOST_BOXES', 3)
+    read = NamedPoses(MOVING)
+    assert read.unknown == ()
+    for others in ('abc', 'abcd'):
+        data = named_bytes([*MOVING, *others], [POSE] * (4 + len(others)), order=order)
+        if len(others) == 3:
+            assert not np.isnan(read(data).numbers).any() and read.unknown == tuple(others)
+            continue
+        for told in (data, data.replace(b'hook', b'h\0ok')):  # no name is looked at
+            with pytest.raises(MessageError, match='^8 joint_names, more than 7$') as refused:
+                read(told)
+            assert refused.value.reason == 'too many names'
 
 
 # --- contacts out ---------------------------------------------------------------------------------
