@@ -98,12 +98,17 @@ class SceneTopics:
         if len(labels) < len(pairs):
             raise ValueError(f'scene: {labels.most_common(1)[0][0]} is the name of two pairs: list '
                              'one of them with a name of its own')
-        topics = [topic for pair in pairs for topic in self._topics_of(pair)]
-        for topic in (f'{prefix}contacts', *topics, *topics_of(scene).values()):
+        remedies = {
+            f'{prefix}contacts': '',
+            **{topic: ': set pair_topics to false' for pair in pairs
+               for topic in self._topics_of(pair)},
+            **dict.fromkeys(topics_of(scene).values(), ': write poses: named in the scene file')}
+        for topic, remedy in remedies.items():
             try:
                 node.resolve_topic_name(topic)
             except RCLError as error:
-                raise ValueError(f'topic {short_repr(topic)}: {error}') from error
+                reason = str(error).partition(', at ')[0]  # of rcl's sources
+                raise ValueError(f'topic {short_repr(topic)}: {reason}{remedy}') from error
         self._subscriptions: dict[str, Subscription] = {}
         self.of_pair: dict[tuple[str, str], tuple[Publisher, Publisher]] = {}
         self.contacts = self._publisher(Contacts, f'{prefix}contacts',
