@@ -204,7 +204,8 @@ class ContactNode(GuardedNode, LifecycleNode):
             self._configure()
         except Exception as error:  # rclpy would swallow it
             self.fault = error
-            self.get_logger().error(f'not configured: {reason_of(error)}')
+            if self.context.ok():  # else a signal has ended it meanwhile
+                self.get_logger().error(f'not configured: {reason_of(error)}')
             return TransitionCallbackReturn.FAILURE
         return super().on_configure(state)
 

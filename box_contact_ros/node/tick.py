@@ -23,14 +23,12 @@ from ..scene.scene_solver import SceneSolver
 from ..solver.checks import absent_poses, are_poses, pose_fault
 from ..stream.cdr import NANOSECONDS, MessageError
 from ..stream.pairing import OVERTAKEN, PAIRINGS, Pairing, StampedPose, TickPoses
-from ..stream.read_poses import NamedPoses, read_pose, read_poses
+from ..stream.read_poses import NamedPoses, read_pose
 from ..stream.streams import ALL_BOXES
 from ..stream.write_contacts import TickWriter
-from .diagnostics import TickMonitor, some_names
+from .diagnostics import TickMonitor
 from .parameters import reason_of
 from .topics import PoseCallback, SceneTopics
-
-UNKNOWN_NAMES = 'unknown names'
 
 
 class PoseQueue:
@@ -39,7 +37,7 @@ class PoseQueue:
     A full queue pushes its oldest pose out. EventsExecutor still has an event for it, and timers
     and services come behind all events. In a node that is too slow, they would wait ever longer.
     So poses that wait when a loss shows are dropped. That takes no time, and empties both queues.
-    Each publisher numbers its own poses. While there are several, losses are not told.
+    Each publisher numbers its own poses. While there are several, losses are unknown.
     """
 
     def __init__(self, publisher_count: Callable[[], int]) -> None:
@@ -47,7 +45,7 @@ class PoseQueue:
         self._publisher_count = publisher_count
         self._sequence: int | None = None  # number that the publisher gave the last pose
         self._arrived = self._new_from = 0  # by the wall clock [ns]
-        self._lost = 0
+        self._lost: int | None = 0  # None: numbers of several publishers did not follow
         self._has_several = False  # publishers, from a number that does not follow to a report
         self._turns = 0  # how often numbers went back meanwhile
 
@@ -70,8 +68,9 @@ class PoseQueue:
         self._has_several = self._has_several or self._publisher_count() > 1
         if self._has_several:
             self._turns += periods <= 0
+            self._lost = None
         elif periods > 0:
-            self._lost += periods - 1
+            self._lost = None if self._lost is None else self._lost + periods - 1
             now = time.time_ns()
             if (now - arrived) * periods > 2 * (arrived - self._arrived):  # not lost on the way
                 self._new_from = now
@@ -80,8 +79,8 @@ class PoseQueue:
         """Begin before the next pose: those that come while nobody asks for any are not lost."""
         self._sequence = None
 
-    def take_lost(self) -> int:
-        """Return how many poses never came since the last call."""
+    def take_lost(self) -> int | None:
+        """Return how many poses never came since the last call; None: nobody knows."""
         if self._has_several and self._publisher_count() < 2:
             self._has_several, self._turns = False, 0
             self.restart()
@@ -214,11 +213,11 @@ class TickAnswerer:
                 self.after()
         return callback
 
-    def take_lost(self) -> int:
-        """Return how many poses never came since the last call; note which boxes are shared."""
-        lost = sum(queue.take_lost() for queue in self._queues.values())
+    def take_lost(self) -> int | None:
+        """Return how many poses never came, None: nobody knows; note which boxes are shared."""
+        lost = [queue.take_lost() for queue in self._queues.values()]
         self._monitor.shared = [box for box, queue in self._queues.items() if queue.is_shared]
-        return lost
+        return None if None in lost else sum(filter(None, lost))
 
     def _read_one(self, box: str, data: bytes) -> StampedPose:
         """Return the pose of a box or body."""
@@ -228,18 +227,10 @@ class TickAnswerer:
 
     def _read_all(self, data: bytes) -> StampedPose:
         """Return the poses of all that moves; a bad one is counted, and its name absent."""
-        moving = self.solver.moving
-        if self.solver.scene.poses == 'named':
-            poses = self._named(data)
-            self._monitor.unknown = self._named.unknown
-            if self._named.unknown:
-                self._counts[UNKNOWN_NAMES] += len(self._named.unknown)
-        else:
-            poses = read_poses(data)
-            if len(poses.numbers) != len(moving):
-                raise MessageError('wrong number of poses',
-                                   f'{len(poses.numbers)} poses, but {len(moving)} move: '
-                                   f'{some_names(moving)}')
+        moving, poses = self.solver.moving, self._named(data)
+        self._monitor.unknown = self._named.unknown
+        if self._named.unknown:
+            self._counts['unknown names'] += len(self._named.unknown)
         missing = np.flatnonzero(~are_poses(poses.numbers))
         for row in missing[~absent_poses(poses.numbers[missing])]:
             self._refuse(MessageError('bad pose', f'{pose_fault(poses.numbers[row])}'), moving[row])
@@ -260,7 +251,7 @@ class TickAnswerer:
             points.publish(point)
             normals.publish(normal)
         self._topics.contacts.publish(contacts)
-        # What nobody waits for comes last. A box that an array leaves out is not there: nobody
+        # What nobody waits for comes last. A box that the message leaves out is not there: nobody
         # asks for its pairs.
         age, scene = time.time_ns() - arrived if arrived else 0, self._writer.solver.scene
         open_pairs = [] if scene.in_one_message else [scene.pair_of(*boxes) for boxes in stale]

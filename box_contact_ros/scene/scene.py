@@ -35,9 +35,9 @@ EVERY_PAIR = (('*', '*'),)
 MOVES = (': leave `pose` out of a box that moves, and give its pose in the call; or, in Python, '
          'ask contacts_of(sizes, poses)')
 """What to do about boxes that are all fixed."""
-POSES = ('topics', 'array', 'named')
-"""How the poses of what moves come: on a topic each; in one message, in the order of the scene; in
-one message, by names. The boxes that move change in scenes of the last kind alone."""
+POSES = ('topics', 'named')
+"""How the poses of what moves come: on a topic each; in one message, by names. The boxes that move
+change in scenes of the latter kind alone."""
 MOST_BOXES = 100_000
 """Of a scene that changes."""
 ALONE = -1

@@ -15,7 +15,6 @@ from geometry_msgs.msg import (
     Point,
     PointStamped,
     Pose,
-    PoseArray,
     PoseStamped,
     Quaternion,
     Transform,
@@ -62,11 +61,6 @@ def pose_stamped(numbers: Iterable[float], frame_id: str, stamp: int) -> PoseSta
     return PoseStamped(header=make_header(stamp, frame_id), pose=_pose(numbers))
 
 
-def pose_array(rows: Iterable[Iterable[float]], frame_id: str, stamp: int) -> PoseArray:
-    """Return the message of poses (n, 7); stamp [ns]."""
-    return PoseArray(header=make_header(stamp, frame_id), poses=[_pose(row) for row in rows])
-
-
 def joint_state(poses: Mapping[str, Iterable[float]], frame_id: str, stamp: int,
                 ) -> MultiDOFJointState:
     """Return the message of poses by name; stamp [ns]."""
@@ -107,7 +101,7 @@ def _pose(numbers: Iterable[float]) -> Pose:
 
 def read_pose(message: PoseStamped) -> StampedPose:
     """Return the pose of a message, or raise MessageError."""
-    numbers = _numbers(message.pose)
+    numbers = _numbers(message.pose.position, message.pose.orientation)
     pose = _stamped(np.array(numbers), message.header)
     fault = pose_fault(numbers)
     if fault:
@@ -115,14 +109,23 @@ def read_pose(message: PoseStamped) -> StampedPose:
     return pose
 
 
-def read_poses(message: PoseArray) -> StampedPose:
-    """Return all poses of a message, numbers (n, 7) as they are, or raise MessageError."""
-    numbers = np.array([_numbers(pose) for pose in message.poses], dtype=float).reshape(-1, 7)
-    return _stamped(numbers, message.header)
+def read_named(moving: Sequence[str], message: MultiDOFJointState) -> StampedPose:
+    """Return the poses (n, 7) of what moves, NaN for the rest, or raise MessageError."""
+    names, transforms = message.joint_names, message.transforms
+    if len(names) != len(transforms):
+        raise MessageError('not a MultiDOFJointState', 'names and transforms differ in number')
+    numbers = np.full((len(moving), 7), np.nan)
+    stamped = _stamped(numbers, message.header)
+    for row, name in enumerate(moving):
+        if names.count(name) > 1:
+            raise MessageError('doubled name', name)
+        if name in names:
+            transform = transforms[names.index(name)]
+            numbers[row] = _numbers(transform.translation, transform.rotation)
+    return stamped
 
 
-def _numbers(pose: Pose) -> Sequence[float]:
-    p, q = pose.position, pose.orientation
+def _numbers(p: Point | Vector3, q: Quaternion) -> Sequence[float]:
     return p.x, p.y, p.z, q.x, q.y, q.z, q.w
 
 

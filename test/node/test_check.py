@@ -238,7 +238,7 @@ def test_a_question_is_answered_as_a_tick_of_the_scene_that_it_makes(margin: flo
         response = asked(answerer, *(a_box(name, *guest) for name, guest in guests.items()),
                          *(a_box(name, place) for name, place in named.items()), margin=margin)
         whole = Scene({**{name: Box(size) for name, (_, size) in guests.items()}, **boxes},
-                      scene.pairs, patterns=(('guest*', '*'), *patterns), poses='array')
+                      scene.pairs, patterns=(('guest*', '*'), *patterns), poses='named')
         poses_of = {name: place for name, (place, _) in guests.items()} | named
         answer = SceneSolver(whole, margin=margin)([poses_of.get(name) for name in whole.moving])
         listed, near = response.contacts.contacts, response.contacts.near

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from geometry_msgs.msg import PoseArray
 from raw_client import ORIGIN
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
@@ -28,7 +27,7 @@ from rclpy.serialization import serialize_message
 from ros_client import CUBES, DEEP, Client, serving
 from sensor_msgs.msg import MultiDOFJointState
 from std_msgs.msg import Header
-from typed_messages import a_box, contacts_by_pair, joint_state, pose_array
+from typed_messages import a_box, contacts_by_pair, joint_state
 
 from box_contact_msgs.msg import Body, Boxes, Contacts
 from box_contact_msgs.srv import Check, GetBoxes, SetBoxes
@@ -339,25 +338,6 @@ def test_boxes_of_a_scene_of_topics(client: YardClient) -> None:
         stamp = both()
         assert client.is_answered(stamp) and client.contacts[stamp].revision == 1
         assert stamp in client.points
-
-
-def test_an_array_of_another_length_is_refused_by_name(tmp_path: Path) -> None:
-    """With `poses: array`, what moves stays as the file has it."""
-    path = tmp_path / 'yard.yaml'
-    boxes = {**YARD['boxes'], 'c1': {'size': CUBE}}
-    path.write_text(yaml.safe_dump({**YARD, 'poses': 'array', 'boxes': boxes}))
-    with closing(Client()) as client, serving(ContactNode, scene=str(path), pair_topics=False):
-        array = client.node.create_publisher(PoseArray, 'poses', DEEP)
-
-        def send(count: int) -> None:
-            array.publish(pose_array([AWAY] * count, 'map', client.next_stamp()))
-
-        assert client.spin(lambda: client.contacts or send(2))
-        send(1)
-        assert client.diagnostic('refused: wrong number of poses') == '1'
-        refused = client.call(SetBoxes, SERVICE, SetBoxes.Request(
-            header=Header(frame_id='map'), absent=['c1']))
-        assert refused.message == f"absent[0]: 'c1' moves, and stays as it is: {NAMED_ALONE}"
 
 
 class Yard:

@@ -35,7 +35,7 @@ from ...solver.checks import are_poses, short_repr
 from ...stream.cdr import MessageError
 from ...stream.pairing import StampedPose
 from ...stream.read_contacts import ReadContacts, read_contacts
-from ...stream.read_poses import NamedPoses, read_pose, read_poses
+from ...stream.read_poses import NamedPoses, read_pose
 from ...stream.streams import ALL_BOXES, topics_of
 
 KEPT = 1000  # poses kept per topic: a second at 1 kHz
@@ -126,9 +126,7 @@ class PoseTopic(NamedTuple):
         """
         if self.source != ALL_BOXES:
             return _read_one
-        if scene.poses == 'named':
-            return partial(_read_all, NamedPoses(scene.moving))
-        return partial(_read_all, read_poses, count=len(scene.moving))
+        return partial(_read_all, NamedPoses(scene.moving))
 
 
 def pose_topics(scene: Scene) -> list[PoseTopic]:
@@ -142,14 +140,9 @@ def _read_one(data: bytes) -> StampedPose:
     return pose._replace(numbers=np.array([pose.numbers]))
 
 
-def _read_all(read: Callable[[bytes], StampedPose], data: bytes, count: int | None = None,
-              ) -> StampedPose:
+def _read_all(read: Callable[[bytes], StampedPose], data: bytes) -> StampedPose:
     """Return all poses. A bad pose becomes NaN: the contact node reports it."""
     poses = read(data)
-    if count not in (None, len(poses.numbers)):
-        raise MessageError('wrong number of poses',
-                           f'{len(poses.numbers)} poses, but {count} boxes and bodies of the scene '
-                           'move')
     poses.numbers[~are_poses(poses.numbers)] = np.nan
     return poses
 
