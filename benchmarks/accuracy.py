@@ -34,12 +34,13 @@ from .contestant import Contestant, model_or_class, ours
 from .errors import ContactErrors, contact_errors
 from .output import markdown_table
 from .paper.numpy_model import turned
-from .pose_sets import LOADS, SETS, Pairs, drawn
+from .pose_sets import LOADS, SETS, THROUGH, Pairs, drawn
 
-MEASURED = {**SETS, **LOADS, 'settled': settled.at_rest}
+MEASURED = {**SETS, **LOADS, 'settled': settled.at_rest, **THROUGH}
 """Sets of poses: drawn ones, and recorded goods at rest of scenes that train no network."""
 PAIRS, QUICK_PAIRS = 100_000, 5_000
 CLASSES = ('vertex-face', 'edge-edge', 'edge-face', 'face-face')
+OUTSIDE = 0.1  # distance from which a point is outside of a box [% of the edge]
 LEAST = 1e-3  # error that is drawn to scale [%]; smaller ones are at the edge
 MARKS = {'o': 'half of the pairs', '|': '99 %', 'D': 'worst pair'}
 """What is drawn of a set."""
@@ -113,6 +114,8 @@ class AccuracyRow:
     set: str
     errors: Mapping[str, Mapping[str, Summary]]  # by field of `ContactErrors`, then by part
     pairs: int
+    outside: float  # share of points outside of a box by more than `OUTSIDE` [%]
+    farthest: float  # point outside of a box [% of the edge]
 
 
 def measure(model: Contestant, name: str, pairs: Pairs, truth: Contacts) -> AccuracyRow | None:
@@ -127,8 +130,10 @@ def measure(model: Contestant, name: str, pairs: Pairs, truth: Contacts) -> Accu
     touching = pairs.rows(both)
     classes = classify(touching)
     errors = contact_errors(contacts[both], truth[both], touching.edge)
+    beyond = 100.0 * touching.beyond(contacts[both].point) / touching.edge
     return AccuracyRow(
         model=model.name, set=name, pairs=len(both),
+        outside=100.0 * float((beyond > OUTSIDE).mean()), farthest=max(0.0, float(beyond.max())),
         errors={quantity: by_part(values, classes) for quantity, values
                 in errors._asdict().items() if np.isfinite(values).all()})
 
@@ -146,7 +151,7 @@ def measure_all(models: Sequence[Contestant], count: int, seed: int) -> list[Acc
 
 
 def error_table(rows: Sequence[AccuracyRow]) -> str:
-    """Return mean/p99/worst of each quantity over whole sets."""
+    """Return mean/p99/worst of each quantity over whole sets, and which points are outside."""
     def cell(row: AccuracyRow, quantity: str) -> str:
         if quantity not in row.errors:
             return ''
@@ -154,9 +159,9 @@ def error_table(rows: Sequence[AccuracyRow]) -> str:
         return f'{errors.mean:.2g}, {errors.p99:.2g}, {errors.worst:.2g}'
 
     return markdown_table(
-        ['model, set', *ContactErrors._fields],
-        [[f'{row.model}, {row.set}', *(cell(row, name) for name in ContactErrors._fields)]
-         for row in rows])
+        ['model, set', *ContactErrors._fields, 'outside [%]', 'farthest [%]'],
+        [[f'{row.model}, {row.set}', *(cell(row, name) for name in ContactErrors._fields),
+          f'{row.outside:.2g}', f'{row.farthest:.2g}'] for row in rows])
 
 
 def class_table(rows: Sequence[AccuracyRow]) -> str:
@@ -178,7 +183,7 @@ def csv_rows(rows: Sequence[AccuracyRow]) -> Iterator[dict[str, object]]:
         for quantity, parts in row.errors.items():
             for part, errors in parts.items():
                 yield {'model': row.model, 'set': row.set, 'part': part, 'quantity': quantity,
-                       **errors._asdict()}
+                       **errors._asdict(), 'outside': row.outside, 'farthest': row.farthest}
 
 
 def draw(path: Path, table: Path) -> None:
@@ -201,7 +206,7 @@ def draw(path: Path, table: Path) -> None:
     axis.invert_yaxis()
     p99, worst = (max(float(row[column]) for row in rows) for column in ('p99', 'worst'))
     axis.set(xscale='log', xlim=(LEAST, 1.2 * worst),
-             title=f'{" and ".join(models)}: p99 at most {p99:.2g} %, the worst {worst:.2g} %',
+             title=f'{" and ".join(models)}: p99 at most {p99:.2g} %, worst drawn {worst:.2g} %',
              xlabel="point error [% of the smaller box's longest edge]")
     axis.xaxis.set_major_formatter('{x:g}')
     axis.grid(color='0.9', linewidth=0.5)

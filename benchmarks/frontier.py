@@ -29,7 +29,6 @@ from . import output, settled
 from .accuracy import Summary
 from .contestant import (
     CORE_MODELS,
-    MLP_SIZES,
     MODELS,
     Contestant,
     add_models,
@@ -40,7 +39,7 @@ from .contestant import (
 )
 from .engines import add_leave_out, installed, may_miss
 from .output import markdown_table, number
-from .pose_sets import SETS, apart, landings
+from .pose_sets import SETS, apart, landings, parcels
 from .timing import by_round, pinned, usable_cores
 from .trials import (
     FEW_PAIRS,
@@ -56,15 +55,16 @@ from .trials import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-TIMED_SETS = {**SETS, 'just apart': apart, 'landings': landings, 'settled': settled.at_rest,
-              'settled cubes': settled.cubes_at_rest, 'as placed': settled.as_placed}
+TIMED_SETS = {**SETS, 'just apart': apart, 'landings': landings, 'parcels': parcels,
+              'settled': settled.at_rest, 'settled cubes': settled.cubes_at_rest,
+              'as placed': settled.as_placed}
 IN_SHORT = ('exact', 'mlp', 'paper', 'paper-at-rest', 'soup-1', 'soup-8', 'soup-22')
 """Models in the short table; other sizes of `mlp` are in that of `traded`."""
 QUICK_MODELS = ('exact', 'mlp', 'paper', 'soup-1', 'soup-8')
 ODD_NORMAL = 10.0  # error of an engine's normal that is explained [deg]
 
-SIZES = (*MLP_SIZES, 'mlp')
-"""The network of `mlp` by size; `mlp` itself has 32-32."""
+SIZES = ('mlp-16-16', 'mlp', 'mlp-32-32')
+"""The network of `mlp` by size; `mlp` itself has 24-24."""
 CALLS = {'exact': ('exact', 'exact', 0), 'mlp': ('mlp', 'mlp', 12),
          'paper': ('paper', 'paper', 10), 'soup-8': ('polygon soup', 'soup', 0),
          'MuJoCo mj_collision': ('MuJoCo', 'MuJoCo', -13),
@@ -72,9 +72,7 @@ CALLS = {'exact': ('exact', 'exact', 0), 'mlp': ('mlp', 'mlp', 12),
          'Coal ComputeCollision, contact patch': ('Coal', 'Coal', 9),
          'Drake hydroelastic': ('Drake', 'Drake', 0)}
 BATCHES = {'exact': ('exact', 'exact', 0), 'mlp-16-16': ('mlp, 16-16', 'mlp', 2),
-           'mlp': ('32-32', 'mlp', -8),
-           'mlp, linear': ('linear, no bends', 'other', 5),
-           'mlp, idle': ('no network', 'other', 0),
+           'mlp': ('24-24', 'mlp', -4), 'mlp-32-32': ('32-32', 'mlp', -10),
            'paper': ('paper', 'paper', 0)}
 """Contestant: its name in a picture, whose colour it has, and how far it is raised [pt]."""
 PANELS = {'Goods at rest': ('settled', 'settled cubes'),
@@ -97,7 +95,7 @@ PICTURES = {
     'frontier': Picture('call_p50',
                         'A call from Python: distance from the point of exact, the reference',
                         'time of a call from Python [µs]', 1e-3, (0.1, 1e5), CALLS),
-    'frontier_batches': Picture('batch_p50', 'A batch: the network saves time at rest, and errs',
+    'frontier_batches': Picture('batch_p50', 'A batch: the network saves time, and errs',
                                 'time of a pair in a batch [ns]', 1.0, (40.0, 1e3), BATCHES)}
 ERRORS = (1e-1, 3e2)
 """Errors that are drawn to scale [%]; 0 has a band of its own below."""
@@ -282,18 +280,18 @@ def _draw_panel(axis: Axes, found: Mapping[str, tuple[float, float]], picture: P
 
 
 def traded(rows: Sequence[FrontierRow]) -> str:
-    """Return what `mlp` costs in a batch and how far it is off, by size and on both panels."""
-    lines = []
-    for name in ('exact', *reversed(SIZES), 'mlp, linear', 'mlp, idle'):
+    """Return what `mlp` costs and how far it is off, by size: at rest, swaying and deep."""
+    shown, lines = ('settled', 'containers', 'deep'), []
+    for name in ('exact', *SIZES):
         line: list[object] = [f'`{name}`']
-        for of_set in ('settled', 'containers'):
+        for of_set in shown:
             row = next(row for row in rows if (row.name, row.set, row.instruction_set)
                        == (name, of_set, native.instruction_set))
             call, batch = by_exact(row, rows)
             point = row.errors.points['all']
             line += [f'{call:.2f}', f'{batch:.2f}', number(point.p50), number(point.p99)]
         lines.append(line)
-    return markdown_table(['', *(f'{of_set}: {what}' for of_set in ('settled', 'containers')
+    return markdown_table(['', *(f'{of_set}: {what}' for of_set in shown
                                  for what in ('call', 'batch', 'p50 [%]', 'p99 [%]'))], lines)
 
 

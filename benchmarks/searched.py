@@ -5,7 +5,7 @@
 
 `python -m benchmarks.searched` writes searched.md and searched.csv. From the worst of fresh draws
 of each set, pairs climb to the largest error of point, volume or covariance. Sizes climb too where
-the set draws sizes.
+the set draws sizes. Pairs with a mirror are searched for steps alone, where an axis flips.
 """
 from __future__ import annotations
 
@@ -22,18 +22,20 @@ from box_contact_ros.solver.contact_solver import ContactSolver
 
 from . import output
 from .errors import contact_errors
-from .pose_sets import LOADS, SETS, Generator, Pairs
-from .steps import drawn_paths, largest_steps
-from .worst_case import RESTART, climb, worst_start
+from .pose_sets import LOADS, SETS, Generator, Pairs, symmetric
+from .steps import drawn_paths, flip_steps, largest_steps
+from .worst_case import DEPTHS, RESTART, climb, worst_start
 
 DRAWN, CLIMBING = 20_000, 500
 """Pairs that are drawn, and pairs that climb from the worst of them."""
 PATHS, TURN = 60, 0.05
 """Paths on which steps are searched, and how far each turns [rad]."""
-MINUTES, QUICK_MINUTES = 10.0, 0.05  # of a quantity, on all sets
+MINUTES, QUICK_MINUTES = 3.0, 0.05  # of a quantity, on all sets
 QUANTITIES = ('point', 'volume', 'covariance')
-FREE = ('random sizes',)  # sets whose sizes climb too
-UNIT = (1.0, 1.0, 1.0)
+FREE = ('random sizes', 'deep')  # sets whose sizes climb too
+DEEP = {'deep': (DEPTHS[1], 0.7)}
+"""Depths of sets that have others than `DEPTHS` [shortest edge]."""
+MIRROR = 'with a mirror'
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +48,8 @@ class Searched:
 
 
 def worst_of(solver: ContactSolver, quantity: str, pairs: Pairs, rng: np.random.Generator,
-             seconds: float, free_sizes: bool) -> float:
+             seconds: float, *, free_sizes: bool,
+             depths: tuple[float, float] = DEPTHS) -> float:
     """Return the largest error that climbing for that long finds [%]."""
     def score(asked: Pairs) -> np.ndarray:
         contacts, truth = asked.contacts(solver), asked.contacts()
@@ -59,7 +62,8 @@ def worst_of(solver: ContactSolver, quantity: str, pairs: Pairs, rng: np.random.
     pairs = worst_start(pairs, score, CLIMBING)
     most = float(score(pairs).max())
     while time.monotonic() < end:
-        pairs, scores = climb(rng, pairs, score, generations=RESTART, free_sizes=free_sizes)
+        pairs, scores = climb(rng, pairs, score, generations=RESTART, free_sizes=free_sizes,
+                              depths=depths)
         most = float(scores[0])
     return most
 
@@ -68,8 +72,8 @@ def search(name: str, make: Generator, seed: Sequence[int], seconds: float) -> S
     """Search a set, each quantity for that long."""
     solver, rng = ContactSolver(model='mlp'), np.random.default_rng(seed)
     pairs = make(rng, DRAWN)
-    worst = {quantity: worst_of(solver, quantity, pairs, rng, seconds, name in FREE)
-             for quantity in QUANTITIES}
+    worst = {quantity: worst_of(solver, quantity, pairs, rng, seconds, free_sizes=name in FREE,
+                                depths=DEEP.get(name, DEPTHS)) for quantity in QUANTITIES}
     touching = pairs.rows(pairs.contacts().colliding)
     paths = drawn_paths(rng, touching.rows(slice(PATHS)), TURN, flat=name not in SETS)
     return Searched(set=name, worst=worst, steps={
@@ -77,11 +81,20 @@ def search(name: str, make: Generator, seed: Sequence[int], seconds: float) -> S
         for quantity, values in zip(QUANTITIES, largest_steps(solver, paths))})
 
 
+def search_flips(seed: Sequence[int]) -> Searched:
+    """Return the largest steps of pairs with a mirror, where rounding flips an axis."""
+    rng = np.random.default_rng(seed)
+    pairs = symmetric(rng, DRAWN)
+    pairs = pairs.rows(pairs.contacts().colliding)
+    steps = flip_steps(rng, ContactSolver(model='mlp'), pairs).max(axis=0)
+    return Searched(set=MIRROR, worst={}, steps=dict(zip(QUANTITIES, map(float, steps))))
+
+
 def table(rows: Sequence[Searched]) -> str:
     """Return a line for each set."""
     titles = [f'{words}{quantity}' for words in ('', 'step of the ') for quantity in QUANTITIES]
     return output.markdown_table(['set', *titles], [
-        [row.set, *(f'{by[quantity]:.2g}' for by in (row.worst, row.steps)
+        [row.set, *(f'{by[quantity]:.2g}' if by else '–' for by in (row.worst, row.steps)
                     for quantity in QUANTITIES)] for row in rows])
 
 
@@ -89,7 +102,7 @@ def csv_rows(rows: Sequence[Searched], seconds: float) -> Iterator[dict[str, obj
     """Yield a row per set and quantity."""
     for row in rows:
         for quantity in QUANTITIES:
-            yield {'set': row.set, 'quantity': quantity, 'worst': row.worst[quantity],
+            yield {'set': row.set, 'quantity': quantity, 'worst': row.worst.get(quantity),
                    'step': row.steps[quantity], 'seconds': seconds}
 
 
@@ -110,6 +123,7 @@ def main(args: Sequence[str] | None = None) -> int:
     seconds = 60.0 * minutes / len(sets)
     rows = [search(name, make, [options.seed, place], seconds) for place, (name, make)
             in enumerate(tqdm(sets.items(), desc='searched', unit='set'))]
+    rows.append(search_flips([options.seed, len(sets)]))
     output.write_csv(folder / 'searched.csv', csv_rows(rows, seconds), about=output.machine())
     output.write_page(folder, 'searched', args, machine=output.machine(), seed=options.seed,
                       minutes=minutes, seconds=seconds, table=table(rows))

@@ -76,7 +76,11 @@ SETS = {
     'random cubes': 'cubes in any pose, 0.1–10 % deep',
     'random sizes': 'random pairs of sizes, to 1:20',
     'containers': '40 ft containers, 5° sway',
+    'deep': 'boxes deep in each other, 10–70 %',
 }
+"""Sets of accuracy.csv in the table of `mlp`, with their names there."""
+UNSEARCHED = 'through each other'
+"""End of the names of sets that no search and no promise is about."""
 
 
 _table = functools.cache(read_csv)
@@ -162,17 +166,16 @@ def models() -> str:
          'point off, at rest [%]', 'point off, landing [%]'], body)
     where = fastest(rows('native.csv', set=SWAY, contestant='exact volume, single'))
     assert where
-    batches = [by_exact('mlp', of_set, 'batch') for of_set in ('settled', 'landings', SWAY)]
-    return (f'{table}\n\nMedian times on one core, {SHOWN[where["instruction_set"]]}, '
-            f'{where["processor"]}; in C those in brackets are with the size of the patch, which '
-            "Python includes. Off: median and 99th percentile of distances from `exact`'s point, "
-            "in % of the smaller box's longest edge, for engines of 1,000 pairs. Of the ways to "
-            'make one point of theirs, the nearest is taken. At rest: settled, deeper than 1e-9 of '
-            f'the size; {100 * min(shares):.0f} % of them are answered. Moving: swaying '
-            "containers. The paper's networks are trained for each. PyBullet is asked at new "
-            'poses, with five detections; its C is Bullet 3.24 for SSE2. A dash: not measured.\n\n'
-            f'`exact` is the default. In batches from Python `mlp` takes {batches[0]} of its time '
-            f'at rest, {batches[1]} landing and {batches[2]} moving; for one pair it takes longer. '
+    batch = [by_exact('mlp', of_set, 'batch') for of_set in ('settled', 'landings', SWAY)]
+    return (f'{table}\n\nMedians on one core, {SHOWN[where["instruction_set"]]}, '
+            f'{where["processor"]}. In brackets: with the patch, as in Python. Off: p50, p99 from '
+            "`exact`'s point, in % of the smaller box's longest edge; "
+            f'{100 * min(shares):.0f} % are answered. [How each was asked]'
+            '(docs/results/native.md).\n\n'
+            f'`exact` is the default. In batches from Python `mlp` takes {batch[0]} of its time '
+            f'at rest, {batch[1]} landing and {batch[2]} moving; for one pair it takes longer, '
+            f'but its slowest contact takes {slowest("mlp")} ns from C, and that of `exact` '
+            f'{slowest("exact")}. '
             f"For one pair, the paper's network takes {by_exact('paper', 'landings', 'call')} of "
             'the time of `exact` landing.')
 
@@ -193,24 +196,31 @@ def bench() -> str:
             'report](docs/results/bench_exact.md).')
 
 
-def mlp_errors() -> str:
-    """Return the errors of `mlp` by pose set: point, volume, covariance."""
+def mlp() -> str:
+    """Return the batch and the point's p99 of each network by set, and how far `mlp` is off."""
     body = []
+    found = {row['set']: row for row in searched() if row['quantity'] == 'point'}
     for name, words in SETS.items():
         errors = {row['quantity']: row
                   for row in rows('accuracy.csv', model='mlp', set=name, part='all')}
-        body.append([words, cell(errors['point'], 'p99', digits=2),
-                     cell(errors['point'], 'worst', digits=2),
-                     cell(errors['volume'], 'p99', digits=2),
-                     cell(errors['covariance'], 'p99', digits=2)])
-    return markdown_table(['Set', 'point: p99', 'worst', 'volume: p99', 'covariance: p99'], body)
+        line = [words]
+        for model in MLP_SIZES:
+            point, = by_point(model, name).values()
+            line.append(f'{by_exact(model, name, "batch")}, {float(point["point_p99"]):.2g}')
+        worst = cell(found[name], 'worst', digits=2) if name in found else '–'
+        body.append([*line, f'{cell(errors["point"], "worst", digits=2)}, {worst}',
+                     ', '.join(cell(errors[quantity], 'p99', digits=2)
+                               for quantity in ('volume', 'covariance'))])
+    return markdown_table(['Set', *(f'`{model}`' for model in MLP_SIZES),
+                           'worst', 'volume, covariance'], body)
 
 
 def mlp_promise() -> str:
     """Return within what errors of `mlp` are in the worst pose set, as comment lines of C++."""
     def most(quantity: str) -> str:
         worst = max(float(row['p99']) for row in rows(
-            'accuracy.csv', model='mlp', part='all', quantity=quantity))
+            'accuracy.csv', model='mlp', part='all', quantity=quantity)
+            if not row['set'].endswith(UNSEARCHED))
         unit = 10.0 ** (math.floor(math.log10(worst)) - 1)  # of the second digit
         return f'{math.ceil(worst / unit) * unit:.2g} %'
 
@@ -235,9 +245,30 @@ def placed() -> str:
     return f'{ratios[0]:.2g} to {ratios[-1]:.2g}'
 
 
+def slowest(model: str, column: str = 'slowest_ns') -> str:
+    """Return the time of the slowest contact of a model from C, of all sets [ns]."""
+    found = rows('native.csv', contestant=f'{model} covariance, each contact',
+                 instruction_set=next(iter(SHOWN)))
+    return f'{max(float(row[column]) for row in found):,.0f}'
+
+
+MLP_SIZES = ('mlp-16-16', 'mlp', 'mlp-32-32')
+
+
+def batches() -> str:
+    """Return the range of the times of a batch of `mlp`, relative to `exact`."""
+    found = sorted(by_exact('mlp', of_set, 'batch') for of_set in SETS)
+    return f'{found[0]} to {found[-1]}'
+
+
+def searched() -> list[Row]:
+    """Return the rows of the search for the worst, but for those of steps alone."""
+    return [row for row in rows('searched.csv') if row['worst']]
+
+
 def worst_point(file: str, column: str, **wanted: str) -> str:
     """Return the largest error of the point of `mlp` in a column [%]."""
-    worst = max(rows(file, **wanted), key=lambda row: float(row[column]))
+    worst = max(rows(file, **wanted), key=lambda row: float(row[column] or 0))
     return cell(worst, column, digits=2)
 
 
@@ -247,16 +278,23 @@ def reading() -> str:
     return number(1e3 * float(row['reading']) / int(row['boxes']), 1)
 
 
-TABLES = {'models': models, 'bench': bench, 'mlp-errors': mlp_errors}
+TABLES = {'models': models, 'bench': bench, 'mlp': mlp}
 FIGURES = {
     'late': lambda: f'{unsettled(LATE)} of {len(rows("stacks.csv", way=LATE))}',
     'late-own': lambda: str(unsettled(f'{LATE}, 5 % lost, own contacts')),
     'mlp-placed': placed,
     'mlp-settled': lambda: worst_point('accuracy.csv', 'worst', model='mlp', set='settled',
                                        part='all', quantity='point'),
-    'mlp-needles': lambda: worst_point('stability.csv', 'point_worst', model='mlp',
-                                       family='e5_needles'),
+    'mlp-batch': batches,
+    'mlp-slowest': lambda: slowest('mlp'),
+    'exact-slowest': lambda: slowest('exact'),
+    'mlp-through': lambda: worst_point('accuracy.csv', 'worst', model='mlp', part='all',
+                                       set='plates through each other', quantity='point'),
+    'mlp-outside': lambda: cell(rows('accuracy.csv', model='mlp', part='all', quantity='point',
+                                     set='plates through each other')[0], 'outside', digits=2),
+    'mlp-worst': lambda: worst_point('searched.csv', 'worst', quantity='point'),
     'mlp-step': lambda: worst_point('searched.csv', 'step', quantity='point'),
+    'search-minutes': lambda: f'{sum(float(row["seconds"]) for row in searched()) / 60:.0f}',
     'reading': reading,
 }
 

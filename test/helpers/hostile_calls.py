@@ -175,8 +175,10 @@ def bounds_without_an_order() -> None:
 def a_network(rng: np.random.Generator | None = None, inputs: int = native.FEATURES,
               outputs: int = native.OUTPUTS) -> np.ndarray:
     """Return the numbers of a network with eight units in each hidden layer: random, or zeros."""
-    header = [inputs, 8, 8, outputs, 0, 0]
-    count = 8 * (1 + -(-inputs // 4) * 4) + 8 * 9 + -(-outputs // 8) * 8 * 9
+    has_path = inputs == native.FEATURES
+    header = [inputs, 8, 8, outputs, 0, 0, has_path]
+    read = -(-inputs // 4) * 4  # numbers, with those that fill the last four
+    count = 8 * (1 + read) + 8 * 9 + -(-outputs // 8) * 8 * (9 + has_path * read)
     numbers = np.zeros(count) if rng is None else rng.uniform(-1e4, 1e4, count)
     return np.concatenate([header, numbers]).astype(np.float32)
 
@@ -187,9 +189,9 @@ def networks_that_no_file_has() -> None:
         network = a_network()
         network[-1] = number
         refused(ValueError, native.Mlp, network)
-    for count in (0, 2, 6, 8):
+    for count in (0, 2, 7, 9):
         refused(ValueError, native.Mlp, np.zeros(count, np.float32))
-    for place in range(6):
+    for place in range(7):
         for number in (-1.0, 0.5, 65.0, 1e4):
             network = a_network()
             network[place] = number

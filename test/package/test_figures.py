@@ -61,13 +61,13 @@ NUMBER = re.compile(r'(?<![\w.])\d(?:[\w.,/⁰-⁹⁻-]*[\w⁰-⁹])?'
                     r'\b))?')
 """A number with its unit."""
 KNOWN = {
-    'README.md': {'printed by the example above': '10 mm, 100 mm, 0.997',
+    'README.md': {'printed by the example above': '0.997',
                   'downloads, which no report measures': '560 MB, 1 GB'},
-    'docs/results/README.md': {'a whole report, which no CSV names': '30 minutes'},
-    'pages/accuracy.md': {'definitions': '99th, 99 %, 1e-6 %, 6°'},
+    'docs/results/README.md': {'a rate': '1,000 Hz'},
+    'pages/accuracy.md': {'definitions': '99th, 99 %, 1e-6 %, 6°, 0.1 %, 70 %'},
     'pages/distance.md': {'definitions': '1, 64 bits, 2⁻⁵³, 1e10 m'},
     'pages/frontier.md': {'two readings of a clock, which no CSV holds': '0.05 µs',
-                          'what is compared': '32-32, 19, 768',
+                          'what is compared': '24-24, 19, 768',
                           'statistics': '1,000, 4th, 17th, 95, 100'},
     'pages/landing.md': {
         'the landings': '1.25°, 3°, 0.6 m, 2 ms, 40, 20 t, 36, 0.5, 0, 1°, 0.47°, 0.5 ms',
@@ -79,7 +79,7 @@ KNOWN = {
     'pages/named_failures.md': {'tolerances of the verdict': '60, 1e-6, 6 %, 1e-12'},
     'pages/native.md': {'statistics': '98 %', 'set-up': '0, 20, 1 m'},
     'pages/scenes.md': {'the walls': '1 m, 0.1 mm'},
-    'pages/searched.md': {'the search': '20,000, 500, 60'},
+    'pages/searched.md': {'the search': '20,000, 500, 60, 1e-12'},
     'pages/speed.md': {'the step': '1/60 s'},
     'pages/stability.md': {'limits of a wrong answer': '60, 16, 1e-12, 1e-10, 1e-9, 1e-6',
                            'the poses': '1e-16, 1e-3, 1,000, 100,000,000'},

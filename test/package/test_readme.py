@@ -441,7 +441,8 @@ LIMITS = {
         f'older than {constant(TUNING, "overdue_periods")} periods'),
     'explanation/mlp.md': (
         f'reads {LAYERS[0][1]} features',
-        f'two hidden layers of {LAYERS[1][0]} rectified units and {LAYERS[-1][0]} outputs'),
+        f'two hidden layers of {LAYERS[1][0]} rectified units, a linear path beside them, and '
+        f'{LAYERS[-1][0]} outputs'),
     'explanation/separating_axis.md': (
         f'shorter than {PARALLEL} are skipped',),
     'how-to/security.md': (
