@@ -28,8 +28,9 @@ PAUSE = 5.0
 SLICE = 2e-3
 """Processor time [s] after which the next step waits for ticks."""
 GAP = 1e-3
-"""Least time [s] for the ticks that wait. The gap is as long as the steps before it: a timer that
-is due again at once comes before the ticks."""
+"""Least time [s] for the ticks that wait: a timer that is due again at once comes before them."""
+REST = 3.0
+"""Time for ticks after some steps, divided by that of these: three quarters of the node's."""
 MOST_WAITING = 16
 """Costly requests that wait for the end of a pause."""
 KEPT_TIMES = 4096  # of requests, for a report
@@ -165,7 +166,7 @@ class PacedService:
             self._running = None
             running.send(response)
         ended = time.monotonic()
-        self._gap = max(GAP, ended - began)
+        self._gap = max(GAP, REST * (ended - began))
         running.wall += ended - began
         running.cost += time.thread_time() - used
         if response is None:

@@ -44,6 +44,7 @@ def changing(solver: SceneSolver, request: SetBoxes.Request,
         raise _at_its_place(error, places, changes['absent']) from None
     yield
     return changed, [*_absent_warnings(solver.scene, request.absent),
+                     *_detached_warnings(solver.scene, request),
                      *_gone_warnings(solver.scene, changed.scene, request.absent),
                      *_pair_warnings(changed.scene, places)]
 
@@ -149,6 +150,15 @@ def _absent_warnings(scene: Scene, absent: Sequence[str]) -> Iterator[str]:
     for number, name in enumerate(absent):
         if name not in scene.row_of:
             yield f'absent[{number}]: {short_repr(name)} is not there'
+
+
+def _detached_warnings(scene: Scene, request: SetBoxes.Request) -> Iterator[str]:
+    """Yield which parts of bodies are named with a size, as new boxes are."""
+    for path, box, body in _listed(request):
+        known = scene.boxes.get(box.name)
+        if not body and known and known.body and any(size_of(box)):
+            yield (f'{_dotted(path)}: {short_repr(box.name)} was a part of '
+                   f'{short_repr(known.body)}, and came off it')
 
 
 def _gone_warnings(before: Scene, after: Scene, absent: Sequence[str]) -> Iterator[str]:

@@ -573,7 +573,8 @@ def test_an_answer_is_made_in_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     bench.ask('first', 80, 0.01)
     bench.ask('second', 1, 0.01)
     for _ in range(2):
-        assert not bench.sent and bench.timer.timer_period_ns == round(1e9 * STEP)
+        assert not bench.sent and bench.timer.timer_period_ns == round(
+            1e9 * paced_service.REST * STEP)
         bench.end_of_pause()
     assert bench.sent == ['first']
     assert bench.timer.timer_period_ns == round(1e9 * paced_service.PAUSE * (2 * STEP + 0.01))

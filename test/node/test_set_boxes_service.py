@@ -252,6 +252,8 @@ def test_what_goes_unnamed_is_told(client: YardClient, scene: str) -> None:
             "bodies[0].boxes[0]: 'bed' is a box of the scene: leave its size as a new message has "
             'it to attach it, or name the part otherwise, such as lorry_2_bed')
         assert client.set_boxes(bodies=[lorry('lorry_1', 5)]).message == ''  # the same again
+        off = client.set_boxes(fixed=[a_box('bed', (0, 0, 9, 0, 0, 0, 1), CUBE)])
+        assert off.warnings == ["fixed[0]: 'bed' was a part of 'lorry_1', and came off it"]
         for _ in range(2):
             moved = client.set_boxes(bodies=[a_body('truck', ORIGIN, a_box('bed', ORIGIN),
                                                     a_box('cab', ORIGIN))])
