@@ -106,7 +106,7 @@ def scene_of(boxes: Boxes, pairs: np.ndarray | None = None) -> Scene:
                  boxes.size.tolist(), boxes.pose.tolist(), boxes.fixed))}
     listed = () if pairs is None else tuple(
         Pair.between(f'b{a}', f'b{b}') for a, b in pairs.tolist())
-    return Scene(named, listed, poses='array', patterns=EVERY_PAIR if pairs is None else ())
+    return Scene(named, listed, poses='named', patterns=EVERY_PAIR if pairs is None else ())
 
 
 class MuJoCo:
@@ -214,7 +214,7 @@ def grow(counts: Sequence[int], rounds: int) -> list[Grown]:
         boxes = bricks(count)
         with tempfile.TemporaryDirectory() as folder, pinned({usable_cores()[-1]}):
             path = Path(folder, 'scene.yaml')
-            path.write_text('poses: array\nboxes:\n' + ''.join(
+            path.write_text('poses: named\nboxes:\n' + ''.join(
                 f'  b{row}: {{size: [1, 1, 1]}}\n' for row in range(count)) + 'pairs: all\n')
             read, scene = nanoseconds(read_scene, path)
             solver = SceneSolver(scene, model='exact')

@@ -96,8 +96,8 @@ class EchoNode(GuardedNode):
         super().__init__('echo', context=context)
         answerer = CheckAnswerer(SceneSolver(yard()))
         for name, question in QUESTIONS.items():
-            response = deserialize_message(
-                serialize_message(answerer.answer(question, Check.Response())), Check.Response)
+            answerer.answer(question, kept := Check.Response())
+            response = deserialize_message(serialize_message(kept), Check.Response)
             self.create_service(Check, service_of(name), lambda *_, response=response: response)
 
 

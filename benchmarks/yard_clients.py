@@ -50,6 +50,7 @@ from box_contact_ros.node.runtime import GuardedNode, run_node, running_node, sp
 from box_contact_ros.node.topics import LATCHED
 from box_contact_ros.processes import keep_to_this_host, running
 from box_contact_ros.scene.scene import AT_FRAME, Box, Frame, Scene
+from box_contact_ros.scene.scene_check import NO_SIZE
 from box_contact_ros.scene.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import SceneSolver
 from box_contact_ros.stream.read_contacts import ReadContacts, read_contacts
@@ -110,7 +111,7 @@ class Yard:
             if kind == 'attach':
                 local = (*rng.uniform(-2, 2, 3), 0.0, 0.0, 0.0, 1.0)
                 self.boxes[name] = Box(CUBE, local, body=body)
-                message.boxes = [a_box(name, local)]
+                message.boxes = [a_box(name, local, CUBE if known is None else NO_SIZE)]
             request.bodies = [message]
         if name in self.boxes:
             self._first.setdefault(name)
@@ -131,9 +132,9 @@ def random_pose(rng: np.random.Generator) -> tuple[float, ...]:
     return (x, y, z, 0.0, 0.0, math.sin(turn), math.cos(turn))
 
 
-def a_box(name: str, pose: Sequence[float]) -> BoxMessage:
-    """Return a cube of a request."""
-    box = BoxMessage(name=name, size=Vector3(x=CUBE[0], y=CUBE[1], z=CUBE[2]))
+def a_box(name: str, pose: Sequence[float], size: Sequence[float] = CUBE) -> BoxMessage:
+    """Return a box of a request."""
+    box = BoxMessage(name=name, size=Vector3(x=size[0], y=size[1], z=size[2]))
     set_pose(box.pose, np.array(pose))
     return box
 

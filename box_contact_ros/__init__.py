@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from .forces.patch_forces import Body, PatchForces
     from .models.make_model import make_model
     from .node.contact_node import ContactNode as ContactNode  # noqa: F401
+    from .node.yard_client import Yard as Yard  # noqa: F401
+    from .node.yard_client import YardClient as YardClient  # noqa: F401
     from .plans.inspect_plan import inspect_plan
     from .plans.inspection import Fall, Inspection, Row
     from .plans.plan import Fault, Plan
@@ -35,12 +37,13 @@ __all__ = ['Approach', 'Approaches', 'Body', 'Box', 'Contact', 'ContactSolver', 
            'PatchForces', 'PathCheck', 'Plan', 'ReadContacts', 'Row', 'Scene', 'SceneSolver',
            'contacts_of', 'face_patches', 'inspect_plan', 'make_model', 'read_contacts',
            'read_plan', 'read_scene']
-# `ContactNode` needs ROS, and `import *` does without.
+# `ContactNode` and `YardClient` need ROS, and `import *` does without.
 
 _LOADED_WHEN_USED = {
     'forces.patch_forces': ('Body', 'PatchForces'),
     'models.make_model': ('make_model',),
     'node.contact_node': ('ContactNode',),
+    'node.yard_client': ('Yard', 'YardClient'),
     'plans.inspect_plan': ('inspect_plan',),
     'plans.inspection': ('Fall', 'Inspection', 'Row'),
     'plans.plan': ('Fault', 'Plan'),

@@ -4,11 +4,14 @@
 """The service ~/check: what the boxes of one request touch, without stamps and topics."""
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from box_contact_msgs.srv import Check
 
 from ..models.make_model import most_near
-from ..scene.scene_check import SceneCheck
+from ..scene.scene_check import Row, SceneCheck
 from ..scene.scene_solver import SceneSolver
+from ..solver.checks import TooMuch
 from .messages import KeptMessages, check_frame, near_messages, pose_of, size_of
 from .paced_service import Kind
 
@@ -25,31 +28,23 @@ class CheckAnswerer:
         self._check = SceneCheck(solver, most_near=most_near(model))
         self._kept = KeptMessages(MOST_CONTACTS)
 
-    def answer(self, request: Check.Request, response: Check.Response) -> Check.Response:
-        """Fill in the response: contacts, or why there are none.
+    def answer(self, request: Check.Request, response: Check.Response,
+               last: Mapping[str, Row] | None = None) -> None:
+        """Fill in contacts, which are overwritten by the next answer.
 
-        Its contacts are overwritten by the next answer.
+        last: poses of what moves, for a request that asks for them. Raises ValueError, with field
+        and value, for what is refused.
         """
-        try:
-            self._answer(request, response)
-        except ValueError as error:
-            response.message = str(error)
-        else:
-            response.success = True
-        return response
-
-    def _answer(self, request: Check.Request, response: Check.Response) -> None:
-        """Fill in contacts; raise ValueError, with field and value, for what is refused."""
         check_frame(request.header.frame_id, self.solver.scene)
-        boxes = request.boxes
+        boxes, last = request.boxes, last or {}
+        names = [box.name for box in boxes]
         found, areas = self._check(
-            [box.name for box in boxes], [pose_of(box) for box in boxes],
-            [size_of(box) for box in boxes],
-            [(pair.box_a, pair.box_b) for pair in request.pairs], request.margin)
+            names, [pose_of(box) for box in boxes], [size_of(box) for box in boxes],
+            [(pair.box_a, pair.box_b) for pair in request.pairs], request.margin, last)
         count = len(found.pairs) + len(found.near_pairs)
         if count > MOST_CONTACTS:
-            raise ValueError(f'contacts: {count} pairs touch or are near, and a response has '
-                             f'at most {MOST_CONTACTS}: ask for fewer boxes, or name pairs')
+            raise TooMuch(f'contacts: {count} pairs touch or are near, and a response has '
+                          f'at most {MOST_CONTACTS}: ask for fewer boxes, or name pairs')
         listed, names_of = response.contacts, self._check.names_of
         listed.header, listed.epoch = request.header, self._epoch
         listed.revision = self.solver.revision
@@ -57,9 +52,10 @@ class CheckAnswerer:
                                           found.contacts, areas)
         listed.near = near_messages([names_of(a, b) for a, b in found.near_pairs.tolist()],
                                     found.near)
+        response.left_out, response.left_out_names = self._check.left_out(names, last)
 
 
 def kind_and_size(request: Check.Request) -> tuple[Kind, int]:
     """Return what decides how many pairs a box has, and the number of boxes and pairs."""
     pairs = len(request.pairs)
-    return (pairs > 0, request.margin), len(request.boxes) + pairs
+    return (pairs > 0, request.margin, request.last_poses), len(request.boxes) + pairs

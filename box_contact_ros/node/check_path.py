@@ -4,7 +4,7 @@
 """The service ~/check_path: what the boxes of one request meet on a path."""
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -12,8 +12,8 @@ from box_contact_msgs.msg import Approach as ApproachMessage
 from box_contact_msgs.msg import BoxPair
 from box_contact_msgs.srv import CheckPath
 
-from ..scene.scene_check import NO_POSE, SceneCheck
-from ..solver.checks import short_repr
+from ..scene.scene_check import NO_POSE, Row, SceneCheck
+from ..solver.checks import TooMuch, short_repr
 from ..solver.motion import Approaches
 from .check import MOST_CONTACTS
 from .messages import check_frame, near_messages, size_of
@@ -25,29 +25,23 @@ MESSAGES = 256
 
 
 def answer(check: SceneCheck, epoch: int, request: CheckPath.Request,
-           response: CheckPath.Response) -> Iterator[None]:
-    """Fill in the response, in steps: what the path meets, or why it is not answered."""
+           response: CheckPath.Response, last: Mapping[str, Row] | None = None) -> Iterator[None]:
+    """Fill in, in steps, what the path meets.
+
+    last: poses of what moves, for a request that asks for them. Raises ValueError, with field and
+    value, for what is refused.
+    """
+    last = last or {}
     response.header, response.epoch = request.header, epoch
     response.revision = check.solver.revision
-    try:
-        yield from _answer(check, request, response)
-    except ValueError as error:
-        response.message = str(error)
-    else:
-        response.success = True
-
-
-def _answer(check: SceneCheck, request: CheckPath.Request, response: CheckPath.Response,
-            ) -> Iterator[None]:
-    """Fill in what the path meets; raise ValueError, with field and value, for what is refused."""
     check_frame(request.header.frame_id, check.solver.scene)
     names = [box.name for box in request.boxes]
     found = yield from check.path(
         names, _path(request, names), [size_of(box) for box in request.boxes],
-        [(pair.box_a, pair.box_b) for pair in request.pairs], request.clearance)
+        [(pair.box_a, pair.box_b) for pair in request.pairs], request.clearance, last)
     if (count := max(len(found.pairs), len(found.at_start))) > MOST_CONTACTS:
-        raise ValueError(f'impacts: {count} pairs come within the clearance, and a response has at '
-                         f'most {MOST_CONTACTS}: ask for fewer boxes, or name pairs')
+        raise TooMuch(f'impacts: {count} pairs come within the clearance, and a response has at '
+                      f'most {MOST_CONTACTS}: ask for fewer boxes, or name pairs')
 
     def messages(pairs: np.ndarray, approaches: Approaches) -> list[ApproachMessage]:
         near = near_messages([check.names_of(a, b) for a, b in pairs.tolist()],
@@ -64,16 +58,18 @@ def _answer(check: SceneCheck, request: CheckPath.Request, response: CheckPath.R
         response.at_start.append(BoxPair(box_a=box_a, box_b=box_b))
     if len(found.least):
         response.least, = messages(found.least_pair, found.least)
+    response.left_out, response.left_out_names = check.left_out(names, last)
 
 
 def _path(request: CheckPath.Request, names: Sequence[str]) -> np.ndarray:
     """Return poses (m, n, 7) of the waypoints by names; ValueError for what is not a path."""
     count = len(request.waypoints)
     if not 2 <= count <= MOST_WAYPOINTS:
-        raise ValueError(f'waypoints: a request has 2 to {MOST_WAYPOINTS}, not {count}')
+        raise (ValueError if count < 2 else TooMuch)(
+            f'waypoints: a request has 2 to {MOST_WAYPOINTS}, not {count}')
     if count * len(names) > MOST_POSES:
-        raise ValueError(f'waypoints: a request has at most {MOST_POSES} transforms, not '
-                         f'{count * len(names)}')
+        raise TooMuch(f'waypoints: a request has at most {MOST_POSES} transforms, not '
+                      f'{count * len(names)}')
     path = np.full((count, len(names), 7), NO_POSE)
     for k, waypoint in enumerate(request.waypoints):
         if sorted(waypoint.joint_names) != sorted(names):
@@ -94,5 +90,5 @@ def _path(request: CheckPath.Request, names: Sequence[str]) -> np.ndarray:
 def kind_and_size(request: CheckPath.Request) -> tuple[Kind, int]:
     """Return what decides how much a box and a waypoint cost, and how many there are."""
     pairs = len(request.pairs)
-    return ((pairs > 0, request.clearance),
+    return ((pairs > 0, request.clearance, request.last_poses),
             (len(request.boxes) + pairs) * len(request.waypoints))

@@ -20,7 +20,7 @@ from __future__ import annotations
 import gc
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar
 
 from rcl_interfaces.msg import SetParametersResult
@@ -48,7 +48,8 @@ from ..stream.streams import watched_of
 from . import check, check_path, get_boxes, set_boxes
 from .check import CheckAnswerer
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
-from .paced_service import PacedService
+from .get_boxes import Lister
+from .paced_service import NotActive, Outdated, PacedService
 from .parameters import (
     Setting,
     declare,
@@ -66,7 +67,6 @@ from .runtime import END_SECONDS, LOG_SECONDS, GuardedNode, run_node
 from .tick import TickAnswerer
 from .topics import SceneTopics
 
-NOT_CONFIGURED = 'the node is not configured'
 LONGEST = 1e6  # s, about twelve days
 TICK_SECONDS = 0.1
 """A report waits so long for a tick, behind which it comes: one takes 0.4 ms."""
@@ -161,16 +161,18 @@ class ContactNode(GuardedNode, LifecycleNode):
         self._answerer: TickAnswerer | None = None  # likewise
         self._check_answerer: CheckAnswerer | None = None  # of the solver's scene and model
         self._path_check: SceneCheck | None = None  # its own: checks come between its steps
+        self._lister: Lister | None = None  # from configure on
         self.add_on_set_parameters_callback(self._set_live)
         self._checks = PacedService(self, self.counts, 'checks', (Check, '~/check'), self._check,
                                     check.kind_and_size, is_timed=True)
         PacedService(self, self.counts, 'paths', (CheckPath, '~/check_path'), self._check_path,
                      check_path.kind_and_size)
         self._taken: SetBoxes.Request | None = None  # the last request of ~/set_boxes
+        self._warnings: list[str] = []  # of that request
         PacedService(self, self.counts, 'changes', (SetBoxes, '~/set_boxes'), self._set_boxes,
                      set_boxes.kind_and_size, in_turn=True)
         PacedService(self, self.counts, 'listings', (GetBoxes, '~/get_boxes'), self._get_boxes,
-                     get_boxes.kind_and_size)
+                     get_boxes.kind_and_size, pause=1.0)
         self.create_service(Trigger, '~/reset', self.answered(self._reset, '~/reset'))
         # On a clock of its own: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -202,7 +204,8 @@ class ContactNode(GuardedNode, LifecycleNode):
             self._configure()
         except Exception as error:  # rclpy would swallow it
             self.fault = error
-            self.get_logger().error(f'not configured: {reason_of(error)}')
+            if self.context.ok():  # else a signal has ended it meanwhile
+                self.get_logger().error(f'not configured: {reason_of(error)}')
             return TransitionCallbackReturn.FAILURE
         return super().on_configure(state)
 
@@ -218,7 +221,7 @@ class ContactNode(GuardedNode, LifecycleNode):
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer no poses, and forget those that wait. SUCCESS: inactive."""
         self._tick.active = False
-        self._tick.pairing.reset()
+        self._tick.reset()
         self.get_logger().info('inactive: no pose is answered')
         return super().on_deactivate(state)
 
@@ -255,7 +258,7 @@ class ContactNode(GuardedNode, LifecycleNode):
             raise
         warn_of_unknown(self, self.parameters)
         self._values, self._topics, self._answerer = values, topics, answerer
-        self._taken = None
+        self._taken, self._lister = None, Lister(answerer.epoch)
         topics.boxes.publish(set_boxes.boxes_message(answerer.epoch, solver, None))
 
     def _make_solver(self, values: Mapping[str, Any], scene: Scene) -> SceneSolver:
@@ -296,65 +299,57 @@ class ContactNode(GuardedNode, LifecycleNode):
             f'poses{frame} from {", ".join(topics[:NAMED_TOPICS])}'
             f'{f" and {more} more" if more > 0 else ""}')
 
+    def _configured(self) -> TickAnswerer:
+        """Return what answers the ticks; raise NotActive."""
+        if self._answerer is None:
+            raise NotActive
+        return self._answerer
+
     def _check(self, request: Check.Request, response: Check.Response) -> Iterator[None]:
         """Answer on the node's scene and model; ticks know nothing of it."""
-        if self._answerer is None:
-            response.message = NOT_CONFIGURED
-            return
-        checker = self._check_answerer
-        if checker is None or checker.solver is not self._answerer.solver:
+        answerer, checker = self._configured(), self._check_answerer
+        if checker is None or checker.solver is not answerer.solver:
             checker = self._check_answerer = CheckAnswerer(
-                self._answerer.solver, self.model_of(self._values), self._answerer.epoch)
+                answerer.solver, self.model_of(self._values), answerer.epoch)
             yield
-        checker.answer(request, response)
+        checker.answer(request, response, answerer.last_poses() if request.last_poses else None)
 
     def _check_path(self, request: CheckPath.Request, response: CheckPath.Response,
                     ) -> Iterator[None]:
         """Answer on the node's scene; ticks know nothing of it."""
-        if self._answerer is None:
-            response.message = NOT_CONFIGURED
-            return
-        checker, epoch = self._path_check, self._answerer.epoch
-        if checker is None or checker.solver is not self._answerer.solver:
-            checker = self._path_check = SceneCheck(self._answerer.solver, most_near=0)
+        answerer, checker = self._configured(), self._path_check
+        if checker is None or checker.solver is not answerer.solver:
+            checker = self._path_check = SceneCheck(answerer.solver, most_near=0)
             yield
-        yield from check_path.answer(checker, epoch, request, response)
+        last = answerer.last_poses() if request.last_poses else None
+        yield from check_path.answer(checker, answerer.epoch, request, response, last)
 
-    def _get_boxes(self, request: GetBoxes.Request, response: GetBoxes.Response) -> Iterable[None]:
+    def _get_boxes(self, request: GetBoxes.Request, response: GetBoxes.Response) -> Iterator[None]:
         """Tell some boxes of the scene."""
-        if self._answerer is None:
-            response.message = NOT_CONFIGURED
-        else:
-            get_boxes.answer(self._answerer.solver, self._answerer.epoch, request, response)
-        return ()
+        solver = self._configured().solver
+        assert self._lister is not None
+        yield from self._lister.answer(solver, self.model_of(self._values), request, response)
 
     def _set_boxes(self, request: SetBoxes.Request, response: SetBoxes.Response,
                    ) -> Iterator[None]:
         """Change boxes of the scene, all or none; the next poses are answered by the new scene."""
-        answerer, topics = self._answerer, self._topics
-        if answerer is None or topics is None:
-            response.message = NOT_CONFIGURED
-            return
+        answerer, topics = self._configured(), self._topics
+        assert topics is not None
         former = answerer.solver
         response.epoch, response.revision = answerer.epoch, former.revision
         if self._taken is not None and set_boxes.is_same(request, self._taken):
-            response.success = True
+            response.warnings = self._warnings
             return
-        try:
-            set_boxes.check_expected(request, answerer.epoch, former.revision)
-            solver, response.warnings = yield from set_boxes.changing(former, request)
-            writer = answerer.writer_of(solver)
-        except ValueError as error:
-            response.message = str(error)
-            return
+        set_boxes.check_expected(request, answerer.epoch, former.revision)
+        solver, warnings = yield from set_boxes.changing(former, request)
+        writer = answerer.writer_of(solver)
         yield
         if self._answerer is not answerer or answerer.solver is not former:
-            response.message = 'the node was configured anew, or took another model, meanwhile'
-            return
+            raise Outdated('the node was configured anew, or took another model, meanwhile')
         answerer.set_writer(writer)
         self._monitor.watch(watched_of(solver.scene))
-        self._taken = request
-        response.success, response.revision = True, solver.revision
+        self._taken, self._warnings = request, warnings
+        response.warnings, response.revision = warnings, solver.revision
         yield
         topics.boxes.publish(set_boxes.boxes_message(answerer.epoch, solver, request))
         if self.has_process and set_boxes.size_of_request(request) > set_boxes.STEP:
@@ -364,16 +359,16 @@ class ContactNode(GuardedNode, LifecycleNode):
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Forget all poses and stamps: a simulation begins anew."""
         if self._answerer is None:
-            response.message = NOT_CONFIGURED
+            response.message = str(NotActive())
             return response
-        self._answerer.pairing.reset()
+        self._answerer.reset()
         response.success, response.message = True, 'all poses and stamps are forgotten'
         return response
 
     def _clock_jumped(self, jump: TimeJump) -> None:
         if self._answerer is not None:
             self.counts[RESETS] += 1
-            self._answerer.pairing.reset()
+            self._answerer.reset()
             cause = ('/clock was set back' if jump.clock_change == ClockChange.ROS_TIME_NO_CHANGE
                      else 'use_sim_time was changed')
             self.get_logger().warning(f'time went back: {cause}; a new time begins',

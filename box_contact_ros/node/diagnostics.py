@@ -13,6 +13,7 @@ import math
 import time
 from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 from ..scene.scene import Pair, Scene
+from ..solver.checks import nearest_name, short_repr
 from ..stream.pairing import NO_PARTNER, OVERTAKEN, Pairing
 from ..stream.streams import streams_of, watched_of
 from .messages import make_header
@@ -40,6 +42,8 @@ REMINDER_SECONDS = 10.0  # a finding that stays is logged again after this long
 KEPT_TIMES = 4096
 """Evaluations whose times are kept for a report: more a second than any node makes."""
 NAMED = 3  # boxes or pairs that a message names
+MOST_TOLD = 100  # names that move nothing and are logged, one in a report
+NEAREST_OF = 200  # names among which the nearest is looked for, in some 5 ms without a tick
 COMPARED = 16  # pairs at most whose stamps are compared for a report
 MARGIN = 1.2
 """A tolerance that is proposed is so much larger than half the period, as periods vary."""
@@ -126,7 +130,7 @@ class TickMonitor:
         lines, self._refusals = list(self._refusals.values()), {}
         return lines
 
-    def take_load(self, lost: int) -> Load:
+    def take_load(self, lost: int | None) -> Load:
         """Return what happened since the last call; the caller knows how many poses were lost."""
         now = time.monotonic()
         times = np.array(self._times).reshape(-1, 2)
@@ -162,7 +166,7 @@ class Load(NamedTuple):
 
     seconds: float
     evaluations: int
-    lost: int  # poses that were sent and never came: the queue was full, or the network
+    lost: int | None  # poses that never came: the queue was full, or the network; None: unknown
     computing: np.ndarray  # (n,) time to answer the last ticks [us]
     ages: np.ndarray  # (n,) time from arrival to answer of the last ticks [ms]
 
@@ -185,13 +189,14 @@ class Diagnostics:
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._reported: Counter[str] = Counter()
         self._logged: dict[str, float] = {}  # when a cause was logged [s]
+        self._told: set[str] = set()  # names that move nothing and were logged
 
     def report(self, state: str, scene: Scene, model: str, pairing: Pairing, topics: SceneTopics,
-               lost: int, checks: Sequence[float]) -> None:
+               lost: int | None, checks: Sequence[float]) -> None:
         """Report on a node that is configured.
 
-        state: that of the lifecycle. Since the last report: lost: poses that never came; checks:
-        times of requests [s].
+        state: that of the lifecycle. Since the last report: lost: poses that never came, or None
+        where nobody knows; checks: times of requests [s].
         """
         logger = self._node.get_logger()
         rejections, pairing.rejections = pairing.rejections, {}
@@ -212,13 +217,13 @@ class Diagnostics:
         findings = [] if state != ACTIVE else list(_findings(
             summary, [name.partition(': ')[2] for name in new if name.startswith('refused')],
             unseen, stale, scene, pairing, topics, mostly_alone=new[NO_PARTNER] > new['poses'] / 2))
-        sent = (new['poses'] + load.lost) / len(streams_of(scene))
+        sent = (new['poses'] + (lost or 0)) / len(streams_of(scene))
         if state == ACTIVE:
             findings += _lateness(load, sent, new[OVERTAKEN])
             if self._monitor.unknown:
                 findings.append(Finding(
-                    'unknown', f'names that move nothing: {some_names(self._monitor.unknown)}',
-                    'the scene has no such box or body, or it does not move; ask ~/get_boxes'))
+                    'unknown', f'names that move nothing: {some_names(self._monitor.unknown)}'))
+                self._log_unknown(scene)
             findings += _rivals(self._monitor.shared, topics,
                                 self._node.get_fully_qualified_name())
         self._log(findings)
@@ -227,7 +232,7 @@ class Diagnostics:
             'model': model, 'pairs': scene.pair_count, 'stale boxes': ' '.join(stale),
             'boxes that never came': ' '.join(unseen),
             'unanswered pairs': len(summary.unanswered), 'waiting ticks': pairing.waiting_ticks,
-            'lost since the last report': load.lost,
+            'lost since the last report': 'unknown' if lost is None else lost,
             'dropped since the last report': sum(
                 count for name, count in new.items() if name.startswith('dropped'))})
 
@@ -257,6 +262,17 @@ class Diagnostics:
         header = make_header(self._node.get_clock().now().nanoseconds, '')
         self._publisher.publish(DiagnosticArray(header=header, status=[status]))
 
+    def _log_unknown(self, scene: Scene) -> None:
+        """Log the first name that moves nothing and has not been logged, with the nearest one."""
+        name = next((name for name in self._monitor.unknown if name not in self._told), None)
+        if name is None or len(self._told) == MOST_TOLD:
+            return
+        self._told.add(name)
+        nearest = nearest_name(name, islice(scene.moving, NEAREST_OF))
+        self._node.get_logger().warning(
+            f'poses: {short_repr(name)} moves nothing{nearest}: the scene has no such box or body, '
+            'or it does not move; ask ~/get_boxes')
+
     def _log(self, findings: Sequence[Finding]) -> None:
         """Log each cause when it comes up, and again while it stays."""
         now = time.monotonic()
@@ -271,17 +287,18 @@ class Diagnostics:
 
 def _lateness(load: Load, sent: float, overtaken: int) -> Iterator[Finding]:
     """Yield that answers are late, or that a burst of poses was lost; sent: poses per box."""
-    lost = load.lost + overtaken
+    lost = (load.lost or 0) + overtaken
+    told = f'at least {lost}' if load.lost is None else lost
     age = float(np.median(load.ages[-NEWEST_ANSWERS:])) if load.evaluations else 0.0
     ticks = 1e-3 * age * sent / load.seconds
     if ticks > LATE_TICKS or (overtaken and not load.evaluations):
         late = (f'{age:.0f} ms, {ticks:.0f} ticks' if load.evaluations else
                 f'none for {load.seconds:.1f} s')
-        yield Finding('late', f'answers are late: {late}; {lost} poses lost',
+        yield Finding('late', f'answers are late: {late}; {told} poses lost',
                       'the node is too slow for these poses; give it a core of its own, list fewer '
                       'pairs, set pair_topics to false, or send poses less often')
     elif lost:
-        yield Finding('burst', f'a burst of poses was lost: {lost}',
+        yield Finding('burst', f'a burst of poses was lost: {told}',
                       'more came at once than the queue holds, or the node stood still; send them '
                       'evenly, or raise the depth by qos_overrides')
 
@@ -380,7 +397,7 @@ def _period(stamps: np.ndarray) -> float:
     return float(np.median(np.diff(stamps))) if len(stamps) > 1 else math.inf
 
 
-def some_names(names: Sequence[str]) -> str:
+def some_names(names: Sequence[str], most: int = NAMED) -> str:
     """Return the first names, and how many there are besides."""
-    more = len(names) - NAMED
-    return ', '.join(names[:NAMED]) + (f' and {more} more' if more > 0 else '')
+    more = len(names) - most
+    return ', '.join(names[:most]) + (f' and {more} more' if more > 0 else '')

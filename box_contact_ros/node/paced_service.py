@@ -15,6 +15,9 @@ from rclpy.clock_type import ClockType
 from rclpy.qos import QoSProfile
 from rclpy.service import Service
 
+from box_contact_msgs.msg import Code
+
+from ..solver.checks import TooMuch
 from .rclpy_workarounds import Send, answer_later
 from .runtime import LONG, GuardedNode
 
@@ -25,8 +28,9 @@ PAUSE = 5.0
 SLICE = 2e-3
 """Processor time [s] after which the next step waits for ticks."""
 GAP = 1e-3
-"""Time [s] for the ticks that wait. EventsExecutor serves a timer that is due when it is set twice,
-then four times, and so on: ticks that wait would come behind all the steps."""
+"""Least time [s] for the ticks that wait: a timer that is due again at once comes before them."""
+REST = 3.0
+"""Time for ticks after some steps, divided by that of these: three quarters of the node's."""
 MOST_WAITING = 16
 """Costly requests that wait for the end of a pause."""
 KEPT_TIMES = 4096  # of requests, for a report
@@ -36,6 +40,29 @@ REQUESTS = QoSProfile(depth=128)
 ever."""
 Kind = tuple[Any, ...]
 """Of requests: what decides how much each part of one costs."""
+
+
+class NotActive(ValueError):
+    """The node has no scene: it is not configured."""
+
+    def __init__(self) -> None:
+        super().__init__('the node is not configured')
+
+
+class Outdated(ValueError):
+    """A request is about a scene that the node does not have, or no longer."""
+
+
+CODES: dict[type[ValueError], int] = {
+    NotActive: Code.NOT_ACTIVE, Outdated: Code.OUTDATED, TooMuch: Code.TOO_MUCH,
+    ValueError: Code.INVALID}
+"""Of refusals, the first class that fits."""
+
+
+def refuse(response: Any, error: ValueError) -> None:
+    """Write why a request is not answered."""
+    response.message = str(error)
+    response.code.value = next(code for kind, code in CODES.items() if isinstance(error, kind))
 
 
 class PacedService:
@@ -49,16 +76,19 @@ class PacedService:
     def __init__(self, node: GuardedNode, counts: Counter[str], what: str, service: tuple[Any, str],
                  answer: Callable[[Any, Any], Iterable[None]],
                  kind_and_size: Callable[[Any], tuple[Kind, int]], *, in_turn: bool = False,
-                 is_timed: bool = False) -> None:
+                 is_timed: bool = False, pause: float = PAUSE) -> None:
         """Serve a service, by its type and name, of a node; `answer` fills in a response in steps.
 
+        It raises ValueError for what it refuses: success, code and message are written here.
         what: what `counts` calls the requests. in_turn: whether none overtakes another. is_timed:
-        whether `take_times` is called again and again.
+        whether `take_times` is called again and again. pause: that after a costly request, divided
+        by its time.
         """
-        self._counts, self._what = counts, what
+        self._counts, self._what, self._pause = counts, what, pause
         self._answer, self._kind_and_size, self._in_turn = answer, kind_and_size, in_turn
         self._until = 0.0  # end of the pause, by the steady clock [s]
         self._due = 0.0  # when to go on, by the same clock [s]
+        self._gap = GAP  # after the last steps [s]
         self._cheap: dict[Kind, int] = {}
         """Size up to which requests are not costly, of the kinds that came last."""
         self._waiting: deque[tuple[float, Any, Any, Send]] = deque()
@@ -92,16 +122,20 @@ class PacedService:
             self._wait()
         else:
             self._counts[f'{self._what} refused'] += 1
+            response.code.value = Code.BUSY
             response.message = (f'busy: {MOST_WAITING} costly requests wait, as ticks come first; '
                                 'ask again later')
             send(response)
 
     def _go_on(self) -> None:
-        """Do the next steps, or begin with the first request that waits, as its pause is over."""
+        """Do the next steps, or begin with the first request that waits, as its pause is over.
+
+        EventsExecutor may serve a timer too early, and multiplies its events if it is set then.
+        """
+        if time.monotonic() < self._due:
+            return
         self._timer.cancel()
-        if time.monotonic() < self._due:  # an executor may serve a timer twice
-            pass
-        elif self._running:
+        if self._running:
             self._run(self._running)
         elif self._waiting:
             self._begin(*self._waiting.popleft())
@@ -111,7 +145,7 @@ class PacedService:
     def _wait(self) -> None:
         """Let the timer end after ticks that wait now; or with the pause."""
         now = time.monotonic()
-        self._due = now + GAP if self._running else max(now + GAP, self._until)
+        self._due = now + self._gap if self._running else max(now + self._gap, self._until)
         self._timer.timer_period_ns = round(1e9 * (self._due - now))
         self._timer.reset()
 
@@ -132,6 +166,7 @@ class PacedService:
             self._running = None
             running.send(response)
         ended = time.monotonic()
+        self._gap = max(GAP, REST * (ended - began))
         running.wall += ended - began
         running.cost += time.thread_time() - used
         if response is None:
@@ -141,7 +176,7 @@ class PacedService:
         kind, size = self._kind_and_size(running.request)
         cheap = max(self._cheap.pop(kind, 0), size)
         if running.cost > COSTLY:
-            self._until = ended + PAUSE * running.wall
+            self._until = ended + self._pause * running.wall
             cheap = int(size * COSTLY / running.cost)
         self._cheap[kind] = cheap  # the newest comes last
         if len(self._cheap) > KEPT_KINDS:
@@ -151,9 +186,16 @@ class PacedService:
         """Return the response after the last step, else None."""
         running = self._running
         assert running is not None
-        if running.steps is None:
-            running.steps = iter(self._answer(request, response))
-        return next(running.steps, response)
+        try:
+            if running.steps is None:
+                running.steps = iter(self._answer(request, response))
+            if next(running.steps, response) is None:
+                return None
+        except ValueError as error:
+            refuse(response, error)
+        else:
+            response.success, response.code.value = True, Code.OK
+        return response
 
 
 @dataclass(slots=True)

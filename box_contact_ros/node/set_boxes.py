@@ -11,14 +11,17 @@ from box_contact_msgs.msg import Box as BoxMessage
 from box_contact_msgs.msg import Boxes
 from box_contact_msgs.srv import SetBoxes
 
+from ..scene.changes import boxes_of
 from ..scene.scene import Box, Frame, KeyPath, Scene, SceneError
 from ..scene.scene_solver import SceneSolver
-from ..solver.checks import name_fault, nearest_name, short_repr
+from ..solver.checks import TooMuch, name_fault, nearest_name, short_repr
+from .diagnostics import some_names
 from .messages import check_frame, pose_of, size_of
-from .paced_service import Kind
+from .paced_service import Kind, Outdated
 
 MOST_REQUESTED = 1000
 """Boxes and names of a request. rclpy reads one of 1,000 boxes in 16 ms, which cannot be sliced."""
+MOST_NAMED = 64  # boxes that a warning names
 STEP = 100  # boxes that are read in one step, in about 2 ms
 
 
@@ -30,28 +33,30 @@ def changing(solver: SceneSolver, request: SetBoxes.Request,
     """
     count = size_of_request(request)
     if count > MOST_REQUESTED:
-        raise ValueError(f'a request has at most {MOST_REQUESTED} boxes and names, not {count}: '
-                         'send several')
+        raise TooMuch(f'a request has at most {MOST_REQUESTED} boxes and names, not {count}: '
+                      'send several')
     yield
     check_frame(request.header.frame_id, solver.scene)
     places, changes = yield from changes_of(solver.scene, request)
     try:
         changed = yield from solver.changing(**changes)
     except SceneError as error:
-        raise _at_its_place(error, places) from None
+        raise _at_its_place(error, places, changes['absent']) from None
     yield
-    return changed, [*_gone_warnings(solver.scene, request.absent),
+    return changed, [*_absent_warnings(solver.scene, request.absent),
+                     *_detached_warnings(solver.scene, request),
+                     *_gone_warnings(solver.scene, changed.scene, request.absent),
                      *_pair_warnings(changed.scene, places)]
 
 
 def check_expected(request: SetBoxes.Request, epoch: int, revision: int) -> None:
-    """Raise ValueError for a request that was made for another scene."""
+    """Raise Outdated for a request that was made for another scene."""
     if request.expected_epoch not in (0, epoch):
-        raise ValueError(f'expected_epoch: {request.expected_epoch}, but the node was configured '
-                         f'anew: its epoch is {epoch}')
+        raise Outdated(f'expected_epoch: {request.expected_epoch}, but the node was configured '
+                       f'anew: its epoch is {epoch}')
     if request.expected_revision not in (-1, revision):
-        raise ValueError(f'expected_revision: {request.expected_revision}, but the yard has '
-                         f'changed: its revision is {revision}')
+        raise Outdated(f'expected_revision: {request.expected_revision}, but the yard has '
+                       f'changed: its revision is {revision}')
 
 
 def size_of_request(request: SetBoxes.Request) -> int:
@@ -86,6 +91,11 @@ def changes_of(scene: Scene, request: SetBoxes.Request | Boxes,
                              f'{short_repr(body.name)} {error.reason}') from None
     for number, (path, box, body) in enumerate(_listed(request)):
         take(path, box.name)
+        known = scene.boxes.get(box.name)
+        if body and known and known.body != body and any(size_of(box)):
+            raise SceneError(path, f'{short_repr(box.name)} is a box of the scene: leave its size '
+                                   'as a new message has it to attach it, or name the part '
+                                   f'otherwise, such as {body}_{box.name}')
         field = 'parts' if body else str(path[0])
         try:
             changes[field][box.name] = _box(scene, box, body, has_pose=field != 'moving')
@@ -94,6 +104,9 @@ def changes_of(scene: Scene, request: SetBoxes.Request | Boxes,
                              f'{short_repr(box.name)} {error.reason}') from None
         if number % STEP == STEP - 1:
             yield
+    for number, name in enumerate(request.absent):
+        if name in scene.row_of:
+            take(('absent', number), name)
     changes['absent'] = [name for name in request.absent if name in scene.row_of]
     return places, changes
 
@@ -117,28 +130,51 @@ def _box(scene: Scene, box: BoxMessage, body: str, *, has_pose: bool) -> Box:
                pose_of(box) if has_pose else None, body=body)
 
 
-def _at_its_place(error: SceneError, places: dict[str, KeyPath]) -> SceneError:
+def _at_its_place(error: SceneError, places: dict[str, KeyPath], absent: Sequence[str],
+                  ) -> SceneError:
     """Return a refusal that names a box with the place of the box in the request."""
-    if len(error.path) < 2 or error.path[1] not in places:
+    field, *rest = error.path or ('',)
+    if field == 'absent' and rest:
+        return SceneError(places[absent[int(rest[0])]], error.reason)
+    if not rest or rest[0] not in places:
         return error
-    name = str(error.path[1])
-    return SceneError((*places[name], *error.path[2:]), f'{short_repr(name)} {error.reason}')
+    name = str(rest[0])
+    return SceneError((*places[name], *rest[1:]), f'{short_repr(name)} {error.reason}')
 
 
 def _dotted(path: KeyPath) -> str:
     return str(SceneError(path, '')).removesuffix(': ')
 
 
-def _gone_warnings(scene: Scene, absent: Sequence[str]) -> Iterator[str]:
+def _absent_warnings(scene: Scene, absent: Sequence[str]) -> Iterator[str]:
     for number, name in enumerate(absent):
         if name not in scene.row_of:
             yield f'absent[{number}]: {short_repr(name)} is not there'
 
 
+def _detached_warnings(scene: Scene, request: SetBoxes.Request) -> Iterator[str]:
+    """Yield which parts of bodies are named with a size, as new boxes are."""
+    for path, box, body in _listed(request):
+        known = scene.boxes.get(box.name)
+        if not body and known and known.body and any(size_of(box)):
+            yield (f'{_dotted(path)}: {short_repr(box.name)} was a part of '
+                   f'{short_repr(known.body)}, and came off it')
+
+
+def _gone_warnings(before: Scene, after: Scene, absent: Sequence[str]) -> Iterator[str]:
+    """Yield what goes beside the names that a request calls absent: parts, and emptied bodies."""
+    for name in absent:
+        if name in before.bodies:
+            parts = list(boxes_of(before, name))
+            yield f'{some_names(parts, MOST_NAMED)} went with {short_repr(name)}'
+    for name in before.bodies.keys() - after.bodies.keys() - set(absent):
+        yield f'the body {short_repr(name)} went with its last box'
+
+
 def _pair_warnings(scene: Scene, places: dict[str, KeyPath]) -> Iterator[str]:
     """Yield which boxes of a request are in no pair, and why."""
     for name, path in places.items():
-        if name in scene.bodies or scene.is_paired[scene.index_of[name]]:
+        if path[0] == 'absent' or name in scene.bodies or scene.is_paired[scene.index_of[name]]:
             continue
         reason = ('the scene has no box that its patterns pair it with and that moves against it'
                   if scene.is_matched[scene.index_of[name]] else 'no pattern of pairs matches it')

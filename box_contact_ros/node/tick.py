@@ -17,18 +17,18 @@ from typing import Any
 
 import numpy as np
 
+from ..scene.scene import NOWHERE
+from ..scene.scene_check import Row
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import absent_poses, are_poses, pose_fault
 from ..stream.cdr import NANOSECONDS, MessageError
 from ..stream.pairing import OVERTAKEN, PAIRINGS, Pairing, StampedPose, TickPoses
-from ..stream.read_poses import NamedPoses, read_pose, read_poses
+from ..stream.read_poses import NamedPoses, read_pose
 from ..stream.streams import ALL_BOXES
 from ..stream.write_contacts import TickWriter
-from .diagnostics import TickMonitor, some_names
+from .diagnostics import TickMonitor
 from .parameters import reason_of
 from .topics import PoseCallback, SceneTopics
-
-UNKNOWN_NAMES = 'unknown names'
 
 
 class PoseQueue:
@@ -37,7 +37,7 @@ class PoseQueue:
     A full queue pushes its oldest pose out. EventsExecutor still has an event for it, and timers
     and services come behind all events. In a node that is too slow, they would wait ever longer.
     So poses that wait when a loss shows are dropped. That takes no time, and empties both queues.
-    Each publisher numbers its own poses. While there are several, losses are not told.
+    Each publisher numbers its own poses. While there are several, losses are unknown.
     """
 
     def __init__(self, publisher_count: Callable[[], int]) -> None:
@@ -45,7 +45,7 @@ class PoseQueue:
         self._publisher_count = publisher_count
         self._sequence: int | None = None  # number that the publisher gave the last pose
         self._arrived = self._new_from = 0  # by the wall clock [ns]
-        self._lost = 0
+        self._lost: int | None = 0  # None: numbers of several publishers did not follow
         self._has_several = False  # publishers, from a number that does not follow to a report
         self._turns = 0  # how often numbers went back meanwhile
 
@@ -68,8 +68,9 @@ class PoseQueue:
         self._has_several = self._has_several or self._publisher_count() > 1
         if self._has_several:
             self._turns += periods <= 0
+            self._lost = None
         elif periods > 0:
-            self._lost += periods - 1
+            self._lost = None if self._lost is None else self._lost + periods - 1
             now = time.time_ns()
             if (now - arrived) * periods > 2 * (arrived - self._arrived):  # not lost on the way
                 self._new_from = now
@@ -78,8 +79,8 @@ class PoseQueue:
         """Begin before the next pose: those that come while nobody asks for any are not lost."""
         self._sequence = None
 
-    def take_lost(self) -> int:
-        """Return how many poses never came since the last call."""
+    def take_lost(self) -> int | None:
+        """Return how many poses never came since the last call; None: nobody knows."""
         if self._has_several and self._publisher_count() < 2:
             self._has_several, self._turns = False, 0
             self.restart()
@@ -90,6 +91,44 @@ class PoseQueue:
     def is_shared(self) -> bool:
         """Return whether publishers take turns; numbers go back once where one is started anew."""
         return self._turns > 1
+
+
+class LastPoses:
+    """The last pose of each box and body that moves, in messages of one or of all of them."""
+
+    def __init__(self) -> None:
+        self._single: dict[str, tuple[int, Row]] = {}  # stamp [ns] and pose, by name
+        self._names: tuple[str, ...] = ()
+        self._stamps, self._rows = np.zeros(0, np.int64), np.zeros((0, 7))  # of these names
+        self._newest = 0  # stamp of the last message
+
+    def forget(self) -> None:
+        """Forget all poses."""
+        self._single.clear()
+        self._names = ()
+
+    def take(self, name: str, pose: StampedPose) -> None:
+        """Note the pose of one name."""
+        self._single[name] = pose.stamp, pose.numbers
+        self._newest = pose.stamp
+
+    def take_all(self, names: tuple[str, ...], poses: StampedPose, missing: np.ndarray) -> None:
+        """Note the poses (n, 7) of n names but for the rows that are missing (k,)."""
+        rows, stamps = poses.numbers, np.full(len(names), poses.stamp)
+        if len(missing):
+            known = {name: row for row, name in enumerate(self._names)}
+            former = np.array([known.get(names[row], -1) for row in missing.tolist()], np.int64)
+            rows = rows.copy()
+            rows[missing] = np.vstack((self._rows, NOWHERE))[former]
+            stamps[missing] = np.append(self._stamps, 0)[former]
+        self._names, self._stamps, self._rows, self._newest = names, stamps, rows, poses.stamp
+
+    def within(self, max_age: int) -> dict[str, Row]:
+        """Return the poses by name whose stamps are within max_age [ns] of the newest; 0: all."""
+        known = {name: (stamp, tuple(row)) for name, stamp, row in zip(
+            self._names, self._stamps.tolist(), self._rows.tolist()) if row[0] == row[0]}
+        return {name: row for name, (stamp, row) in {**known, **self._single}.items()
+                if not 0 < max_age < abs(self._newest - stamp)}
 
 
 class TickAnswerer:
@@ -109,6 +148,7 @@ class TickAnswerer:
         self.set_solver(solver)
         self.set_times(settings)
         self._queues: dict[str, PoseQueue] = {}  # by box
+        self._last = LastPoses()
         self.active = False
         self.after: Callable[[], None] | None = None
 
@@ -131,6 +171,15 @@ class TickAnswerer:
         self._named = NamedPoses(scene.moving)
         self.pairing.set_partners(scene)
 
+    def reset(self) -> None:
+        """Forget all poses and stamps."""
+        self.pairing.reset()
+        self._last.forget()
+
+    def last_poses(self) -> dict[str, Row]:
+        """Return by name the last poses of what moves, not older than `max_age`."""
+        return self._last.within(self.pairing.max_age)
+
     def set_times(self, settings: Mapping[str, Any]) -> None:
         """Take `tolerance` and `max_age` of checked parameters [s]."""
         self.pairing.tolerance, self.pairing.max_age = (
@@ -139,7 +188,7 @@ class TickAnswerer:
     def callback_of(self, box: str, topic: str) -> PoseCallback:
         """Return the callback for the bytes of a box, or of all; it raises nothing at all."""
         queue = self._queues[box] = PoseQueue(partial(self._topics.publisher_count, box))
-        read = self._read_all if box == ALL_BOXES else read_pose
+        read = self._read_all if box == ALL_BOXES else partial(self._read_one, box)
 
         def callback(data: bytes, info: Mapping[str, Any]) -> None:
             if not self.active:
@@ -164,31 +213,30 @@ class TickAnswerer:
                 self.after()
         return callback
 
-    def take_lost(self) -> int:
-        """Return how many poses never came since the last call; note which boxes are shared."""
-        lost = sum(queue.take_lost() for queue in self._queues.values())
+    def take_lost(self) -> int | None:
+        """Return how many poses never came, None: nobody knows; note which boxes are shared."""
+        lost = [queue.take_lost() for queue in self._queues.values()]
         self._monitor.shared = [box for box, queue in self._queues.items() if queue.is_shared]
-        return lost
+        return None if None in lost else sum(filter(None, lost))
+
+    def _read_one(self, box: str, data: bytes) -> StampedPose:
+        """Return the pose of a box or body."""
+        pose = read_pose(data)
+        self._last.take(box, pose)
+        return pose
 
     def _read_all(self, data: bytes) -> StampedPose:
         """Return the poses of all that moves; a bad one is counted, and its name absent."""
-        moving = self.solver.moving
-        if self.solver.scene.poses == 'named':
-            poses = self._named(data)
-            self._monitor.unknown = self._named.unknown
-            if self._named.unknown:
-                self._counts[UNKNOWN_NAMES] += len(self._named.unknown)
-        else:
-            poses = read_poses(data)
-            if len(poses.numbers) != len(moving):
-                raise MessageError('wrong number of poses',
-                                   f'{len(poses.numbers)} poses, but {len(moving)} move: '
-                                   f'{some_names(moving)}')
+        moving, poses = self.solver.moving, self._named(data)
+        self._monitor.unknown = self._named.unknown
+        if self._named.unknown:
+            self._counts['unknown names'] += len(self._named.unknown)
         missing = np.flatnonzero(~are_poses(poses.numbers))
         for row in missing[~absent_poses(poses.numbers[missing])]:
             self._refuse(MessageError('bad pose', f'{pose_fault(poses.numbers[row])}'), moving[row])
         poses.numbers[missing] = np.nan
         self._monitor.absent = [moving[row] for row in missing]
+        self._last.take_all(moving, poses, missing)
         return poses
 
     def _answer(self, tick: TickPoses, arrived: int) -> None:
@@ -203,7 +251,7 @@ class TickAnswerer:
             points.publish(point)
             normals.publish(normal)
         self._topics.contacts.publish(contacts)
-        # What nobody waits for comes last. A box that an array leaves out is not there: nobody
+        # What nobody waits for comes last. A box that the message leaves out is not there: nobody
         # asks for its pairs.
         age, scene = time.time_ns() - arrived if arrived else 0, self._writer.solver.scene
         open_pairs = [] if scene.in_one_message else [scene.pair_of(*boxes) for boxes in stale]

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from geometry_msgs.msg import PointStamped, PoseArray, PoseStamped, Vector3Stamped
+from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
@@ -40,8 +40,8 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 CONTACT_DEPTH = 10
 POSE_DEPTH = 100
 """Poses that wait: 100 ms at 1 kHz, longer than any collection of garbage."""
-ARRAY_DEPTH = 5
-"""Arrays that wait: a node that cannot keep up is late by a few ticks, never by seconds."""
+NAMED_DEPTH = 5
+"""Messages of all poses that wait: a slow node is late by a few ticks, never by seconds."""
 
 PoseCallback = Callable[[bytes, Mapping[str, Any]], None]
 """Takes the bytes of poses, and what the middleware knows of them."""
@@ -52,13 +52,13 @@ def pose_qos(source: str) -> QoSProfile:
 
     Best effort matches every publisher.
     """
-    return QoSProfile(depth=ARRAY_DEPTH if source == ALL_BOXES else POSE_DEPTH,
+    return QoSProfile(depth=NAMED_DEPTH if source == ALL_BOXES else POSE_DEPTH,
                       reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 def pose_type(scene: Scene) -> type:
     """Return the type of the messages that have the poses of a scene."""
-    return {'topics': PoseStamped, 'array': PoseArray, 'named': MultiDOFJointState}[scene.poses]
+    return MultiDOFJointState if scene.in_one_message else PoseStamped
 
 
 def contact_qos() -> QoSProfile:
@@ -98,12 +98,17 @@ class SceneTopics:
         if len(labels) < len(pairs):
             raise ValueError(f'scene: {labels.most_common(1)[0][0]} is the name of two pairs: list '
                              'one of them with a name of its own')
-        topics = [topic for pair in pairs for topic in self._topics_of(pair)]
-        for topic in (f'{prefix}contacts', *topics, *topics_of(scene).values()):
+        remedies = {
+            f'{prefix}contacts': '',
+            **{topic: ': set pair_topics to false' for pair in pairs
+               for topic in self._topics_of(pair)},
+            **dict.fromkeys(topics_of(scene).values(), ': write poses: named in the scene file')}
+        for topic, remedy in remedies.items():
             try:
                 node.resolve_topic_name(topic)
             except RCLError as error:
-                raise ValueError(f'topic {short_repr(topic)}: {error}') from error
+                reason = str(error).partition(', at ')[0]  # of rcl's sources
+                raise ValueError(f'topic {short_repr(topic)}: {reason}{remedy}') from error
         self._subscriptions: dict[str, Subscription] = {}
         self.of_pair: dict[tuple[str, str], tuple[Publisher, Publisher]] = {}
         self.contacts = self._publisher(Contacts, f'{prefix}contacts',

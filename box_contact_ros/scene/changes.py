@@ -53,7 +53,7 @@ def checked_changes(scene: Scene, fixed: Mapping[str, Box], moving: Mapping[str,
     for number, name in enumerate(absent):
         if fault := _name_fault(name) or _absent_fault(scene, name, changes):
             raise SceneError(('absent', number), f'{short_repr(name)} {fault}')
-        changes.boxes.update((part, None) for part in _boxes_of(scene, name))
+        changes.boxes.update((part, None) for part in boxes_of(scene, name))
         if name in scene.bodies:
             changes.frames[name] = None
     _check_emptied(scene, changes)
@@ -61,7 +61,7 @@ def checked_changes(scene: Scene, fixed: Mapping[str, Box], moving: Mapping[str,
     return changes
 
 
-def _boxes_of(scene: Scene, name: str) -> Iterator[str]:
+def boxes_of(scene: Scene, name: str) -> Iterator[str]:
     """Yield the name of a box, or the names of the boxes of a body."""
     if name not in scene.bodies:
         yield name
@@ -129,9 +129,9 @@ def _absent_fault(scene: Scene, name: str, changes: Changes) -> str | None:
     """Return why a box or body may not go, or None."""
     if name not in scene.boxes and name not in scene.bodies:
         return f'is none of the boxes{nearest_name(name, scene.row_of)}'
-    if name in changes.frames or any(part in changes.boxes for part in _boxes_of(scene, name)):
+    if name in changes.frames or any(part in changes.boxes for part in boxes_of(scene, name)):
         return 'is changed by the same request'
-    if any(part in scene.listed_names for part in _boxes_of(scene, name)):
+    if any(part in scene.listed_names for part in boxes_of(scene, name)):
         return 'is a box of a listed pair, which stays'
     return _stays(scene, name)
 

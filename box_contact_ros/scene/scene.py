@@ -35,9 +35,9 @@ EVERY_PAIR = (('*', '*'),)
 MOVES = (': leave `pose` out of a box that moves, and give its pose in the call; or, in Python, '
          'ask contacts_of(sizes, poses)')
 """What to do about boxes that are all fixed."""
-POSES = ('topics', 'array', 'named')
-"""How the poses of what moves come: on a topic each; in one message, in the order of the scene; in
-one message, by names. The boxes that move change in scenes of the last kind alone."""
+POSES = ('topics', 'named')
+"""How the poses of what moves come: on a topic each; in one message, by names. The boxes that move
+change in scenes of the latter kind alone."""
 MOST_BOXES = 100_000
 """Of a scene that changes."""
 ALONE = -1
@@ -317,12 +317,14 @@ class Scene:
             kinds = np.frombuffer(b''.join(number_of), bool).reshape(-1, kinds.shape[1])
         vars(scene)['_kinds'] = kinds, kind
 
-    def with_boxes(self, boxes: Mapping[str, Box], bodies: Mapping[str, Frame]) -> Scene:
-        """Return the scene of other boxes and bodies, which a changed scene may have.
+    @classmethod
+    def as_changed(cls, **fields: Any) -> Scene:
+        """Return a scene of all these fields as changes may leave it: patterns may match no box.
 
         Raises SceneError.
         """
-        scene = self._with(boxes, bodies)
+        scene = object.__new__(cls)
+        vars(scene).update(fields)
         _check_kinds(scene)
         _check_bodies(scene)
         _check_pairs(scene)

@@ -5,18 +5,19 @@
 
 A guest is a box of a question that the scene does not know. It is box A of its pairs with boxes of
 the scene, and of those with later guests. Moving boxes and bodies that a question does not name are
-absent.
+absent, or stand where they were last.
 """
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from functools import cached_property, lru_cache
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 
 from ..core import native
 from ..solver.checks import (
+    TooMuch,
     as_margin,
     name_fault,
     nearest_name,
@@ -28,12 +29,13 @@ from ..solver.contact_solver import ContactSolver
 from ..solver.contacts_of import Found, touching_and_near
 from .path import Found as PathFound
 from .path import as_path, check_course, moved_boxes
-from .rides import Course
+from .rides import Course, Surroundings
 from .scene_solver import SceneSolver
 
 MOST_BOXES = 256
 MOST_PAIRS = 4096
 """Pairs that a question may list."""
+MOST_LEFT_OUT = 64  # names that an answer tells
 KEPT_MARGINS = 4  # of the last questions, each with a broad phase
 Row = tuple[float, ...]  # numbers of one box
 NO_POSE: Row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
@@ -88,7 +90,7 @@ class SceneCheck:
 
     def __call__(self, names: Sequence[str], poses: Sequence[Row], sizes: Sequence[Row],
                  pairs: Sequence[tuple[str, str]] = (), margin: float = 0.0,
-                 ) -> tuple[Found, np.ndarray]:
+                 last: Mapping[str, Row] | None = None) -> tuple[Found, np.ndarray]:
         """Return which boxes touch, and which are apart by the distance `margin` [m] at most.
 
         names, poses (n, 7), sizes (n, 3): of the boxes and bodies of a question. A size of zeros is
@@ -96,22 +98,26 @@ class SceneCheck:
         the scene's.
         pairs: those that are asked for. Without, the scene's pairs of these boxes are. Guests meet
         all boxes of the question and all fixed ones. `names_of` tells the names of the answer.
+        last: poses of what else moves, by name; it takes part like what is fixed.
         With it come the areas (k,) by which the faces of what touches meet [m²].
         Raises ValueError, with field and value, for what is refused.
         """
         margin = as_margin(margin)
         broad_phase, solver = self._made_for(margin)
-        rows, moving = self._take(names, poses, sizes)
+        rows, moving = self._take(names, poses, sizes, last or {})
         try:
             self._place_bodies()
             if pairs:
                 places = self._places(rows, pairs)
             else:
                 places = broad_phase.find(self._poses, self.most_near)[0]
+                if last:
+                    stands = self._stands(names)
+                    places = places[~stands[places].all(axis=1)]
             if len(places) > self.most_near:
-                raise ValueError(f'pairs: more than {self.most_near} are asked for and near, and '
-                                 "the node's model answers no more per request: name those that "
-                                 'matter')
+                raise TooMuch(f'pairs: more than {self.most_near} are asked for and near, and '
+                              "the node's model answers no more per request: name those that "
+                              'matter')
             contacts = solver.batch(self._poses, sizes=self._sizes, pairs=places)
             found = touching_and_near(places, contacts, solver, self._sizes, self._poses, margin)
             areas = native.face_areas(self._sizes, self._poses, found.pairs)
@@ -122,11 +128,11 @@ class SceneCheck:
 
     def path(self, names: Sequence[str], path: np.ndarray, sizes: Sequence[Row],
              pairs: Sequence[tuple[str, str]] = (), clearance: float = 0.0,
-             ) -> Generator[None, None, PathFound]:
+             last: Mapping[str, Row] | None = None) -> Generator[None, None, PathFound]:
         """Return, in steps, what the boxes, bodies and guests of a question meet on a path.
 
-        No other question comes between. path: poses (m, n, 7) by names. sizes, pairs: as of a
-        question without a path. What is fixed cannot be named.
+        No other question comes between. path: poses (m, n, 7) by names. sizes, pairs, last: as of
+        a question without a path. What is fixed cannot be named.
         Raises ValueError, with field and value, for what is refused.
         """
         scene = self._scene
@@ -134,24 +140,51 @@ class SceneCheck:
         for number, name in enumerate(names):
             if self._fixed_pose(name) is not None:
                 raise ValueError(f'boxes[{number}] {short_repr(name)} is fixed in the scene')
-        rows, moving = self._take(names, path[0].tolist(), sizes)
+        rows, moving = self._take(names, path[0].tolist(), sizes, last or {})
         try:
+            self._place_bodies()
             listed = self._places(rows, pairs) if pairs else scene.rows + MOST_BOXES
+            stands, around = self._is_fixed, self.solver.around
+            if last:
+                stands = self._stands(names) & ~np.isnan(self._poses[:, 0])
+                around = Surroundings(self._sizes[stands], self._poses[stands])
+            standing = np.where(stands[:, None], self._poses, np.nan)
         finally:
             native.write_poses(self._rows, moving, [None] * len(moving))
+            self._place_bodies()
         known = np.array([name in scene.row_of for name in names])
-        placed = np.array(list(rows.values()))
+        placed = np.array([rows[name] for name in names])
         boxes, poses, centres = moved_boxes(scene, placed[known] - MOST_BOXES, path[:, known])
         group, meets = self._groups
         guests = placed[~known]
         return (yield from check_course(Course(
-            self._sizes, np.where(self._is_fixed[:, None], self._poses, np.nan),
-            np.concatenate((guests, MOST_BOXES + boxes)),
+            self._sizes, standing, np.concatenate((guests, MOST_BOXES + boxes)),
             np.concatenate((path[:, ~known], poses), axis=1),
             np.concatenate((np.zeros((len(guests), 3)), centres)),
-            np.concatenate((-1 - np.arange(MOST_BOXES), scene.rigid)), listed, group,
-            meets[:0, :0] if pairs else meets, self.solver.around,
-            MOST_BOXES + np.flatnonzero(scene.is_fixed)), clearance))
+            np.where(stands, 0, np.concatenate((-1 - np.arange(MOST_BOXES), scene.rigid))),
+            listed, group, meets[:0, :0] if pairs else meets, around,
+            np.flatnonzero(stands)), clearance))
+
+    def left_out(self, names: Sequence[str], last: Mapping[str, Row]) -> tuple[int, list[str]]:
+        """Return how many boxes and bodies that move a question leaves out, and the first names."""
+        given = self._movers.intersection([*names, *last])
+        others = (name for name in self._scene.moving if name not in given)
+        return len(self._movers) - len(given), list(islice(others, MOST_LEFT_OUT))
+
+    @cached_property
+    def _movers(self) -> frozenset[str]:
+        """Names of the boxes and bodies that move."""
+        return frozenset(self._scene.moving)
+
+    def _stands(self, names: Sequence[str]) -> np.ndarray:
+        """Return which rows (n,) of boxes are not those that a question names."""
+        scene = self._scene
+        stands = np.arange(len(self._sizes)) >= MOST_BOXES
+        named = [scene.row_of[name] for name in names if name in scene.row_of]
+        boxes = np.isin(np.where(scene.body_of < 0, np.arange(len(scene.boxes)),
+                                 len(scene.boxes) + scene.body_of), named)
+        stands[MOST_BOXES:] = scene.is_fixed | ~boxes
+        return stands
 
     def names_of(self, a: int, b: int) -> tuple[str, str, str]:
         """Return the name of a pair of the last answer, and those of its boxes."""
@@ -167,13 +200,14 @@ class SceneCheck:
             self._scene.place_boxes(self._rows[MOST_BOXES:])
 
     def _take(self, names: Sequence[str], poses: Sequence[Row], sizes: Sequence[Row],
-              ) -> tuple[dict[str, int], np.ndarray]:
-        """Take the poses and sizes of a question.
+              last: Mapping[str, Row]) -> tuple[dict[str, int], np.ndarray]:
+        """Take the poses and sizes of a question, and the last poses of what else moves.
 
         Returns the row of each name, and the rows (k,) of what moves.
         """
         if not 1 <= len(names) <= MOST_BOXES:
-            raise ValueError(f'boxes: a request has 1 to {MOST_BOXES} boxes, not {len(names)}')
+            raise (ValueError if not names else TooMuch)(
+                f'boxes: a request has 1 to {MOST_BOXES} boxes, not {len(names)}')
         rows: dict[str, int] = {}
         moved: dict[int, Row] = {}  # poses by row
         resized: dict[int, Row] = {}  # sizes by row, where they differ from those before
@@ -197,6 +231,9 @@ class SceneCheck:
                 moved[row] = pose
                 if row < len(self._sizes) and size != self._size_at(row):
                     resized[row] = size
+        for name in self._movers.intersection(last).difference(rows):
+            row = rows[name] = MOST_BOXES + self._scene.row_of[name]
+            moved[row] = last[name]
         if resized:
             self._resize(resized)
         moving = np.array(list(moved), np.int64)
@@ -261,7 +298,7 @@ class SceneCheck:
     def _places(self, rows: dict[str, int], pairs: Sequence[tuple[str, str]]) -> np.ndarray:
         """Return the rows (n, 2) of pairs that are listed by the names of boxes or bodies."""
         if len(pairs) > MOST_PAIRS:
-            raise ValueError(f'pairs: a request has at most {MOST_PAIRS}, not {len(pairs)}')
+            raise TooMuch(f'pairs: a request has at most {MOST_PAIRS}, not {len(pairs)}')
         scene = self._scene
 
         def boxes_of(name: str, field: str) -> list[int]:

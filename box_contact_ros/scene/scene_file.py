@@ -21,8 +21,8 @@ from ..solver.checks import SHOWN, short_repr
 from .scene import Box, Frame, KeyPath, Pair, Scene, SceneError
 
 MOST_STREAMS = 1000
-"""Boxes with a topic of their own. Each subscription takes a millisecond and 100 kB; an array has
-all poses in one message."""
+"""Boxes with a topic of their own. Each subscription takes a millisecond and 100 kB; with
+`poses: named`, one message has all poses."""
 MOST_BYTES = 2**26
 """Of a file: 64 MiB, some million boxes. With all aliases written out, a file has at most so many
 nodes: that binds no file without aliases."""
@@ -197,7 +197,10 @@ def _check_schema(data: Any) -> None:
     schema = json.loads(resource_path('msg_schemas', 'scene.json').read_text('utf-8'))
     error = best_match(Draft202012Validator(schema).iter_errors(data))
     if error is not None:
-        raise SceneError(tuple(error.absolute_path), error.message)
+        path = tuple(error.absolute_path)
+        # Files of before have it.
+        remedy = ': write named' if path == ('poses',) and error.instance == 'array' else ''
+        raise SceneError(path, f'{error.message}{remedy}')
 
 
 def _is_pattern(entry: Mapping[str, str], bodies: KeysView[str]) -> bool:

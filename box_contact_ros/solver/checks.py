@@ -34,6 +34,10 @@ _REPR.maxlevel = 3
 _REPR.maxstring = _REPR.maxother = SHOWN
 
 
+class TooMuch(ValueError):
+    """A question is right, and asks for more than is answered at once."""
+
+
 def printable(text: str) -> str:
     """Return a text in which what no terminal shows is a question mark."""
     return ''.join(mark if mark.isprintable() else '?' for mark in text)

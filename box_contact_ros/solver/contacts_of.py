@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import native
-from .checks import as_boxes, as_margin, as_places, pose_fault, short_repr
+from .checks import TooMuch, as_boxes, as_margin, as_places, pose_fault, short_repr
 from .contact import Contacts
 from .contact_solver import ContactSolver
 from .faces import as_tolerances
@@ -33,7 +33,7 @@ class Found(NamedTuple):
     near: Nearests  # (m,)
 
 
-class TooManyNear(ValueError):
+class TooManyNear(TooMuch):
     """More pairs near each other than were to be answered; `pairs` (k, 2) are the first ones."""
 
     reason = 'too many pairs near'

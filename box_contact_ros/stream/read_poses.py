@@ -13,6 +13,7 @@ import struct
 import numpy as np
 
 from ..core import native
+from ..scene.scene import MOST_BOXES
 from ..solver.checks import pose_fault, short_repr
 from .cdr import (
     ENCAPSULATION,
@@ -51,24 +52,6 @@ def _read_in_python(data: bytes) -> StampedPose:
     return pose
 
 
-def read_poses(data: bytes) -> StampedPose:
-    """Return all poses of a serialised PoseArray, numbers (n, 7), or raise MessageError.
-
-    A row may be no pose: the box of that row has none.
-    """
-    data = bytes(data)
-    order, sec, nanosec, length = parse_head(data, 'PoseArray')
-    count_at = -(-(FRAME_AT + length) // 4) * 4
-    count = struct.unpack_from(f'{order}I', data, count_at)[0] if count_at + 4 <= len(data) else 0
-    at = ENCAPSULATION + -(-count_at // 8) * 8 if count else count_at + 4
-    if not 0 <= len(data) - (at + count * POSE_BYTES) <= PADDING:
-        raise MessageError('not a PoseArray', f'{len(data)} bytes, where {count} poses with a '
-                                              f'frame_id of {length} need '
-                                              f'{at + count * POSE_BYTES}')
-    numbers = np.frombuffer(data, f'{order}f8', 7 * count, at).reshape(count, 7).astype(np.float64)
-    return StampedPose(numbers, parse_frame(data, length, 'PoseArray'), _stamp(sec, nanosec))
-
-
 class NamedPoses:
     """Reads the poses of what moves from MultiDOFJointState messages.
 
@@ -77,7 +60,9 @@ class NamedPoses:
 
     def __init__(self, names: tuple[str, ...]) -> None:
         """Take the names of all that moves, in the order of the rows of an answer."""
-        self._names, self._native = names, native.NamedPoses(names)
+        self._most = len(names) + MOST_BOXES  # names of a message, also of what does not move
+        self._row_of = {name: row for row, name in enumerate(names)}
+        self._native = native.NamedPoses(names, self._most)
         self.unknown: tuple[str, ...] = ()
 
     def __call__(self, data: bytes) -> StampedPose:
@@ -93,49 +78,53 @@ class NamedPoses:
 
     def _read_in_python(self, data: bytes) -> StampedPose:
         order, sec, nanosec, length = parse_head(data, NAMED)
-        frame_id = parse_frame(data, length, NAMED)
         try:
-            given, poses = _parse_named(data, order, FRAME_AT + length)
+            given, poses = _parse_named(data, order, FRAME_AT + length, self._most)
         except struct.error as error:
             raise MessageError(f'not a {NAMED}', f'{len(data)} bytes: {error}') from None
-        row_of = {name: row for row, name in enumerate(self._names)}
-        numbers = np.full((len(row_of), 7), np.nan)
-        for number, (name, pose) in enumerate(zip(given, poses)):
-            if name in given[:number]:
+        frame_id, stamp = parse_frame(data, length, NAMED), _stamp(sec, nanosec)
+        first_of: dict[str, int] = {}
+        for number, name in enumerate(given):
+            first = first_of.setdefault(name, number)
+            if first != number and name in self._row_of:
                 raise MessageError('doubled name', f'joint_names[{number}]: {short_repr(name)} is '
-                                                   f'joint_names[{given.index(name)}], too')
-            if name in row_of:
-                numbers[row_of[name]] = pose
-        self.unknown = tuple(name for name in given if name not in row_of)
-        return StampedPose(numbers, frame_id, _stamp(sec, nanosec))
+                                                   f'joint_names[{first}], too')
+        numbers = np.full((len(self._row_of), 7), np.nan)
+        named = first_of.keys() & self._row_of
+        numbers[[self._row_of[name] for name in named]] = poses[[first_of[name] for name in named]]
+        self.unknown = tuple(name for name in given if name not in self._row_of)
+        return StampedPose(numbers, frame_id, stamp)
 
 
-def _parse_named(data: bytes, order: str, at: int) -> tuple[list[str], np.ndarray]:
-    """Return names and poses (n, 7) from a place of a message on; struct.error: it ends there."""
+def _parse_named(data: bytes, order: str, at: int, most: int) -> tuple[list[str], np.ndarray]:
+    """Return up to `most` names, and poses (n, 7), from a place on; struct.error: it ends there."""
     def count_at(at: int) -> tuple[int, int]:
         at += -at % 4
         return struct.unpack_from(f'{order}I', data, at)[0], at + 4
 
     count, at = count_at(at)
-    names = []
+    if at + count * (4 + POSE_BYTES) > len(data):  # a length and a pose each, before any is read
+        raise struct.error(f'{count} joint_names and transforms need more')
+    if count > most:
+        raise MessageError('too many names', f'{count} joint_names, more than {most}')
+    names: list[str] = []
     for _ in range(count):
         length, at = count_at(at)
-        if at + length > len(data):
-            raise struct.error(f'a name of {length} bytes ends behind them')
+        if length and data.find(b'\0', at, at + length) != at + length - 1:
+            raise struct.error(f'joint_names[{len(names)}] does not end with its first zero')
         names.append(data[at:at + length].removesuffix(b'\0').decode(errors='backslashreplace'))
         at += length
-    poses = np.zeros((0, 7))
     for part, size in (('transforms', POSE_BYTES), ('twist', TWIST_BYTES), ('wrench', TWIST_BYTES)):
         rows, at = count_at(at)
         at += (ENCAPSULATION - at) % 8 if rows else 0
         if part == 'transforms':
             if rows != count:
                 raise MessageError(f'not a {NAMED}', f'{count} joint_names, but {rows} transforms')
-            poses = np.array(struct.unpack_from(f'{order}{7 * count}d', data, at)).reshape(-1, 7)
+            poses_at = at
         at += rows * size
     if not 0 <= len(data) - at <= PADDING:
         raise struct.error(f'{at} are told')
-    return names, poses
+    return names, np.frombuffer(data, f'{order}f8', 7 * count, poses_at).reshape(-1, 7)
 
 
 def _stamp(sec: int, nanosec: int) -> int:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..scene.scene import ALONE, Box, Frame, Pair, Scene
 
-POSE_ARRAY = 'poses'
+POSES_TOPIC = 'poses'
 """Topic of the poses of all boxes and bodies that move, where they come as one message."""
 ALL_BOXES = 'all boxes'
 """Stream of these poses: no box of a scene file can have this name."""
@@ -24,7 +24,7 @@ def streams_of(scene: Scene) -> tuple[str, ...]:
 def topics_of(scene: Scene) -> Mapping[str, str]:
     """Return the topics of poses, by stream."""
     if scene.in_one_message:
-        return {ALL_BOXES: POSE_ARRAY}
+        return {ALL_BOXES: POSES_TOPIC}
     parts: dict[str, Box | Frame] = {**scene.boxes, **scene.bodies}
     return {name: parts[name].pose_topic or f'{name}/pose' for name in scene.moving}
 

@@ -21,14 +21,16 @@ import resource
 import struct
 import sys
 from collections import Counter
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from geometry_msgs.msg import PoseArray, PoseStamped
+from geometry_msgs.msg import PoseStamped
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.serialization import deserialize_message
-from typed_messages import read_pose, read_poses
+from sensor_msgs.msg import MultiDOFJointState
+from typed_messages import read_named, read_pose
 
 from box_contact_ros.stream import read_poses as readers
 from box_contact_ros.stream.cdr import MessageError
@@ -37,7 +39,9 @@ from box_contact_ros.stream.pairing import StampedPose
 MESSAGES = 100_000
 SHOWN = 5  # differences of a type that are printed
 MEMORY = 4 << 30  # bytes: a reader that believes a length field ends with MemoryError
-TYPES = (PoseStamped, PoseArray)
+TYPES = (PoseStamped, MultiDOFJointState)
+MOVING = ('hook', 'c1', 'c22', 'lorry')
+"""What moves, in the scene of the named poses."""
 
 SPECIAL = (0.0, -0.0, 5e-324, -2e-310, 1e-160, 1e50, 1e51, 1e200, float('inf'), float('-inf'),
            float('nan'))
@@ -59,6 +63,8 @@ class Written(NamedTuple):
     sec: int = 5
     nanosec: int = 7
     rows: tuple[tuple[float, ...], ...] = ((1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0),)
+    names: tuple[bytes, ...] = ()  # of named poses
+    extra: int = 0  # twists, and wrenches, of these
     padding: int = 0
     tail: bytes = b''
 
@@ -66,10 +72,20 @@ class Written(NamedTuple):
         """Return the serialised message."""
         order = '<' if self.kind[1] % 2 else '>'
         body = struct.pack(f'{order}iII', self.sec, self.nanosec, len(self.frame)) + self.frame
-        if message_type is PoseArray:
-            body = self._aligned(body, 4) + struct.pack(f'{order}I', len(self.rows))
+        def count(number: int) -> bytes:
+            return self._aligned(body, 4) + struct.pack(f'{order}I', number)
+
+        if message_type is MultiDOFJointState:
+            body = count(len(self.names))
+            for name in self.names:
+                body = count(len(name)) + name
+            body = count(len(self.rows))
         for row in self.rows:
             body = self._aligned(body, 8) + struct.pack(f'{order}7d', *row)
+        for _ in range(2 if message_type is MultiDOFJointState else 0):
+            body = count(self.extra)
+            if self.extra:
+                body = self._aligned(body, 8) + bytes(48 * self.extra)
         return self.kind + self.options + body + self.tail
 
     def _aligned(self, body: bytes, size: int) -> bytes:
@@ -78,13 +94,15 @@ class Written(NamedTuple):
 
 def written(rng: random.Random, message_type: type) -> Written:
     """Draw a message. Most are well-formed; any part may be bad."""
-    rows = 1 if message_type is PoseStamped else rng.choice((0, 1, 2, 3, 40))
+    names = () if message_type is PoseStamped else _names(rng)
+    rows = 1 if message_type is PoseStamped else len(names) + (rng.random() < 0.07)
     kind = bytes([0, rng.randrange(14)]) if rng.random() < 0.1 else bytes([0, rng.random() < 0.7])
     return Written(
         kind=kind, options=rng.choice((b'\0\0', b'\0\1', b'\0\2', b'\0\3', rng.randbytes(2))),
         frame=_frame(rng), sec=rng.choice((0, 5, -1, 2**31 - 1, -2**31)),
         nanosec=rng.choice((0, 7, 999_999_999, 999_999_999, 1_000_000_000)),
-        rows=tuple(_row(rng) for _ in range(rows)), padding=rng.choice((0, 0, 255, 1)),
+        rows=tuple(_row(rng) for _ in range(rows)), names=names,
+        extra=rng.choice((0, 0, 0, 1, 2)), padding=rng.choice((0, 0, 255, 1)),
         tail=rng.randbytes(rng.choice((0,) * 12 + (1, 2, 3, 4, 7, 100))))
 
 
@@ -100,6 +118,17 @@ def _frame(rng: random.Random) -> bytes:
         place = rng.randrange(len(text) + 1)
         return text[:place] + b'\0' + text[place:] + b'\0'
     return text + b'\0'
+
+
+def _names(rng: random.Random) -> tuple[bytes, ...]:
+    """Draw names of named poses. Most move, and most are there once."""
+    names = [name.encode() + b'\0' for name in (*MOVING, 'c333', 'ö', '')]
+    drawn = rng.sample(names, rng.randrange(len(names) + 1))
+    if rng.random() < 0.3:
+        drawn += rng.choices(names, k=2)
+    if rng.random() < 0.05:
+        drawn.append(rng.choice((b'c1', b'c1\0x\0', b'\xff\0', b'')))
+    return tuple(drawn)
 
 
 def _row(rng: random.Random) -> tuple[float, ...]:
@@ -144,15 +173,28 @@ def _is_other_kind(data: bytes, _: type) -> bool:
     return data[:2] not in (b'\0\0', b'\0\1')
 
 
-def _is_no_string(data: bytes, _: type) -> bool:
-    """Whether frame_id lacks its NUL, or has one inside. rclpy ends the text at the first NUL.
+def _strings(data: bytes, message_type: type) -> Iterator[bytes]:
+    """Yield the bytes of frame_id, and those of names, of a message that rclpy reads."""
+    order: Literal['little', 'big'] = 'little' if data[1] else 'big'
+    at, count = 12, 1
+    while count:
+        length = int.from_bytes(data[at:at + 4], order)
+        yield data[at + 4:at + 4 + length]
+        at += 4 + length + -length % 4
+        count -= 1
+        if message_type is MultiDOFJointState:
+            count, message_type = int.from_bytes(data[at:at + 4], order), PoseStamped
+            at += 4
+
+
+def _is_no_string(data: bytes, message_type: type) -> bool:
+    """Whether a string lacks its NUL, or has one inside. rclpy ends the text at the first NUL.
 
     A string in CDR ends with a NUL, and has none inside. Two frame_ids that differ must not be
-    taken for the same frame.
+    taken for the same frame, nor two names for the same box.
     """
-    order = 'little' if data[1] else 'big'
-    frame = data[16:16 + int.from_bytes(data[12:16], order)]
-    return bool(frame) and frame.find(b'\0') != len(frame) - 1
+    return any(text and text.find(b'\0') != len(text) - 1
+               for text in _strings(data, message_type))
 
 
 def _is_longer(data: bytes, message_type: type) -> bool:
@@ -182,13 +224,14 @@ def wanted(data: bytes, message_type: type) -> tuple[str, Outcome]:
     for word, applies in STRICTER.items():
         if applies(data, message_type):
             return f'stricter: {word}', refusal
-    outcome = outcome_of(read_pose if message_type is PoseStamped else read_poses, message)
+    outcome = outcome_of(
+        read_pose if message_type is PoseStamped else partial(read_named, MOVING), message)
     return str(outcome[0]) if len(outcome) == 1 else 'read', outcome
 
 
 def reader_of(message_type: type) -> Callable[[bytes], StampedPose]:
     """Return the reader of the bytes of a type."""
-    return readers.read_pose if message_type is PoseStamped else readers.read_poses
+    return readers.read_pose if message_type is PoseStamped else readers.NamedPoses(MOVING)
 
 
 def outcome_of(read: Callable[[Any], StampedPose], message: Any) -> Outcome:

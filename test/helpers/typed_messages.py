@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import chain, repeat
 from typing import Any
 
@@ -14,7 +15,6 @@ from geometry_msgs.msg import (
     Point,
     PointStamped,
     Pose,
-    PoseArray,
     PoseStamped,
     Quaternion,
     Transform,
@@ -25,10 +25,11 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import MultiDOFJointState
 from std_msgs.msg import Header
 
-from box_contact_msgs.msg import Box, BoxPair, Contacts
+from box_contact_msgs.msg import Box, BoxPair, Code, Contacts
 from box_contact_msgs.msg import Contact as ContactMessage
 from box_contact_msgs.msg import Near as NearMessage
 from box_contact_ros.node.messages import make_header
+from box_contact_ros.node.paced_service import refuse
 from box_contact_ros.scene.scene import Pair
 from box_contact_ros.solver.checks import pose_fault
 from box_contact_ros.solver.contact import FIELDS, Contact
@@ -43,14 +44,21 @@ TOLD = FIELDS[:-1]
 """What a message says of a contact: all but its axis."""
 
 
+def answered(request: Any, response: Any, answer: Callable[[Any, Any], Iterable[None] | None],
+             ) -> Any:
+    """Return a response as the node sends it; `answer` fills it in, in steps or at once."""
+    try:
+        deque(answer(request, response) or (), maxlen=0)
+    except ValueError as error:
+        refuse(response, error)
+    else:
+        response.success, response.code.value = True, Code.OK
+    return response
+
+
 def pose_stamped(numbers: Iterable[float], frame_id: str, stamp: int) -> PoseStamped:
     """Return the message of a pose `x y z qx qy qz qw`; stamp [ns]."""
     return PoseStamped(header=make_header(stamp, frame_id), pose=_pose(numbers))
-
-
-def pose_array(rows: Iterable[Iterable[float]], frame_id: str, stamp: int) -> PoseArray:
-    """Return the message of poses (n, 7); stamp [ns]."""
-    return PoseArray(header=make_header(stamp, frame_id), poses=[_pose(row) for row in rows])
 
 
 def joint_state(poses: Mapping[str, Iterable[float]], frame_id: str, stamp: int,
@@ -93,7 +101,7 @@ def _pose(numbers: Iterable[float]) -> Pose:
 
 def read_pose(message: PoseStamped) -> StampedPose:
     """Return the pose of a message, or raise MessageError."""
-    numbers = _numbers(message.pose)
+    numbers = _numbers(message.pose.position, message.pose.orientation)
     pose = _stamped(np.array(numbers), message.header)
     fault = pose_fault(numbers)
     if fault:
@@ -101,14 +109,23 @@ def read_pose(message: PoseStamped) -> StampedPose:
     return pose
 
 
-def read_poses(message: PoseArray) -> StampedPose:
-    """Return all poses of a message, numbers (n, 7) as they are, or raise MessageError."""
-    numbers = np.array([_numbers(pose) for pose in message.poses], dtype=float).reshape(-1, 7)
-    return _stamped(numbers, message.header)
+def read_named(moving: Sequence[str], message: MultiDOFJointState) -> StampedPose:
+    """Return the poses (n, 7) of what moves, NaN for the rest, or raise MessageError."""
+    names, transforms = message.joint_names, message.transforms
+    if len(names) != len(transforms):
+        raise MessageError('not a MultiDOFJointState', 'names and transforms differ in number')
+    numbers = np.full((len(moving), 7), np.nan)
+    stamped = _stamped(numbers, message.header)
+    for row, name in enumerate(moving):
+        if names.count(name) > 1:
+            raise MessageError('doubled name', name)
+        if name in names:
+            transform = transforms[names.index(name)]
+            numbers[row] = _numbers(transform.translation, transform.rotation)
+    return stamped
 
 
-def _numbers(pose: Pose) -> Sequence[float]:
-    p, q = pose.position, pose.orientation
+def _numbers(p: Point | Vector3, q: Quaternion) -> Sequence[float]:
     return p.x, p.y, p.z, q.x, q.y, q.z, q.w
 
 

@@ -25,7 +25,7 @@ from rclpy.parameter import Parameter
 from ros_client import CUBES, Client, serving
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
-from typed_messages import TOLD, a_box, a_pair, contacts_by_pair
+from typed_messages import TOLD, a_box, a_pair, answered, contacts_by_pair
 
 from box_contact_msgs.srv import Check
 from box_contact_ros import ContactSolver, SceneSolver, make_model
@@ -35,8 +35,10 @@ from box_contact_ros.node.check import MOST_CONTACTS, CheckAnswerer
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.paced_service import PacedService
 from box_contact_ros.node.runtime import GuardedNode
+from box_contact_ros.node.tick import LastPoses
 from box_contact_ros.scene.scene import Box, Frame, Pair, Scene
 from box_contact_ros.scene.scene_check import MOST_BOXES, MOST_PAIRS
+from box_contact_ros.stream.pairing import StampedPose
 
 CUBE = tuple(poses.CUBE)
 SCENE = Scene({name: Box(CUBE) for name in ('load', 'stack', 'lorry')},
@@ -53,7 +55,7 @@ def answerer() -> CheckAnswerer:
 
 def asked(answerer: CheckAnswerer, *boxes: Any, **fields: Any) -> Check.Response:
     """Return the response to boxes and further fields of a request."""
-    return answerer.answer(Check.Request(boxes=list(boxes), **fields), Check.Response())
+    return answered(Check.Request(boxes=list(boxes), **fields), Check.Response(), answerer.answer)
 
 
 def labels(response: Check.Response) -> list[str]:
@@ -166,6 +168,56 @@ def test_a_body_is_a_question() -> None:
                             "'spreader' to boxes")
 
 
+def test_what_moves_and_is_not_named_is_told() -> None:
+    """Or it stands where it was last: it meets what is named, and nothing else."""
+    answerer = CheckAnswerer(SceneSolver(SPREADER))
+    load, above = a_box('load', (0, 0, 1.9, 0, 0, 0, 1)), (0, 0, 3.4, 0, 0, 0, 1)
+    left = asked(answerer, load)
+    assert (labels(left), left.left_out, left.left_out_names) == (['load_stack'], 1, ['spreader'])
+    assert asked(answerer, load, a_box('spreader', above)).left_out == 0
+
+    def found(*boxes: Any, last: Any, **fields: Any) -> list[str]:
+        response = answered(Check.Request(boxes=list(boxes), **fields), Check.Response(),
+                            partial(answerer.answer, last=last))
+        assert response.left_out == len({'load', 'spreader'} - {box.name for box in boxes}
+                                        - last.keys())
+        return labels(response)
+
+    low = (0, 0, 2.1, 0, 0, 0, 1)  # the beam is 2.6 to 3.6 m high, the load up to 2.9 m
+    assert found(load, last={'spreader': low}) == ['load_stack', 'beam_load']
+    assert found(load, last={}) == ['load_stack']
+    in_stack = (-2.5, 0, 0.4, 0, 0, 0, 1)  # the foot is, and nobody asks about it
+    assert found(a_box('load', (0, 9, 9, 0, 0, 0, 1)), last={'spreader': in_stack}) == []
+    assert found(load, last={'spreader': low}, pairs=[a_pair('load', 'spreader')]) == ['load_beam']
+    assert found(load, a_box('spreader', above), last={'spreader': low}) == ['load_stack']
+    assert found(a_box('mine', low, CUBE), last={'spreader': low, 'nobody': low}) == ['mine_beam']
+    assert labels(asked(answerer, load)) == ['load_stack']
+
+
+@pytest.mark.parametrize('margin', [0.0, 0.3])
+def test_last_poses_answer_as_if_they_were_named(margin: float) -> None:
+    """But for pairs of which neither is asked for."""
+    rng = np.random.default_rng(6)
+    boxes = {f'b{n}': Box(rng.uniform(0.5, 2, 3)) for n in range(80)}
+    solver, count = SceneSolver(Scene(boxes, patterns=(('b*', 'b*'),), poses='named')), 0
+    answerer, of_all = CheckAnswerer(solver), CheckAnswerer(solver)
+    for _ in range(20):
+        places = {name: (*rng.uniform(-3, 3, 3), *rng.normal(size=4)) for name in boxes}
+        named = set(rng.permutation(list(boxes))[:20].tolist())
+        whole = asked(of_all, *(a_box(name, place) for name, place in places.items()),
+                      margin=margin)
+        part = answered(Check.Request(margin=margin, boxes=[
+            a_box(name, place) for name, place in places.items() if name in named]),
+            Check.Response(), partial(answerer.answer, last=places))
+        for kind in ('contacts', 'near'):
+            wanted = [entry for entry in getattr(whole.contacts, kind)
+                      if named & {entry.box_a, entry.box_b}]
+            assert [(entry.box_a, entry.box_b) for entry in getattr(part.contacts, kind)] == [
+                (entry.box_a, entry.box_b) for entry in wanted]
+            count += len(wanted)
+    assert count > 500
+
+
 @pytest.mark.parametrize('margin', [0.0, 0.3])
 def test_a_question_is_answered_as_a_tick_of_the_scene_that_it_makes(margin: float) -> None:
     """Guests are boxes of that scene, before its own; whoever is not named has no pose."""
@@ -186,7 +238,7 @@ def test_a_question_is_answered_as_a_tick_of_the_scene_that_it_makes(margin: flo
         response = asked(answerer, *(a_box(name, *guest) for name, guest in guests.items()),
                          *(a_box(name, place) for name, place in named.items()), margin=margin)
         whole = Scene({**{name: Box(size) for name, (_, size) in guests.items()}, **boxes},
-                      scene.pairs, patterns=(('guest*', '*'), *patterns), poses='array')
+                      scene.pairs, patterns=(('guest*', '*'), *patterns), poses='named')
         poses_of = {name: place for name, (place, _) in guests.items()} | named
         answer = SceneSolver(whole, margin=margin)([poses_of.get(name) for name in whole.moving])
         listed, near = response.contacts.contacts, response.contacts.near
@@ -345,6 +397,41 @@ def test_a_check_leaves_the_ticks_alone(client: Client) -> None:
         client.ask(ORIGIN, TOUCHING)
 
 
+def test_the_last_pose_of_each_is_kept() -> None:
+    """Of one message of all, also where a later one leaves it out, and of topics of their own."""
+    def message(stamp: int, *xs: float) -> StampedPose:
+        return StampedPose(np.array([(x, 0, 0, 0, 0, 0, 1) for x in xs]), 'map', stamp)
+
+    last = LastPoses()
+    last.take_all(('a', 'b', 'c'), message(10, 1.0, 2.0, math.nan), np.array([2]))
+    assert {name: row[0] for name, row in last.within(0).items()} == {'a': 1.0, 'b': 2.0}
+    last.take_all(('c', 'b', 'd'), message(15, 3.0, math.nan, 4.0), np.array([1]))
+    assert {name: row[0] for name, row in last.within(0).items()} == {'b': 2.0, 'c': 3.0, 'd': 4.0}
+    assert last.within(4).keys() == {'c', 'd'} and last.within(5).keys() == {'b', 'c', 'd'}
+    last.take('e', StampedPose((5.0, 0, 0, 0, 0, 0, 1), 'map', 30))
+    assert last.within(0)['e'][0] == 5.0 and last.within(10).keys() == {'e'}
+    last.take('e', StampedPose((6.0, 0, 0, 0, 0, 0, 1), 'map', 1))  # time went back
+    assert last.within(10).keys() == {'b', 'e'} and last.within(14).keys() == {'b', 'c', 'd', 'e'}
+    last.forget()
+    assert last.within(0) == {}
+
+
+def test_last_poses_are_those_of_the_topics(client: Client) -> None:
+    """Until time begins anew."""
+    with serving(ContactNode, **CUBES):
+        client.offer_until_answered(ORIGIN, APART)
+        client.ask(ORIGIN, TOUCHING)
+        load = [a_box('box_a', ORIGIN)]
+        request = Check.Request(boxes=load, last_poses=True)
+        met = client.call(Check, 'contact_node/check', request)
+        assert labels(met) == ['box_a_box_b'] and met.left_out == 0
+        alone = client.call(Check, 'contact_node/check', Check.Request(boxes=load))
+        assert labels(alone) == [] and alone.left_out_names == ['box_b']
+        assert client.call(Trigger, 'contact_node/reset', Trigger.Request()).success
+        forgotten = client.call(Check, 'contact_node/check', request)
+        assert labels(forgotten) == [] and forgotten.left_out_names == ['box_b']
+
+
 COSTLY = Check.Request(boxes=[a_box(f'{n}', ORIGIN, CUBE) for n in range(91)])
 CHEAP = Check.Request(boxes=COSTLY.boxes[:2])
 
@@ -394,14 +481,16 @@ class Bench:
         for _ in range(self.steps - 1):
             self.now += STEP
             yield
-        response.success = request.name != 'bad'
+        if request.name == 'bad':
+            raise ValueError('a fault')
 
     def ask(self, name: str, boxes: int, seconds: float, margin: float = 0.0) -> None:
         """Take a request whose answer is sent after so long."""
         def send(response: Check.Response) -> None:
             self.now += seconds
             self.sent.append(name if response.success else f'{name}: {response.message[:4]}')
-        request = SimpleNamespace(name=name, boxes=range(boxes), pairs=(), margin=margin)
+        request = SimpleNamespace(name=name, boxes=range(boxes), pairs=(), margin=margin,
+                                  last_poses=False)
         self.service._take(request, Check.Response(), send)
 
 
@@ -421,7 +510,7 @@ def test_a_pause_is_five_times_as_long_as_its_request(monkeypatch: pytest.Monkey
     bench.end_of_pause()
     assert bench.sent[3:] == ['one that waits'] and bench.timer.timer_period_ns == round(0.5e9)
     bench.ask('bad', 0, 0.001)
-    assert bench.sent.pop() == 'bad: '
+    assert bench.sent.pop() == 'bad: a fa'
     for _ in range(16):
         bench.end_of_pause()
     assert bench.sent[4:] == [f'{number}' for number in range(15)]
@@ -451,6 +540,19 @@ def test_what_one_client_asks_makes_no_other_wait(monkeypatch: pytest.MonkeyPatc
     assert len(bench.service._cheap) == paced_service.KEPT_KINDS
 
 
+def test_a_timer_that_is_served_too_early_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """EventsExecutor multiplies the events of a timer that is set while one of them waits."""
+    bench = Bench(monkeypatch, steps=3)
+    bench.ask('first', 80, 0.01)
+    before = bench.timer.mock_calls[:]
+    for _ in range(10):
+        bench._end_of_pause()
+    assert bench.timer.mock_calls == before and not bench.sent
+    for _ in range(2):
+        bench.end_of_pause()
+    assert bench.sent == ['first']
+
+
 def test_where_the_order_matters_none_overtakes(monkeypatch: pytest.MonkeyPatch) -> None:
     """A cheap request waits behind a costly one; alone in a pause it does not."""
     bench = Bench(monkeypatch, in_turn=True)
@@ -471,7 +573,8 @@ def test_an_answer_is_made_in_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     bench.ask('first', 80, 0.01)
     bench.ask('second', 1, 0.01)
     for _ in range(2):
-        assert not bench.sent and bench.timer.timer_period_ns == round(1e9 * paced_service.GAP)
+        assert not bench.sent and bench.timer.timer_period_ns == round(
+            1e9 * paced_service.REST * STEP)
         bench.end_of_pause()
     assert bench.sent == ['first']
     assert bench.timer.timer_period_ns == round(1e9 * paced_service.PAUSE * (2 * STEP + 0.01))
@@ -502,13 +605,52 @@ def test_what_comes_in_a_step_is_served_before_the_next(client: Client, executor
                     pass
                 time.sleep(0.02)  # on a busy machine the message needs it to arrive
                 yield
-            response.success = True
 
     with serving(Stepper, executor_type) as node:
         assert client.spin(lambda: node.ticks.get_subscription_count())
         assert client.call(Check, 'stepper/check', Check.Request()).success
     in_a_row = sum(pair == ('step', 'step') for pair in pairwise(order))
     assert order.count('step') == 10 and in_a_row < 4, order
+
+
+@pytest.mark.parametrize('executor_type', [SingleThreadedExecutor, EventsExecutor])
+def test_many_requests_at_once_are_served_once_each(client: Client, executor_type: Any) -> None:
+    """Ticks come between all of their steps, and the timer ends some times for each request."""
+    order: list[str] = []
+
+    class Stepper(GuardedNode):
+        def __init__(self, context: Any) -> None:
+            super().__init__('stepper', context=context)
+            self.create_subscription(Header, 'ticks', lambda _: order.append('tick'), 10)
+            self.ticks = self.create_publisher(Header, 'ticks', 10)
+            self.served = 0
+            service = PacedService(self, Counter(), 'checks', (Check, '~/check'), self.answer,
+                                   lambda request: ((), len(request.boxes)))
+            go_on = service._timer.callback
+
+            def counted() -> None:
+                self.served += 1
+                go_on()
+            service._timer.callback = counted
+
+        def answer(self, _: Any, response: Check.Response) -> Iterator[None]:
+            for _ in range(3):
+                order.append('step')
+                self.ticks.publish(Header())
+                began = time.thread_time()
+                while time.thread_time() < began + 0.005:
+                    pass
+                yield
+
+    with serving(Stepper, executor_type) as node:
+        assert client.spin(lambda: node.ticks.get_subscription_count())
+        service = client._client_of(Check, 'stepper/check')
+        request = Check.Request(boxes=[a_box('p', ORIGIN, CUBE)])
+        futures = [service.call_async(request) for _ in range(10)]
+        assert client.spin(lambda: all(future.done() for future in futures))
+    assert all(future.result().success for future in futures)
+    silences = ''.join(word[0] for word in order).split('t')
+    assert node.served <= 10 * len(futures) and max(map(len, silences)) <= 4, order
 
 
 @pytest.mark.parametrize('by_topics', [False, True])

@@ -130,6 +130,7 @@ def test_two_publishers_of_a_box(node, client):
     while not answer_in_turns():
         assert time.monotonic() < deadline
     assert (status().level, status().message) == (b'\1', 'several publishers: box_a')
+    assert client.newest_diagnostic('lost since the last report') == 'unknown'
     assert not client.newest_diagnostic('dropped: newer poses wait')
     client.node.destroy_publisher(other[0])
     assert client.spin(lambda: 'several publishers' not in status().message)
@@ -259,7 +260,13 @@ def test_a_bad_start_is_one_clear_line(tmp_path):
         ({'scene': str(long_topics(tmp_path)), 'size_a': SIZE, 'size_b': SIZE},
          "/contact/point': failed to resolve name: topic length should not exceed"),
         ({'scene': str(names_of_containers(tmp_path)), 'size_a': SIZE, 'size_b': SIZE},
-         "topic 'MSKU-123_20ft_1/contact/point': failed to resolve name: topic name must not"),
+         "topic 'MSKU-123_20ft_1/contact/point': failed to resolve name: topic name must not "
+         "contain characters other than alphanumerics, '_', '~', '{', or '}': "
+         "set pair_topics to false\n"),
+        ({'scene': str(names_of_containers(tmp_path)), 'size_a': SIZE, 'size_b': SIZE,
+          'pair_topics': False},
+         "topic 'MSKU-123/pose': failed to resolve name: topic name must not contain characters "
+         "other than alphanumerics, '_', '~', '{', or '}': write poses: named in the scene file\n"),
         ({'qos_overrides./box_a/pose.subscription.depth': 'deep'}, "'deep' of type 'STRING'"),
         ({'qos_overrides./box_a/pose.subscription.reliability': 'relyable'},
          'qos_overrides of /box_a/pose: Unexpected QoS override for policy `reliability`'),
@@ -292,6 +299,23 @@ class Node(ContactNode):
 print(run(Node, None, ['--ros-args', '-p', 'size_a:=[0.0, 1.0, 1.0]']))
 """], capture_output=True, text=True)
     assert done.stdout.split('\n') == ['destroyed True', '1', ''], done.stderr
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_it_is_configured(number):
+    """That is no fault of the configuration: nothing is logged, and the status is 0."""
+    done = subprocess.run([sys.executable, '-c', f"""
+import os, time
+from box_contact_ros.node.contact_node import ContactNode, run
+class Node(ContactNode):
+    def _make_solver(self, values, scene):
+        os.kill(os.getpid(), {int(number)})
+        while self.context.ok():
+            time.sleep(0.01)
+        return super()._make_solver(values, scene)
+print(run(Node, None, {arguments(**CUBES)}))
+"""], capture_output=True, text=True, timeout=PATIENCE)
+    assert (done.stdout, done.stderr) == ('0\n', '')
 
 
 @pytest.mark.parametrize(('number', 'pauses'), [

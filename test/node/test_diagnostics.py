@@ -14,7 +14,7 @@ from geometry_msgs.msg import PoseStamped
 
 from box_contact_ros import SceneSolver
 from box_contact_ros.node import diagnostics
-from box_contact_ros.node.diagnostics import ACTIVE, Diagnostics, TickMonitor
+from box_contact_ros.node.diagnostics import ACTIVE, MOST_TOLD, Diagnostics, TickMonitor
 from box_contact_ros.node.tick import PoseQueue
 from box_contact_ros.node.topics import SceneTopics
 from box_contact_ros.scene.scene import two_boxes
@@ -113,8 +113,35 @@ def test_poses_that_never_came_are_told(node):
     counts['poses'] += 20
     assert report(5.0, age=10**5, lost=1000) == 'a burst of poses was lost: 1000'
     assert 'stood still' in report.lines[-1].args[0]
+    assert report.values['lost since the last report'] == '1000'
     counts['poses'] += 200
     assert report(1.0, age=10**5) == 'answering'
+    counts['poses'] += 200
+    assert report(1.0, age=10**5, lost=None) == 'answering'
+    assert report.values['lost since the last report'] == 'unknown'
+    counts.update({'poses': 200, OVERTAKEN: 100})
+    assert report(1.0, age=10**5, lost=None) == 'a burst of poses was lost: at least 100'
+
+
+def test_a_name_that_moves_nothing_is_logged_once(node):
+    """With the nearest one, one in a report, whatever comes between; of endless names, few."""
+    _, report = node
+    for unknown in (('box_c', 'hook'), (), ('hook', 'box_c')) * 20:
+        report.monitor.unknown = unknown
+        message = report(1.0)
+        assert ('names that move nothing: ' in message) == bool(unknown)
+
+    def lines():
+        told = [call.args[0] for call in report.lines]
+        return [line for line in told if 'moves nothing' in line]
+
+    end = ': the scene has no such box or body, or it does not move; ask ~/get_boxes'
+    assert lines() == [f"poses: 'box_c' moves nothing (did you mean box_b?){end}",
+                       f"poses: 'hook' moves nothing{end}"]
+    for number in range(2 * MOST_TOLD):
+        report.monitor.unknown = (f'n{number}',)
+        report(1.0)
+    assert len(lines()) == MOST_TOLD
 
 
 def test_poses_that_an_inactive_node_leaves_are_not_lost():
@@ -136,7 +163,7 @@ def test_numbers_of_several_publishers_are_not_compared():
     publishers[0] = 2
     numbers = [number for turn in range(50) for number in (turn + 1, turn + 6000)]
     assert not any(queue.is_overtaken(number, 0) for number in numbers)
-    assert queue.take_lost() == 0 and queue.is_shared
+    assert queue.take_lost() is None and queue.is_shared
     publishers[0] = 1
     assert queue.take_lost() == 0 and not queue.is_shared
     assert not queue.is_overtaken(6050, 0) and queue.is_overtaken(6060, 0)
@@ -157,7 +184,8 @@ def test_a_publisher_that_is_started_anew_is_not_two():
     queue = PoseQueue(lambda: 2)
     for number in (500, 501, 1, 2, 3):
         assert not queue.is_overtaken(number, 0)
-    assert queue.take_lost() == 0 and not queue.is_shared
+    assert queue.take_lost() is None and not queue.is_shared
+    assert not queue.is_overtaken(4, 0) and queue.take_lost() == 0
 
 
 @pytest.mark.parametrize('every, off, told', [(1, 300_000, True), (10, 300_000, True),

@@ -5,7 +5,7 @@
 
 The node runs as a process of its own, and most poses are sent as bytes, so that nothing on this
 side repairs them. The policy: docs/reference/conventions.md, "Bad input". Elsewhere: nodes that are
-killed (test_contact_node.py), bad arrays and clocks (test_scene_node.py).
+killed (test_contact_node.py), bad named poses and clocks (test_scene_node.py).
 """
 from __future__ import annotations
 

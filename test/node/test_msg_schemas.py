@@ -17,14 +17,14 @@ from typing import Any
 
 import pytest
 import yaml
-from geometry_msgs.msg import PoseArray, PoseStamped
+from geometry_msgs.msg import PoseStamped
 from jsonschema import Draft202012Validator
 from patience import PATIENCE
 from rclpy.qos import QoSProfile
 from referencing import Registry, Resource
 from ros_client import CUBES, Client, serving
 from sensor_msgs.msg import MultiDOFJointState
-from typed_messages import a_box, a_pair, joint_state, make_contacts, pose_array
+from typed_messages import a_box, a_pair, joint_state, make_contacts
 
 from box_contact_msgs.msg import Body, Boxes
 from box_contact_msgs.srv import Check, CheckPath, GetBoxes, SetBoxes
@@ -192,7 +192,7 @@ def client():
 def live(node, client) -> dict[str, list[Any]]:
     """Messages by topic: poses in contact, close, apart and refused, the answers, diagnostics.
 
-    The poses of an array are what a client may send; one box is not there.
+    Named poses are what a client may send.
     """
     got: dict[str, list[Any]] = {channel: [] for channel in ADDRESSES}
     for channel in ('boxAPose', 'boxBPose'):
@@ -220,9 +220,7 @@ def live(node, client) -> dict[str, list[Any]]:
                 name=f'body{k}', fixed=True, boxes=[a_box(f'part{k}', APART, (1, 1, 1))])]))
         newest = changed.revision  # other tests may have changed the node's scene before
         assert client.spin(lambda: got['boxes'] and got['boxes'][-1].revision == newest)  # noqa: B023
-    got['namedPoses'] = [joint_state({'a': TOUCHING, 'b': first}, 'map', 0)
-                         for first in (ORIGIN, APART)]
-    got['poses'] = [pose_array([TOUCHING, first], 'map', 0) for first in (ORIGIN, (math.nan,) * 7)]
+    got['poses'] = [joint_state({'a': TOUCHING, 'b': first}, 'map', 0) for first in (ORIGIN, APART)]
     return got
 
 
@@ -350,8 +348,8 @@ WRONG_MESSAGES = {
     'a contact without half of its point': ('contacts', set_in('contacts.0.point.x', math.nan)),
     'a negative volume': ('contacts', set_in('contacts.0.volume', -1e-9)),
     'pose at 1e51 m': ('boxAPose', set_in('pose.position.x', 1e51)),
-    'half a pose in an array': ('poses', set_in('poses.0.position.x', math.nan)),
-    'half an absent pose': ('poses', set_in('poses.0.orientation.w', math.nan)),
+    'half a named pose': ('poses', set_in('transforms.0.translation.x', math.nan)),
+    'a doubled name': ('poses', set_in('joint_names', ['a', 'a'])),
     'NaN in the quaternion': ('boxAPose', set_in('pose.orientation.w', math.nan)),
     'quaternion of zero length': ('boxAPose', set_in('pose.orientation.w', 0.0)),
     'unknown level': ('diagnostics', set_in('status.0.level', b'\x03')),
@@ -388,8 +386,7 @@ def test_topics_have_the_documents_type_and_qos(node, operation):
     """Of what nothing is said, it is ROS's default: neither deadlines nor lifespans."""
     address = follow(operation['channel']['$ref'])['address']
     if address == 'poses':
-        array = operation['channel']['$ref'] == '#/channels/poses'
-        message_type, qos = PoseArray if array else MultiDOFJointState, pose_qos(ALL_BOXES)
+        message_type, qos = MultiDOFJointState, pose_qos(ALL_BOXES)
     else:
         entities = node.publishers if operation['action'] == 'send' else node.subscriptions
         (message_type, qos), = ((entity.msg_type, entity.qos_profile) for entity in entities

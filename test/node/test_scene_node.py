@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""A contact node with a scene over DDS: many boxes, pose arrays, stale boxes, time, lifecycle."""
+"""A contact node with a scene over DDS: many boxes, named poses, stale boxes, time, lifecycle."""
 from __future__ import annotations
 
 import json
@@ -13,20 +13,20 @@ from contextlib import closing
 import numpy as np
 import poses
 import pytest
-from geometry_msgs.msg import PoseArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from patience import PATIENCE
 from rclpy.lifecycle import TransitionCallbackReturn
 from ros_client import DEEP, Client, serving, stamp_of
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import MultiDOFJointState
 from std_srvs.srv import Trigger
-from typed_messages import contacts_by_pair, pose_array, read
+from typed_messages import contacts_by_pair, joint_state, read
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
-from box_contact_ros.node.topics import ARRAY_DEPTH, MOST_PAIRS_WITH_TOPICS
+from box_contact_ros.node.topics import MOST_PAIRS_WITH_TOPICS, NAMED_DEPTH
 from box_contact_ros.scene.scene import ALONE
 from box_contact_ros.view.live.listener import read_answer
 
@@ -40,7 +40,7 @@ pairs:
   - {a: floor, b: load}
   - {name: load_lorry, a: lorry, b: load}
 """
-ARRAY = SCENE.replace('boxes:', 'poses: array\nboxes:').replace(', pose_topic: /traffic/lorry', '')
+NAMED = SCENE.replace('boxes:', 'poses: named\nboxes:').replace(', pose_topic: /traffic/lorry', '')
 FLOOR, BESIDE = 'floor_load', 'load_lorry'  # the pairs
 ON_FLOOR = (0, 0, 0.9, 0, 0, 0, 1)    # 0.1 m deep
 ON_LORRY = (0, 0, 2.8, 0, 0, 0, 1)    # 0.2 m deep in a lorry on the floor
@@ -49,16 +49,19 @@ FAR = (9, 9, 9, 0, 0, 0, 1)
 GONE = (math.nan,) * 7
 
 
-class ArrayClient(Client):
-    """Publishes the poses of all boxes as one message."""
+class NamedClient(Client):
+    """Publishes the poses of all boxes as one message; None: a box is not named."""
+
+    names = ('load', 'lorry')
 
     def __init__(self):
         super().__init__()
-        self.poses = self.node.create_publisher(PoseArray, 'poses', DEEP)
+        self.poses = self.node.create_publisher(MultiDOFJointState, 'poses', DEEP)
 
     def send(self, *rows, stamp=None, frame='map'):
         stamp = stamp or self.next_stamp()
-        self.poses.publish(pose_array(rows, frame, stamp))
+        named = {name: row for name, row in zip(self.names, rows, strict=True) if row is not None}
+        self.poses.publish(joint_state(named, frame, stamp))
         return stamp
 
 
@@ -70,8 +73,8 @@ def client():
 
 
 @pytest.fixture
-def array_client():
-    with closing(ArrayClient()) as client:
+def named_client():
+    with closing(NamedClient()) as client:
         yield client
 
 
@@ -121,7 +124,7 @@ def test_without_pair_topics(client, scene_node):
 
 def test_many_pairs_have_no_topics_of_their_own(scene_node):
     boxes = {f'b{n}': {'size': [1, 1, 1]} for n in range(46)}  # 1,035 pairs
-    scene = json.dumps({'poses': 'array', 'boxes': boxes, 'pairs': 'all'})
+    scene = json.dumps({'poses': 'named', 'boxes': boxes, 'pairs': 'all'})
     with pytest.raises(ValueError, match=f'at most {MOST_PAIRS_WITH_TOPICS}.: set pair_topics to '
                                          'false'), scene_node(scene):
         pass
@@ -185,39 +188,43 @@ def test_frame_of_the_scene_and_a_refused_tick(client, scene_node):
         assert client.diagnostic('refused: frame_id differs') == '1'
 
 
-# --- pose arrays ----------------------------------------------------------------------------------
+# --- named poses ----------------------------------------------------------------------------------
 
 
 @pytest.fixture(params=['stamp', 'latest'])
-def array_node(array_client, scene_node, request):
-    with scene_node('frame_id: map\n' + ARRAY, pairing=request.param) as node:
-        array_client.offer_until_answered(ON_FLOOR, LORRY)
+def named_node(named_client, scene_node, request):
+    with scene_node('frame_id: map\n' + NAMED, pairing=request.param) as node:
+        named_client.offer_until_answered(ON_FLOOR, LORRY)
         yield node
 
 
-def test_one_message_has_all_poses(array_node, array_client):
-    """In the order of the boxes; a message is a tick; the same answers as from a topic a box.
+def test_one_message_has_all_poses(named_node, named_client):
+    """By their names, in any order; a message is a tick; the same answers as from a topic a box.
 
-    A box that is not there is stale in this tick alone, whatever the pairing.
+    A box that is not named, or has seven NaN, is stale in this tick alone, whatever the pairing.
     """
-    assert {entity.topic_name for entity in array_node.subscriptions
+    assert {entity.topic_name for entity in named_node.subscriptions
             if 'pose' in entity.topic_name} == {'/poses'}
-    contacts = array_client.answer(ON_LORRY, LORRY)
+    contacts = named_client.answer(ON_LORRY, LORRY)
     assert list(contacts) == [BESIDE] and contacts[BESIDE].separation == pytest.approx(-0.2)
-    contacts = array_client.answer(LORRY, ON_LORRY)
+    contacts = named_client.answer(LORRY, ON_LORRY)
     assert list(contacts) == [FLOOR, BESIDE]
     assert contacts[BESIDE].normal[2] == -1  # the lorry is on the load
-    stamp = array_client.ask(ON_FLOOR, GONE)
-    assert list(contacts_by_pair(array_client.contacts[stamp])) == [FLOOR]
-    assert array_client.contacts[stamp].stale == [BESIDE]
-    assert array_client.diagnostic('stale boxes') == 'lorry'
-    assert BESIDE in array_client.answer(ON_LORRY, LORRY)
-    assert array_client.contacts[array_client.ask(GONE, GONE)].stale == [FLOOR, BESIDE]
+    named_client.names = ('lorry', 'load')
+    assert list(named_client.answer(ON_LORRY, LORRY)) == list(contacts)
+    named_client.names = NamedClient.names
+    for gone in (GONE, None):
+        stamp = named_client.ask(ON_FLOOR, gone)
+        assert list(contacts_by_pair(named_client.contacts[stamp])) == [FLOOR]
+        assert named_client.contacts[stamp].stale == [BESIDE]
+        assert named_client.diagnostic('stale boxes') == 'lorry'
+    assert BESIDE in named_client.answer(ON_LORRY, LORRY)
+    assert named_client.contacts[named_client.ask(None, None)].stale == [FLOOR, BESIDE]
 
 
-def test_a_slow_node_says_so_and_is_late_by_few_ticks(array_node, array_client, monkeypatch):
-    """Of arrays at 100 Hz it answers a third, and those that are new. Services come in between."""
-    tick, client = array_node._tick, array_client
+def test_a_slow_node_says_so_and_is_late_by_few_ticks(named_node, named_client, monkeypatch):
+    """Of ticks at 100 Hz it answers a third, and those that are new. Services come in between."""
+    tick, client = named_node._tick, named_client
 
     def slow(poses, writer=tick._writer):
         time.sleep(0.03)
@@ -229,7 +236,7 @@ def test_a_slow_node_says_so_and_is_late_by_few_ticks(array_node, array_client, 
     sent, behind = [], []
 
     def stream(done):
-        """Send until done, and note how many arrays were sent after each one that is answered."""
+        """Send until done, and note how many were sent after each one that is answered."""
         deadline = time.monotonic() + PATIENCE
         while not done():
             assert time.monotonic() < deadline
@@ -246,69 +253,68 @@ def test_a_slow_node_says_so_and_is_late_by_few_ticks(array_node, array_client, 
     assert status.level == b'\x01'
     assert sum(int(values[f'{how} since the last report']) for how in ('lost', 'dropped')) > 3
     assert 0 < int(values['rate [1/s]']) <= 34 and float(values['age p50 [ms]']) > 30.0
-    assert max(behind) < 6 * ARRAY_DEPTH  # three ticks pass while one is in work
+    assert max(behind) < 6 * NAMED_DEPTH  # three ticks pass while one is in work
     answered = len(client.contacts)
     future = reset.call_async(Trigger.Request())
     stream(future.done)
-    assert future.result().success and len(client.contacts) - answered < 4 * ARRAY_DEPTH
+    assert future.result().success and len(client.contacts) - answered < 4 * NAMED_DEPTH
 
 
-def test_pairs_that_no_list_has(array_client, scene_node):
+def test_pairs_that_no_list_has(named_client, scene_node):
     """With `pairs: all` as with a list. A box that is not there stands for all of its pairs."""
-    with scene_node(ARRAY.partition('pairs:')[0] + 'pairs: all\n') as node:
-        array_client.offer_until_answered(ON_FLOOR, LORRY)
-        contacts = array_client.answer(ON_LORRY, LORRY)
+    with scene_node(NAMED.partition('pairs:')[0] + 'pairs: all\n') as node:
+        named_client.offer_until_answered(ON_FLOOR, LORRY)
+        contacts = named_client.answer(ON_LORRY, LORRY)
         assert list(contacts) == ['load_lorry', 'lorry_floor']
         assert contacts['load_lorry'].normal[2] == pytest.approx(-1.0)
-        stamp = array_client.ask(ON_FLOOR, LORRY)
-        assert 'load_floor' in contacts_by_pair(array_client.contacts[stamp])
-        stamp = array_client.ask(ON_FLOOR, GONE)
-        answer = read_answer(read(array_client.contacts[stamp]), node._tick.solver.scene)
-        assert array_client.contacts[stamp].stale == ['lorry']
+        stamp = named_client.ask(ON_FLOOR, LORRY)
+        assert 'load_floor' in contacts_by_pair(named_client.contacts[stamp])
+        stamp = named_client.ask(ON_FLOOR, None)
+        answer = read_answer(read(named_client.contacts[stamp]), node._tick.solver.scene)
+        assert named_client.contacts[stamp].stale == ['lorry']
         assert [pair.label for pair, _ in answer.named()] == ['load_floor']
         assert answer.stale.tolist() == [[1, ALONE]]
 
 
-def test_two_thousand_boxes(array_client, scene_node):
-    """A hundred towers of twenty cubes: every array is answered, with every contact."""
+def test_two_thousand_boxes(named_client, scene_node):
+    """A hundred towers of twenty cubes: every message is answered, with every contact."""
     rows = [(2.0 * tower, 0, 0.999 * cube, 0, 0, 0, 1) for tower in range(100)
             for cube in range(20)]
-    boxes = ''.join(f'  b{row}: {{size: [1, 1, 1]}}\n' for row in range(len(rows)))
-    with scene_node(f'poses: array\nboxes:\n{boxes}pairs: all\n', pair_topics=False):
-        array_client.offer_until_answered(*rows)
+    named_client.names = [f'b{row}' for row in range(len(rows))]
+    boxes = ''.join(f'  {name}: {{size: [1, 1, 1]}}\n' for name in named_client.names)
+    with scene_node(f'poses: named\nboxes:\n{boxes}pairs: all\n', pair_topics=False):
+        named_client.offer_until_answered(*rows)
         for _ in range(20):
-            stamp = array_client.ask(*rows)
-            assert len(array_client.contacts[stamp].contacts) == 100 * 19
+            stamp = named_client.ask(*rows)
+            assert len(named_client.contacts[stamp].contacts) == 100 * 19
 
 
-def test_bad_arrays_are_refused_and_counted(array_node, array_client):
-    """Of a bad pose, the box is not there; another length or frame refuses the whole message."""
+def test_bad_named_poses_are_refused_and_counted(named_node, named_client):
+    """Of a bad pose, the box is not there; another frame refuses the whole message."""
     bad = [(math.nan, 0, 0, 0, 0, 0, 1), (0, 0, 1e60, 0, 0, 0, 1), (0, 0, 0, 0, 0, 0, 0)]
     for pose in bad:
-        stamp = array_client.ask(ON_FLOOR, pose)
-        assert list(contacts_by_pair(array_client.contacts[stamp])) == [FLOOR]
-        assert array_client.contacts[stamp].stale == [BESIDE]
-    refused = [array_client.send(*rows) for rows in ((), (ON_FLOOR,), (ON_FLOOR, LORRY, LORRY))]
-    refused.append(array_client.send(ON_FLOOR, LORRY, frame='odom'))
-    array_client.ask(ON_FLOOR, LORRY)  # on the same topic, after those
-    assert not any(stamp in array_client.contacts for stamp in refused)
-    counts = array_node.counts
+        stamp = named_client.ask(ON_FLOOR, pose)
+        assert list(contacts_by_pair(named_client.contacts[stamp])) == [FLOOR]
+        assert named_client.contacts[stamp].stale == [BESIDE]
+    refused = named_client.send(ON_FLOOR, LORRY, frame='odom')
+    named_client.ask(ON_FLOOR, LORRY)  # on the same topic, after it
+    assert refused not in named_client.contacts
+    counts = named_node.counts
     assert counts['refused: bad pose'] == len(bad)
-    assert counts['refused: wrong number of poses'] == 3
     assert counts['refused: frame_id differs'] == 1
 
 
-def test_arrays_are_answered_by_their_stamps(array_node, array_client):
+def test_named_poses_are_answered_by_their_stamps(named_node, named_client):
     """A late one once with `stamp`, never with `latest`; a repeated one the other way round."""
-    by_stamp = array_node.get_parameter('pairing').value == 'stamp'
-    late = array_client.next_stamp()
-    stamp = array_client.ask(ON_FLOOR, LORRY, stamp=late + 10 * MS)
-    array_client.send(ON_FLOOR, LORRY, stamp=late)
-    assert array_client.is_answered(late, PATIENCE if by_stamp else 0.2) == by_stamp
-    counts = array_node.counts
+    by_stamp = named_node.get_parameter('pairing').value == 'stamp'
+    late = named_client.next_stamp()
+    stamp = named_client.ask(ON_FLOOR, LORRY, stamp=late + 10 * MS)
+    named_client.send(ON_FLOOR, LORRY, stamp=late)
+    assert named_client.is_answered(late, PATIENCE if by_stamp else 0.2) == by_stamp
+    counts = named_node.counts
     evaluations = counts['evaluations']
-    array_client.send(ON_FLOOR, LORRY, stamp=stamp)
-    assert array_client.spin(lambda: counts['evaluations'] + counts['refused: repeated stamp']
+    named_client.send(ON_FLOOR, LORRY, stamp=stamp)
+    assert named_client.spin(lambda: counts['evaluations'] + counts['refused: repeated stamp']
                              > evaluations)
     assert counts['evaluations'] - evaluations == (not by_stamp)
 
@@ -373,16 +379,15 @@ def test_the_stamp_of_a_body_is_that_of_its_boxes(body_client, scene_node):
         assert crate not in body_client.points_of[FOOT]
 
 
-def test_an_array_has_boxes_then_bodies(array_client, scene_node):
-    """A pose too few is refused, and a body that is not there is stale by its boxes."""
-    with scene_node('poses: array\n' + BODIES) as node:
-        array_client.offer_until_answered(CRATE, TURNED)
-        assert list(array_client.answer(CRATE, TURNED)) == ['floor_load_foot', 'crate_load_hull']
-        array_client.send(CRATE)
-        stamp = array_client.ask(CRATE, GONE)
-        assert array_client.contacts[stamp].stale == ['load_hull', 'load_foot']
-        assert array_client.diagnostic('stale boxes') == 'load'
-        assert node.counts['refused: wrong number of poses'] == 1
+def test_bodies_are_named_as_boxes_are(named_client, scene_node):
+    """A body that is not there is stale by its boxes."""
+    named_client.names = ('crate', 'load')
+    with scene_node('poses: named\n' + BODIES):
+        named_client.offer_until_answered(CRATE, TURNED)
+        assert list(named_client.answer(CRATE, TURNED)) == ['floor_load_foot', 'crate_load_hull']
+        stamp = named_client.ask(CRATE, None)
+        assert named_client.contacts[stamp].stale == ['load_hull', 'load_foot']
+        assert named_client.diagnostic('stale boxes') == 'load'
 
 
 # --- time -----------------------------------------------------------------------------------------

@@ -29,7 +29,7 @@ CLIENTS = ('check_client.py', 'lockstep_client.py', 'forces_client.py', 'lift.py
 LIFT = f'{ROOT}/config/scenes/lift.yaml'
 PARAMETERS = dict.fromkeys(('lift.py', 'save_yard.py', 'crane_lift.py'),
                            (f'scene:={LIFT}', 'pair_topics:=false'))
-ARGUMENTS = {'save_yard.py': (LIFT, '/tmp/yard.yaml')}
+ARGUMENTS = {'save_yard.py': ('/tmp/yard.yaml',)}
 RUNS = {'lift.py': 10, 'lockstep_client.py': 2}
 """A simulator that is started anew repeats the stamps of its last run, and finds what it left."""
 NEEDS = {'mujoco_loop.py': 'mujoco', 'container_stack.py': 'mujoco',
@@ -224,11 +224,13 @@ def test_cpp_node_pairs_streams_that_drift_apart(cpp_with_ros: Path, events: str
 
 
 def test_cpp_client(cpp_with_ros: Path, program) -> None:
-    """The client of ~/check prints what it says."""
+    """The client of ~/check and ~/check_path prints what it says."""
     program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready')
     printed = subprocess.run([cpp_with_ros / 'check_client'], check=True, capture_output=True,
                              text=True, timeout=PATIENCE).stdout
-    assert f'//   {printed}' in (EXAMPLES / 'cpp/check_client.cpp').read_text('utf-8')
+    told = ''.join(f'//   {line}\n' for line in printed.splitlines())
+    assert printed.count('\n') == 2
+    assert told in (EXAMPLES / 'cpp/check_client.cpp').read_text('utf-8')
 
 
 def test_cpp_client_refused(cpp_with_ros: Path, program) -> None:

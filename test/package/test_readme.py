@@ -32,6 +32,7 @@ from conftest import PROGRAMS
 from geometry_msgs.msg import PoseStamped
 from patience import PATIENCE
 from test_library import INCLUDES, LINKED
+from typed_messages import answered
 
 from benchmarks import hard_poses
 from box_contact_msgs.msg import Box
@@ -173,7 +174,7 @@ def called(words: list[str], **_) -> None:
     request = filled(Check.Request(), yaml.safe_load(words[5]))
     yard = read_scene(ROOT / 'config/scenes/yard_bay.yaml')
     scenes = [two_boxes((2.0, 2.0, 2.0), (2.0, 2.0, 2.0)), yard]
-    responses = [CheckAnswerer(SceneSolver(scene)).answer(request, Check.Response())
+    responses = [answered(request, Check.Response(), CheckAnswerer(SceneSolver(scene)).answer)
                  for scene in scenes]
     assert sum(bool(response.contacts.contacts) for response in responses) >= 1, responses
 

@@ -338,7 +338,7 @@ def test_the_pairs_of_a_scene(patterns, listed):
     boxes = {name: Box(tuple(size[i]), tuple(pose[i]) if i % 4 == 0 else None)
              for i, name in enumerate(names)}
     pairs = tuple(Pair(f'p{i}', names[2 * i + 1], names[2 * i]) for i in rng.permutation(listed))
-    scene = Scene(boxes, pairs, patterns=patterns, poses='array')
+    scene = Scene(boxes, pairs, patterns=patterns, poses='named')
     wanted = wanted_pairs(boxes, pairs, patterns)
     assert list(scene.every_pair()) == wanted[:listed] + sorted(
         wanted[listed:], key=lambda pair: sorted(map(names.index, (pair.a, pair.b))))
@@ -369,7 +369,7 @@ def test_the_pairs_of_a_scene(patterns, listed):
 def test_bad_poses_are_refused_among_many():
     names = [f'm{number}' for number in range(90)]
     scene = Scene({name: Box((1.0, 1.0, 1.0)) for name in names}, patterns=EVERY_PAIR,
-                  poses='array')
+                  poses='named')
     rows = np.tile(poses.IDENTITY, (90, 1))
     rows[4, 0] = np.inf
     solver = SceneSolver(scene, model='exact')
@@ -402,7 +402,7 @@ for row in rows:
 print(memory() - before, end=' ')
 boxes = {f'b{n}': Box((1.0, 1.0, 1.0)) for n in range(8000)}
 before = memory()
-solver = SceneSolver(Scene(boxes, patterns=EVERY_PAIR, poses='array'), model='exact',
+solver = SceneSolver(Scene(boxes, patterns=EVERY_PAIR, poses='named'), model='exact',
                      most_near=1000)
 try:
     solver(place)
@@ -426,8 +426,8 @@ def test_more_pairs_than_are_to_be_answered():
     """Listed ones as those of patterns."""
     boxes = {name: Box((1.0, 1.0, 1.0)) for name in 'abc'}
     place = np.tile([0.0, 0, 0, 0, 0, 0, 1], (3, 1))
-    for scene in (Scene(boxes, (Pair.between('a', 'b'), Pair.between('b', 'c')), poses='array'),
-                  Scene(boxes, patterns=(('b', '*'),), poses='array')):
+    for scene in (Scene(boxes, (Pair.between('a', 'b'), Pair.between('b', 'c')), poses='named'),
+                  Scene(boxes, patterns=(('b', '*'),), poses='named')):
         assert SceneSolver(scene, model='exact', most_near=2)(place).touching == 2
         with pytest.raises(TooManyNear, match='more than 1 pairs are near each other'):
             SceneSolver(scene, model='exact', most_near=1)(place)

@@ -261,7 +261,7 @@ def test_a_load_that_is_put_back_lands():
 def test_what_begins_within_the_clearance_must_not_get_into_each_other(way, time, clearance):
     """Towards a cube, through it, into it from its top, and away; by 0.1 mm it may get deeper."""
     scene = Scene({'cube': Box(UNIT, at(0, 0, 0)), 'load': Box(UNIT)}, patterns=(('*', '*'),),
-                  poses='array')
+                  poses='named')
     answer = SceneSolver(scene).check_path([[at(*place)] for place in way], clearance=clearance)
     assert answer.is_free == (time is None)
     if time is not None:
@@ -292,7 +292,7 @@ def test_the_next_corner_of_a_long_load_that_turns_beside_a_wall_is_an_impact():
     reach, closest = np.hypot(1.0, 0.3), 1e-3  # [m]; each corner would be so deep in the wall
     scene = Scene({'load': Box((2.0, 0.6, 1.0)),
                    'wall': Box((0.2, 10.0, 10.0), at(reach - closest + 0.1, 0, 0))},
-                  patterns=(('*', '*'),), poses='array')
+                  patterns=(('*', '*'),), poses='named')
     path = [[at(0, 0, 0, turn=yaw(angle))] for angle in (-half, 2.9 - half)]
     answer = SceneSolver(scene).check_path(path)
     assert len(answer.at_start) == len(answer.pairs) == 1

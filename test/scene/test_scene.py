@@ -147,7 +147,7 @@ def test_a_hundred_thousand_boxes():
     n, begin = 100_000, time.process_time()
     boxes = {f'box{k}': Box((1.0, 1.0, 1.0), (2.0 * k, 0, 0, 0, 0, 0, 1) if k % 2 else None)
              for k in range(n)}
-    scene = Scene(boxes, patterns=EVERY_PAIR, poses='array')
+    scene = Scene(boxes, patterns=EVERY_PAIR, poses='named')
     SceneSolver(scene)
     fixed = n // 2
     assert scene.pair_count == n * (n - 1) // 2 - fixed * (fixed - 1) // 2

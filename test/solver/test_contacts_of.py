@@ -49,7 +49,7 @@ def test_a_scene_finds_the_same():
     rng = np.random.default_rng(2)
     size, pose = heap(rng, 50)
     scene = Scene({f'b{n}': Box(extents) for n, extents in enumerate(size)},
-                  patterns=(('*', '*'),), poses='array')
+                  patterns=(('*', '*'),), poses='named')
     answer = SceneSolver(scene)(pose)
     pairs, contacts = contacts_of(size, pose)
     assert np.array_equal(answer.pairs, pairs) and len(pairs) > 50

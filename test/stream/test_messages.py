@@ -5,8 +5,10 @@
 from __future__ import annotations
 
 import struct
+import time
 from collections import Counter
 from dataclasses import replace
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -15,7 +17,7 @@ import typed_messages
 from geometry_msgs.msg import PoseStamped
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from message_fuzz import STRICTER, TYPES, fuzz, outcome_of
+from message_fuzz import MOVING, STRICTER, TYPES, fuzz, outcome_of
 from poses import assert_same_bits
 from rclpy.serialization import deserialize_message, serialize_message
 from typed_messages import (
@@ -25,7 +27,6 @@ from typed_messages import (
     make_contacts,
     make_normal,
     make_point,
-    pose_array,
     pose_stamped,
     unset,
 )
@@ -49,10 +50,11 @@ from box_contact_ros.scene.scene_solver import SceneSolver
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contacts_of import TooManyNear
 from box_contact_ros.solver.nearest import Nearests
+from box_contact_ros.stream import read_poses
 from box_contact_ros.stream.cdr import MessageError
 from box_contact_ros.stream.pairing import StampedPose
 from box_contact_ros.stream.read_contacts import read_contacts
-from box_contact_ros.stream.read_poses import NamedPoses, read_pose, read_poses
+from box_contact_ros.stream.read_poses import NamedPoses, read_pose
 from box_contact_ros.stream.write_contacts import TickWriter
 from box_contact_ros.view.live.listener import read_answer
 
@@ -67,7 +69,7 @@ NUMBERS = st.one_of(st.tuples(*[FLOATS] * 7), st.tuples(*[BOUNDED] * 7))
 POSE = (1, 2, 3, 0, 0, 0, 1)
 STAMP = 5_000_000_007
 GOOD = bytes(serialize_message(pose_stamped(POSE, 'map', STAMP)))
-ARRAY = bytes(serialize_message(pose_array([POSE] * 2, 'map', STAMP)))
+NAMED = bytes(serialize_message(joint_state({'c1': POSE, 'hook': POSE}, 'map', STAMP)))
 NEAR = Nearests(np.zeros(1, bool), np.array([0.5]), np.array([[0.0, 0.6, 0.8]]),
                 np.array([[1.0, 2.0, 3.0]]), np.array([[1.0, 2.3, 3.4]]))
 
@@ -85,12 +87,13 @@ def test_poses_are_read_alike(poses):
 
 
 @given(st.lists(st.tuples(*[FLOATS] * 7), max_size=4), FRAMES, STAMPS)
-def test_pose_arrays_are_read_alike(rows, frame_id, stamp):
+def test_named_poses_are_read_alike(rows, frame_id, stamp):
     """Numbers to the bit, of any count and any frame, whose length moves all that follows."""
-    message = pose_array(rows, frame_id, stamp)
-    outcome = outcome_of(read_poses, bytes(serialize_message(message)))
-    assert outcome == outcome_of(typed_messages.read_poses, message)
-    assert outcome == (np.array(rows, dtype=float).tobytes(), (len(rows), 7), frame_id, stamp)
+    message = joint_state(dict(zip(MOVING, rows)), frame_id, stamp)
+    outcome = outcome_of(NamedPoses(MOVING), bytes(serialize_message(message)))
+    assert outcome == outcome_of(partial(typed_messages.read_named, MOVING), message)
+    numbers = np.array([*rows, *[NOWHERE] * (len(MOVING) - len(rows))], dtype=float)
+    assert outcome == (numbers.tobytes(), numbers.shape, frame_id, stamp)
 
 
 @pytest.mark.parametrize('order', ['<', '>'])
@@ -103,10 +106,9 @@ def test_what_cdr_leaves_open_makes_no_difference(order):
         head = struct.pack(f'{order}iII', 5, 7, len(frame)) + frame
         pose = struct.pack(f'{order}7d', *POSE) + tail
         data = start + head + padding * (-len(head) % 8) + pose
-        counted = head + padding * (-len(head) % 4) + struct.pack(f'{order}I', 1)
-        array = start + counted + padding * (-len(counted) % 8) + pose
         assert (native.read_pose(data) is None) == (order == '>')  # which Python reads
-        for stamped in (read_pose(data), read_poses(array)):
+        named = named_bytes(['c1'], [POSE], order=order, frame=frame, padding=padding, tail=tail)
+        for stamped in (read_pose(data), NamedPoses(('c1',))(named)):
             numbers = np.array(stamped.numbers)
             assert numbers.ravel().tolist() == list(POSE) and numbers.dtype == np.float64
             assert (stamped.frame_id, stamped.stamp) == (frame[:-1].decode(), STAMP)
@@ -121,7 +123,7 @@ def test_a_long_frame_is_refused(frame_id, is_read):
     wanted = outcome_of(typed_messages.read_pose, pose_stamped(POSE, frame_id, STAMP))
     assert (len(wanted) > 1) == is_read
     for read, message in ((read_pose, pose_stamped(POSE, frame_id, STAMP)),
-                          (read_poses, pose_array([POSE], frame_id, STAMP))):
+                          (NamedPoses(MOVING), joint_state({'c1': POSE}, frame_id, STAMP))):
         outcome = outcome_of(read, bytes(serialize_message(message)))
         assert outcome[-2:] == (wanted[-2:] if is_read else ('bad header',))
 
@@ -132,14 +134,16 @@ def test_mutated_messages_are_read_as_rclpy_reads_them(message_type):
     tally, differences = fuzz(message_type, 3000, seed=20260)
     assert not differences, differences[0][:1000]
     words = {'read', 'not deserialised', 'bad header', *(f'stricter: {name}' for name in STRICTER)}
-    assert set(tally) == words | ({'bad pose'} if message_type is PoseStamped else set())
+    words |= {'bad pose'} if message_type is PoseStamped else {
+        'doubled name', 'not a MultiDOFJointState'}
+    assert set(tally) == words
     assert min(tally.values()) > 50
 
 
 @pytest.mark.parametrize('kind', [b'\0\3', b'\0\7', b'\0\x09', b'\0\x0b', b'\1\1'])
 def test_another_encapsulation_is_refused_by_its_name(kind):
     """A list of parameters, three forms of XCDR2, and one that nobody has defined."""
-    for read, good in ((read_pose, GOOD), (read_poses, ARRAY)):
+    for read, good in ((read_pose, GOOD), (NamedPoses(MOVING), NAMED)):
         with pytest.raises(MessageError,
                            match=f'encapsulation 0x{kind.hex()} is neither .* use XCDR1'):
             read(kind + good[2:])
@@ -172,28 +176,15 @@ def test_a_pose_that_is_none_is_refused_with_its_reason(numbers, reason):
     (lambda data: data[:12] + b'\xff' * 4 + data[16:], 'not a')])
 def test_headers_are_checked(change, reason):
     """A second of nanoseconds, a frame that is not UTF-8 or no string, a length beyond the end."""
-    for read, good in ((read_pose, GOOD), (read_poses, ARRAY)):
+    for read, good in ((read_pose, GOOD), (NamedPoses(MOVING), NAMED)):
         with pytest.raises(MessageError) as refused:
             read(change(good))
         assert refused.value.reason.startswith(reason)
 
 
-COUNT_AT = ARRAY.index(b'\2\0\0\0')
-
-
-@pytest.mark.parametrize('data', [
-    b'', ARRAY[:4], ARRAY[:COUNT_AT], ARRAY[:-1], ARRAY + b'\0' * 4,
-    ARRAY[:COUNT_AT] + b'\3\0\0\0' + ARRAY[COUNT_AT + 4:],
-    ARRAY[:COUNT_AT] + b'\xff' * 4 + ARRAY[COUNT_AT + 4:], GOOD], ids=range(8))
-def test_bytes_that_are_no_pose_array_are_refused(data):
-    with pytest.raises(MessageError) as refused:
-        read_poses(data)
-    assert refused.value.reason == 'not a PoseArray'
-
-
 def named_bytes(names, rows, *, order='<', frame=b'map\0', padding=b'\0', extra=(0, 0), tail=b''):
     """Return a MultiDOFJointState; extra: how many twists and wrenches it has."""
-    body = b''
+    body = bytearray()
 
     def add(size, data):
         nonlocal body
@@ -211,10 +202,7 @@ def named_bytes(names, rows, *, order='<', frame=b'map\0', padding=b'\0', extra=
         count(number)
         if number:
             add(8, struct.pack(f'{order}{np.size(numbers)}d', *np.ravel(numbers)))
-    return (b'\0\1' if order == '<' else b'\0\0') + b'\0\0' + body + tail
-
-
-MOVING = ('hook', 'c1', 'c22', 'lorry')
+    return bytes((b'\0\1' if order == '<' else b'\0\0') + b'\0\0' + body + tail)
 
 
 @given(st.lists(st.tuples(st.permutations((*MOVING, 'c333', 'ö')), st.integers(0, 6), FRAMES),
@@ -228,7 +216,7 @@ def test_named_poses_are_read_by_name(messages, padding):
         bytes_of = {'<': named_bytes(list(rows), list(rows.values()), padding=padding),
                     '>': named_bytes(list(rows), list(rows.values()), order='>')}
         for order, data in bytes_of.items():
-            assert (native.NamedPoses(MOVING).read(data) is None) == (order == '>')
+            assert (native.NamedPoses(MOVING, 6).read(data) is None) == (order == '>')
             stamped = read(data)
             assert (stamped.frame_id, stamped.stamp) == ('map', STAMP)
             for row, name in zip(stamped.numbers, MOVING):
@@ -251,11 +239,15 @@ def test_twists_and_wrenches_are_passed_over():
 @pytest.mark.parametrize('data, reason', [
     (b'', 'not a MultiDOFJointState'), (GOOD, 'not a MultiDOFJointState'),
     (named_bytes(['c1', 'hook'], [POSE]), 'not a MultiDOFJointState'),
+    *((data, 'not a MultiDOFJointState') for data in (
+        NAMED[:4], NAMED[:20], NAMED[:-1],
+        *(NAMED[:20] + count + NAMED[24:] for count in (b'\3\0\0\0', b'\xff' * 4)))),
     (named_bytes(['c1'], [POSE])[:-1], 'not a MultiDOFJointState'),
     (named_bytes(['c1'], [POSE], tail=b'\0' * 4), 'not a MultiDOFJointState'),
     (named_bytes(['c1', 'c1'], [POSE, POSE]), 'doubled name'),
     (named_bytes(['c1'], [POSE]).replace(b'c1', b'\xff1'), 'not a MultiDOFJointState'),
-    (named_bytes(['c1'], [POSE], frame=b'\xff\0'), 'bad header')], ids=range(8))
+    (named_bytes(['c1'], [POSE]).replace(b'c1\0', b'c1c'), 'not a MultiDOFJointState'),
+    (named_bytes(['c1'], [POSE], frame=b'\xff\0'), 'bad header')], ids=range(14))
 def test_bytes_that_are_no_named_poses_are_refused(data, reason):
     """Also after a good message with the same names. A name that is not UTF-8 is unknown."""
     read = NamedPoses(MOVING)
@@ -267,6 +259,44 @@ def test_bytes_that_are_no_named_poses_are_refused(data, reason):
         read(data)
     assert refused.value.reason == reason
     assert read(named_bytes(['c1'], [POSE])).numbers[1].tolist() == list(POSE)
+
+
+@pytest.mark.parametrize('order', '<>')
+def test_reading_names_takes_time_by_their_number(order):
+    """Of 20,000 that move, the last one is there twice: which one is told, within .3 s.
+
+    That the time of reading goes by the square of the number made it 3 s.
+    """
+    names = tuple(f'c{number}' for number in range(20_000))
+    given = [*names, names[-1]]
+    data, read = named_bytes(given, np.tile(POSE, (len(given), 1)), order=order), NamedPoses(names)
+    began = time.process_time()
+    with pytest.raises(MessageError, match=r"joint_names\[20000\]: 'c19999' is joint_names\[19999"):
+        read(data)
+    assert time.process_time() - began < 0.3
+
+
+@pytest.mark.parametrize('order', '<>')
+def test_a_count_of_names_is_judged_before_them(order, monkeypatch):
+    """By the bytes that are there, 4 for a name and 56 for its pose, and by the limit."""
+    head = named_bytes([], [], order=order)[:20]
+    data = head + b'\xff' * 4 + bytes(6_000_000)
+    began = time.process_time()
+    with pytest.raises(MessageError, match='4294967295 joint_names and transforms need more'):
+        NamedPoses(MOVING)(data)
+    assert time.process_time() - began < 0.1
+    monkeypatch.setattr(read_poses, 'MOST_BOXES', 3)
+    read = NamedPoses(MOVING)
+    assert read.unknown == ()
+    for others in ('abc', 'abcd'):
+        data = named_bytes([*MOVING, *others], [POSE] * (4 + len(others)), order=order)
+        if len(others) == 3:
+            assert not np.isnan(read(data).numbers).any() and read.unknown == tuple(others)
+            continue
+        for told in (data, data.replace(b'hook', b'h\0ok')):  # no name is looked at
+            with pytest.raises(MessageError, match='^8 joint_names, more than 7$') as refused:
+                read(told)
+            assert refused.value.reason == 'too many names'
 
 
 # --- contacts out ---------------------------------------------------------------------------------
@@ -351,7 +381,7 @@ def test_any_numbers_and_names_are_written_as_rclpy_writes_them(data, stamp, fra
 
 
 def a_scene(rng):
-    """Return a scene of two to seven boxes: listed pairs, patterns, fixed boxes, bodies, arrays."""
+    """Return a scene of two to seven boxes: listed pairs, patterns, fixed boxes, bodies."""
     is_cubes = rng.random() < 0.5
     size = (1.0, 1.0, 1.0) if is_cubes else None
     bodies = {'body': Frame()} if rng.random() < 0.3 else {}

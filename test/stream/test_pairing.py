@@ -295,7 +295,7 @@ def test_boxes_that_never_came_are_told_from_those_that_did():
         assert pairing.unseen() == ['box_b']
 
 
-# --- tolerance, arrays, latest --------------------------------------------------------------------
+# --- tolerance, all in one message, latest --------------------------------------------------------
 
 
 def test_tolerance_joins_the_nearest_stamps():
@@ -319,9 +319,9 @@ def test_a_pose_that_gives_way_to_a_nearer_one_is_counted():
 
 
 @pytest.mark.parametrize('policy', PAIRINGS.values())
-def test_an_array_has_all_poses_of_its_tick(policy):
+def test_one_message_has_all_poses_of_its_tick(policy):
     boxes = {name: Box((1.0, 1.0, 1.0)) for name in 'ab'}
-    pairing = policy(Scene(boxes, (Pair('', 'a', 'b'),), poses='array'))
+    pairing = policy(Scene(boxes, (Pair('', 'a', 'b'),), poses='named'))
     assert [stamps(pairing.add(ALL_BOXES, pose(stamp))) for stamp in (1, 2)] == [[1], [2]]
 
 

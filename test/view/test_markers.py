@@ -298,7 +298,8 @@ def test_boxes_that_come_and_go_are_drawn(tmp_path):
             change(moving=[a_box('c1', (0, 0, 0, 0, 0, 0, 1))])
             poses['c1'] = (0, 0, 7, 0, 0, 0, 1)
             assert is_shown(-0.5, 9.0, 7.0)
-            markers._revision -= 1  # as if it had missed a change
+            yard = markers._yard  # as if it had missed a change
+            yard.yard = yard.yard._replace(revision=yard.yard.revision - 1)
             change(absent=['c1'])
             assert is_shown(-0.5, 9.0)
             change(fixed=[a_box(f'p{k}', (0, 0, 20 + k, 0, 0, 0, 1), CUBE) for k in range(600)])
@@ -308,3 +309,36 @@ def test_boxes_that_come_and_go_are_drawn(tmp_path):
                 request = ChangeState.Request(transition=Transition(id=step))
                 assert client.call(ChangeState, 'contact_node/change_state', request).success
             assert is_shown(-0.5, 9.0)
+
+
+def test_fixed_boxes_are_sent_as_they_change_and_once_a_second(tmp_path):
+    """A viewer that starts later sees them; 30 times a second nobody has to read them."""
+    path = tmp_path / 'yard.yaml'
+    path.write_text(yaml.safe_dump({'poses': 'named', 'pairs': 'all', 'boxes': {
+        'ground': {'size': [20, 20, 1], 'pose': [0, 0, -0.5, 0, 0, 0, 1]},
+        'hook': {'size': CUBE}}}))
+    arrays: list[set[int]] = []
+
+    def hear(message):
+        arrays.append({marker.id for marker in message.markers if marker.ns == 'boxes'})
+
+    def send():
+        named.publish(joint_state({'hook': (0, 0, 9, 0, 0, 0, 1)}, 'map', client.next_stamp()))
+
+    with closing(Client()) as client, serving(ContactNode, scene=str(path), pair_topics=False), (
+            serving(MarkersNode, scene=str(path))):
+        named = client.node.create_publisher(MultiDOFJointState, 'poses', 10)
+        client.node.create_subscription(MarkerArray, 'markers', hear, 10)
+        assert client.spin(lambda: len(arrays) >= 45 or send())
+        assert all(1 in drawn for drawn in arrays)  # the hook, by its row
+        assert 1 <= sum(0 in drawn for drawn in arrays) <= len(arrays) // 5
+        request = SetBoxes.Request(fixed=[a_box('c1', (0, 0, 3, 0, 0, 0, 1), CUBE)])
+        assert client.call(SetBoxes, 'contact_node/set_boxes', request).success
+        arrays.clear()
+        assert client.spin(lambda: any(2 in drawn for drawn in arrays) or send())
+
+
+def test_the_log_says_while_another_yard_is_drawn(program, tmp_path):
+    """Without a contact node, the file is drawn."""
+    running = program('markers', '--ros-args', '-p', 'scene:=config/scenes/two_boxes.yaml')
+    assert running.wait_for_output('it has not told its boxes yet')

@@ -32,7 +32,7 @@ import msgspec
 import viser
 from browser import chromium, open_page
 from PIL import Image
-from typed_messages import changed, contacts_at, pose_array, pose_stamped, read
+from typed_messages import changed, contacts_at, joint_state, pose_stamped, read
 from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import connect
 
@@ -155,15 +155,15 @@ def test_time_that_goes_back(make_node):
         assert np.array_equal(node.tick().poses, (ORIGIN, pose))
 
 
-def test_boxes_that_an_array_lacks_stay_where_they_were(make_node, tmp_path):
-    """A row of NaN, and a quaternion of length zero."""
+def test_boxes_that_a_message_lacks_stay_where_they_were(make_node, tmp_path):
+    """One that is not named, and a quaternion of length zero."""
     (tmp_path / 'scene.yaml').write_text(
-        'poses: array\npairs: [{a: a, b: b}, {a: c, b: d}]\nboxes:\n'
+        'poses: named\npairs: [{a: a, b: b}, {a: c, b: d}]\nboxes:\n'
         + ''.join(f'  {name}: {{size: [2, 2, 2]}}\n' for name in 'abcd'))
     node = make_node(Parameter('scene', value=str(tmp_path / 'scene.yaml')))
-    for stamp, rows in ((START, [ORIGIN] * 4),
-                        (START + MS, [ORIGIN, TOUCHING, [math.nan] * 7, [0.0] * 7])):
-        node._on_poses(0, serialize_message(pose_array(rows, 'yard', stamp)))
+    for stamp, rows in ((START, dict.fromkeys('abcd', ORIGIN)),
+                        (START + MS, {'b': TOUCHING, 'a': ORIGIN, 'd': [0.0] * 7})):
+        node._on_poses(0, serialize_message(joint_state(rows, 'yard', stamp)))
     assert np.array_equal(node.tick().poses, [ORIGIN, TOUCHING, ORIGIN, ORIGIN])
 
 
@@ -625,7 +625,7 @@ def test_boxes_that_come_and_go_in_a_browser():
     """The page draws the boxes of the newest scene, as ~/set_boxes makes it, and no others."""
     stack = Box(CUBE, ORIGIN)
     both = Scene({'crane': Box(CUBE), 'stack': stack}, patterns=(('crane', 'stack*'),),
-                 poses='array')
+                 poses='named')
     crane_alone, _ = both.changed({'stack': None}, {})
     with (closing(Page('127.0.0.1', 8450, SceneRows(crane_alone))) as page,
           open_page(page.url, 640, 360) as tab):

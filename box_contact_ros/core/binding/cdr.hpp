@@ -81,6 +81,8 @@ class CdrReader {
   bool is_good() const { return is_good_; }
   // Whether nothing follows but padding.
   bool is_at_end() const { return is_good_ && size_ - at_ <= padding_max; }
+  // Whether so many more bytes are there.
+  bool has(size_t size) const { return is_good_ && size <= size_ - at_; }
   size_t at() const { return at_; }
   std::string_view since(size_t begin) const { return {data_ + begin, at_ - begin}; }
 
@@ -115,8 +117,7 @@ class CdrReader {
   size_t count() const { return count_; }
   // Whether such bytes follow, which are passed over then.
   bool skip(std::string_view bytes) {
-    if (!is_good_ || size_ - at_ < bytes.size() ||
-        std::memcmp(data_ + at_, bytes.data(), bytes.size()) != 0)
+    if (!has(bytes.size()) || std::memcmp(data_ + at_, bytes.data(), bytes.size()) != 0)
       return false;
     at_ += bytes.size();
     return true;

@@ -17,8 +17,8 @@ namespace box_contact::binding {
 
 class NamedPoses {
  public:
-  // names: of all that moves, in the order of the rows that `read` returns.
-  explicit NamedPoses(Owned names) : names_(std::move(names)) {
+  // names: of all that moves, in the order of the rows of `read`. most: names of a message.
+  NamedPoses(Owned names, Py_ssize_t most) : names_(std::move(names)), most_(most) {
     for (Py_ssize_t row = 0; row < PyTuple_GET_SIZE(names_.get()); ++row)
       row_of_.emplace(utf8_of(PyTuple_GET_ITEM(names_.get(), row)), row);
   }
@@ -32,7 +32,9 @@ class NamedPoses {
     int64_t stamp = message.stamp();
     std::string_view frame = message.text(frame_id_max);
     uint32_t count = message.number();
-    if (!message.is_good() || !read_names(message, count)) Py_RETURN_NONE;
+    // Before any name is read: what a count promises may be seconds of work.
+    if (count > most_ || !message.has(count * (sizeof count + pose_size))) Py_RETURN_NONE;
+    if (!read_names(message, count)) Py_RETURN_NONE;
     const char* transforms = message.rows(pose_size);
     bool is_whole = message.count() == count;
     message.rows(six_numbers);  // twists
@@ -106,6 +108,7 @@ class NamedPoses {
   }
 
   Owned names_;
+  Py_ssize_t most_;
   std::unordered_map<std::string_view, int64_t> row_of_;
   std::string names_before_;   // as they were in the last message
   std::vector<int64_t> rows_;  // of these names; −1: moves nothing
@@ -114,8 +117,9 @@ class NamedPoses {
 
 inline PyObject* named_poses_new(PyTypeObject* type, PyObject* args, PyObject*) {
   PyObject* names;
-  if (!PyArg_ParseTuple(args, "O!:NamedPoses", &PyTuple_Type, &names)) return nullptr;
-  return Holder<NamedPoses>::make(type, NamedPoses(Owned(Py_NewRef(names))));
+  Py_ssize_t most;
+  if (!PyArg_ParseTuple(args, "O!n:NamedPoses", &PyTuple_Type, &names, &most)) return nullptr;
+  return Holder<NamedPoses>::make(type, NamedPoses(Owned(Py_NewRef(names)), most));
 }
 
 inline PyObject* named_poses_read(PyObject* self, PyObject* data) {
@@ -129,7 +133,7 @@ inline PyMethodDef named_poses_methods[] = {
     {nullptr, nullptr, 0, nullptr}};
 
 inline PyType_Slot named_poses_slots[] = {
-    {Py_tp_doc, const_cast<char*>("NamedPoses(names)\n--\n\n"
+    {Py_tp_doc, const_cast<char*>("NamedPoses(names, most)\n--\n\n"
                                   "Read MultiDOFJointState messages; see named_poses.hpp.")},
     {Py_tp_new, slot<named_poses_new>()},
     {Py_tp_dealloc, reinterpret_cast<void*>(Holder<NamedPoses>::dealloc)},

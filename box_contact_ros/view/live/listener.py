@@ -20,30 +20,26 @@ import numpy as np
 from rclpy.context import Context
 from rclpy.qos import QoSProfile
 
-from box_contact_msgs.msg import Boxes
 from box_contact_msgs.msg import Contacts as ContactsMessage
-from box_contact_msgs.srv import GetBoxes
 
 from ...node.contact_node import PARAMETERS as CONTACT_PARAMETERS
 from ...node.contact_node import scene_of
-from ...node.get_boxes import scene_of_answers
-from ...node.paced_service import REQUESTS
+from ...node.diagnostics import REMINDER_SECONDS
 from ...node.parameters import Setting, declare, warn_of_unknown
 from ...node.runtime import GuardedNode
-from ...node.set_boxes import changes_of
-from ...node.topics import LATCHED, pose_qos, pose_type
-from ...scene.changes import checked_changes
+from ...node.topics import pose_qos, pose_type
+from ...node.yard_client import Yard, YardClient
 from ...scene.scene import ALONE, Scene
-from ...scene.scene_solver import Answer, finished
+from ...scene.scene_solver import Answer
 from ...solver.checks import are_poses, short_repr
 from ...stream.cdr import MessageError
 from ...stream.pairing import StampedPose
 from ...stream.read_contacts import ReadContacts, read_contacts
-from ...stream.read_poses import NamedPoses, read_pose, read_poses
+from ...stream.read_poses import NamedPoses, read_pose
 from ...stream.streams import ALL_BOXES, topics_of
 
 KEPT = 1000  # poses kept per topic: a second at 1 kHz
-ASK_AGAIN = 1.0  # time [s] after which ~/get_boxes is asked again
+LOOK_PERIOD = 1.0  # time [s] between looks whether the drawn yard is that of the node
 UNANSWERED = 0.5
 """Time [s] that poses may come without contacts; then nobody answers, and none are drawn."""
 QUIET = 1.0  # time [s] without a pose, after which nobody moves the boxes any more
@@ -130,9 +126,7 @@ class PoseTopic(NamedTuple):
         """
         if self.source != ALL_BOXES:
             return _read_one
-        if scene.poses == 'named':
-            return partial(_read_all, NamedPoses(scene.moving))
-        return partial(_read_all, read_poses, count=len(scene.moving))
+        return partial(_read_all, NamedPoses(scene.moving))
 
 
 def pose_topics(scene: Scene) -> list[PoseTopic]:
@@ -146,14 +140,9 @@ def _read_one(data: bytes) -> StampedPose:
     return pose._replace(numbers=np.array([pose.numbers]))
 
 
-def _read_all(read: Callable[[bytes], StampedPose], data: bytes, count: int | None = None,
-              ) -> StampedPose:
+def _read_all(read: Callable[[bytes], StampedPose], data: bytes) -> StampedPose:
     """Return all poses. A bad pose becomes NaN: the contact node reports it."""
     poses = read(data)
-    if count not in (None, len(poses.numbers)):
-        raise MessageError('wrong number of poses',
-                           f'{len(poses.numbers)} poses, but {count} boxes and bodies of the scene '
-                           'move')
     poses.numbers[~are_poses(poses.numbers)] = np.nan
     return poses
 
@@ -192,7 +181,7 @@ class Track:
 class Listener(GuardedNode):
     """Keeps the last poses and contacts that it hears of a scene.
 
-    It follows the changes that ~/boxes tells. What it missed it asks for: it may start at any time.
+    It draws the scene of its parameters until it has the yard of the contact node.
 
     values: its parameters; rows: the scene.
     """
@@ -212,12 +201,9 @@ class Listener(GuardedNode):
         self._tracks = [Track() for _ in self.topics]
         self._readers: list[Callable[[bytes], StampedPose]] = []
         self._take(scene, 0, 0)
-        self._changes: deque[Boxes] = deque(maxlen=KEPT)  # that came while the scene is asked for
-        self._pages: list[GetBoxes.Response] = []
-        self._asked = -math.inf  # when a page was asked for, by the steady clock [s]
-        self._boxes = self.create_client(GetBoxes, 'contact_node/get_boxes', qos_profile=REQUESTS)
-        self.create_subscription(Boxes, 'contact_node/boxes', self._on_boxes, LATCHED)
-        self.create_timer(ASK_AGAIN, self._ask_again)
+        self._yard = YardClient(self, on_yard=self._on_yard)
+        self._strange = 0  # looks that found another yard than that of the node
+        self.create_timer(LOOK_PERIOD, self._look)
         for number, topic in enumerate(self.topics):
             self.create_subscription(topic.kind, topic.name, partial(self._on_poses, number),
                                      topic.qos, raw=True)
@@ -237,51 +223,23 @@ class Listener(GuardedNode):
             track.follow(topic.names(scene), scene.row_of)
         self._readers = [topic.reader(scene) for topic in self.topics]
 
-    def _on_boxes(self, boxes: Boxes) -> None:
-        """Follow a change of the scene, or ask for the whole scene where some were missed."""
-        if self._changes:
-            self._changes.append(boxes)
-        elif (boxes.epoch, boxes.revision) == (self._epoch, self._revision + 1):
-            self._follow(boxes)
-        elif (boxes.epoch, boxes.revision) != (self._epoch, self._revision):
-            self._changes.append(boxes)
-            self._ask([])
+    def _on_yard(self, yard: Yard) -> None:
+        """Draw the yard of the node from now on, if its poses come as those that are heard."""
+        if yard.scene.poses == self.rows.scene.poses:
+            self._take(yard.scene, yard.epoch, yard.revision)
 
-    def _follow(self, boxes: Boxes) -> None:
-        scene = self.rows.scene
-        _, changes = finished(changes_of(scene, boxes))
-        self._take(scene.changed(*checked_changes(scene, **changes))[0], boxes.epoch,
-                   boxes.revision)
-
-    def _ask(self, pages: list[GetBoxes.Response]) -> None:
-        """Ask for the boxes behind those of some answers."""
-        self._pages, self._asked = pages, time.monotonic()
-        first = sum(len(page.boxes) for page in pages)
-        self._boxes.call_async(GetBoxes.Request(first=first)).add_done_callback(
-            self.guarded(partial(self._on_page, pages), 'contact_node/get_boxes'))
-
-    def _ask_again(self) -> None:
-        """Begin anew where no answer came: it is lost if the node starts, or ends, meanwhile."""
-        if self._changes and time.monotonic() - self._asked > ASK_AGAIN:
-            self._ask([])
-
-    def _on_page(self, pages: list[GetBoxes.Response], future: Any) -> None:
-        page = future.result()
-        if pages is not self._pages or not page.success:
-            return
-        if pages and (page.epoch, page.revision) != (pages[0].epoch, pages[0].revision):
-            self._ask([])
-            return
-        pages.append(page)
-        if page.boxes and sum(len(page.boxes) for page in pages) < page.count:
-            self._ask(pages)
-            return
-        changes, self._pages = list(self._changes), []
-        self._changes.clear()
-        self._take(scene_of_answers(self.rows.scene, pages), page.epoch, page.revision)
-        for boxes in changes:
-            if boxes.epoch == page.epoch and boxes.revision > self._revision:
-                self._on_boxes(boxes)
+    def _look(self) -> None:
+        """Log while what is drawn is not what the node has."""
+        yard = self._yard.yard
+        is_drawn = (self._yard.is_current and yard is not None
+                    and (yard.epoch, yard.revision) == (self._epoch, self._revision))
+        self._strange = 0 if is_drawn else self._strange + 1
+        if self._strange > 1:
+            self.get_logger().warning(
+                'what is drawn is not what the contact node has: ' + (
+                    'it has not told its boxes yet' if yard is None else
+                    'start this program with the scene file of the node'),
+                throttle_duration_sec=REMINDER_SECONDS)
 
     def _on_poses(self, number: int, data: bytes) -> None:
         poses = self._readers[number](data)

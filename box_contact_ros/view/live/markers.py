@@ -6,7 +6,8 @@
 A contact has its point, normal, patch and depth. Boxes that are near have a dashed line between
 their nearest points, with the distance.
 Subscribes to the poses of all that moves and to the contact node's contacts. Publishes markers
-(visualization_msgs/MarkerArray) 30 times a second while poses come. RViz with config/contact.rviz
+(visualization_msgs/MarkerArray) 30 times a second while poses come, and fixed boxes once a second
+and as they change. RViz with config/contact.rviz
 shows them, Foxglove with config/contact.foxglove.json. A patch is the rectangle of its covariance.
 """
 from __future__ import annotations
@@ -29,9 +30,10 @@ from ...node.topics import contact_qos
 from ...solver.contact import Contacts
 from ...solver.nearest import Nearests
 from .. import style
-from .listener import SCENE_PARAMETERS, DrawnTick, Listener
+from .listener import SCENE_PARAMETERS, DrawnTick, Listener, SceneRows
 
 PERIOD = 1 / 30  # time [s] between marker arrays
+FIXED_PERIOD = 1.0  # time [s] between those that have the fixed boxes, for viewers that start later
 DELETED = 5.0
 """Time [s] for which arrays delete what is gone: a viewer that is behind loses some of them."""
 LABELLED = 10
@@ -57,10 +59,13 @@ def line_marker(header: Header, name: str, lines: np.ndarray, *, width: float,
     return marker
 
 
-def scene_markers(tick: DrawnTick) -> list[Marker]:
-    """Return what draws a tick: boxes by their row as id, contacts the deepest first."""
+def scene_markers(tick: DrawnTick, *, fixed: bool = True) -> list[Marker]:
+    """Return what draws a tick: boxes by their row as id, contacts the deepest first.
+
+    fixed: whether the fixed boxes, too.
+    """
     header = make_header(tick.stamp, tick.frame_id)
-    markers = list(_boxes(header, tick))
+    markers = list(_boxes(header, tick, fixed))
     answer, sizes = tick.answer, tick.rows.sizes
     if answer is not None and len(answer.pairs):
         markers += _contacts(header, answer.contacts, _edges(sizes, answer.pairs))
@@ -74,10 +79,10 @@ def _edges(sizes: np.ndarray, pairs: np.ndarray) -> np.ndarray:
     return np.asarray(sizes[pairs].max(axis=2).min(axis=1))
 
 
-def _boxes(header: Header, tick: DrawnTick) -> Iterator[Marker]:
-    """Yield a translucent cube for each box that has a pose."""
+def _boxes(header: Header, tick: DrawnTick, fixed: bool) -> Iterator[Marker]:
+    """Yield a translucent cube for each box that has a pose; fixed: whether for fixed ones, too."""
     poses = style.unit_poses(tick.poses)
-    for row in np.flatnonzero(~np.isnan(poses[:, 0])):
+    for row in np.flatnonzero(~np.isnan(poses[:, 0]) & (fixed | ~tick.rows.scene.is_fixed)):
         colour = style.BOX_A if tick.rows.is_a[row] else style.BOX_B
         marker = make_marker(header, 'boxes', Marker.CUBE, colour, style.BOX_OPACITY,
                              number=int(row))
@@ -139,6 +144,9 @@ class MarkersNode(Listener):
     def __init__(self, context: Context, **options: Any) -> None:
         super().__init__('markers', context, SCENE_PARAMETERS, contact_qos(), **options)
         self._drawn: set[tuple[str, int]] = set()
+        self._fixed: set[tuple[str, int]] = set()  # those of fixed boxes
+        self._fixed_rows: SceneRows | None = None  # whose boxes these are
+        self._fixed_at = 0.0  # when they were sent last, by the steady clock [s]
         self._gone: dict[tuple[str, int], float] = {}  # since when, by the steady clock [s]
         self._markers = self.create_publisher(MarkerArray, 'markers', contact_qos())
         self.create_timer(PERIOD, self._publish)
@@ -148,8 +156,14 @@ class MarkersNode(Listener):
         tick = None if self.quiet else self.tick()
         if tick is None:
             return
-        markers = scene_markers(tick)
-        now, drawn = time.monotonic(), {(marker.ns, marker.id) for marker in markers}
+        now = time.monotonic()
+        is_due = tick.rows is not self._fixed_rows or now - self._fixed_at >= FIXED_PERIOD
+        markers = scene_markers(tick, fixed=is_due)
+        if is_due:
+            self._fixed_rows, self._fixed_at = tick.rows, now
+            self._fixed = {('boxes', row)
+                           for row in np.flatnonzero(tick.rows.scene.is_fixed).tolist()}
+        drawn = self._fixed.union((marker.ns, marker.id) for marker in markers)
         self._gone = {key: since for key, since in self._gone.items()
                       if key not in drawn and now - since <= DELETED}
         self._gone |= dict.fromkeys(self._drawn - drawn, now)
