@@ -26,6 +26,9 @@ def test_every_field_has_a_comment_with_its_unit(definition: Path) -> None:
     for line in definition.read_text('utf-8').splitlines():
         if line.startswith('#'):
             comment += line
+        elif '=' in line:  # a constant
+            assert '# ' in line, line
+            fields += 1
         elif line not in ('', '---'):
             name = line.split()[1]
             assert comment or name == 'box_b', name  # the comment of both boxes
