@@ -3,9 +3,9 @@
 
 """Is a plan sound? A line for each fault, first what was left out, and one for the whole plan.
 
-It reads SMDG BAPLIE, SDF, MJCF, URDF, scene files, and packing plans as CSV or JSON. Of several
-files it prints a line each. The exit status is 2 if a file could not be read, else 1 if a plan is
-not sound, else 3 if not all of one was judged, else 0.
+It reads SMDG BAPLIE, and packing plans as CSV or JSON. Of several files it prints a line each. The
+exit status is 2 if a file could not be read, else 1 if a plan is not sound, else 3 if not all of
+one was judged, else 0.
 """
 from __future__ import annotations
 
@@ -54,8 +54,7 @@ def judged(path: str, options: argparse.Namespace) -> tuple[Inspection, str]:
         free = np.setdiff1d(np.arange(len(plan)), plan.ground)
         limits[free] = np.minimum(limits[free], options.limit)
     ignored = {kind for kind, is_told in (
-        ('mass', options.geometry), ('order', options.order), ('gravity', options.acceleration))
-        if is_told}
+        ('mass', options.geometry), ('order', options.order)) if is_told}
     plan = dataclasses.replace(
         plan, masses=None if options.geometry else plan.masses, limits=limits,
         order=order_of_rows(plan) if options.order else plan.order,
@@ -159,8 +158,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--sides', action='store_true', help='boxes beside each other carry by '
                         'friction, and so do the walls of a container')
     parser.add_argument('--acceleration', type=float, nargs=3, metavar=('X', 'Y', 'Z'),
-                        help='what the goods feel, gravity included [m/s²] (default: 0 0 -9.81, '
-                        'whatever the file says); a lorry that brakes along +x by 0.4 g: '
+                        help='what the goods feel, gravity included [m/s²] (default: 0 0 '
+                        '-9.81); a lorry that brakes along +x by 0.4 g: '
                         '3.92 0 -9.81')
     parser.add_argument('--order', choices=('rows',), help='boxes come by the order of their rows; '
                         'else by the column or key `order`, if there is one')

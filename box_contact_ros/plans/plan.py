@@ -34,7 +34,7 @@ FAULT_KINDS = {
     'pose': ('not all judged', 'place'), 'mass': ('not all judged', 'weight'),
     'order': ('not all judged', 'order'), 'shape': ('not all judged', 'shape'),
     'support': ('not all judged', 'support'), 'way': ('not all judged', 'judgement'),
-    'unit': ('not all judged', 'unit'), 'gravity': ('not all judged', ''),
+    'unit': ('not all judged', 'unit'),
     'origin': ('not sound', 'origin'), 'column': ('sound', '')}
 """What may be wrong with a row of a file: the best verdict with it, and what it lacks."""
 NO_ROOM = ((-np.inf,) * 3, (np.inf,) * 3)

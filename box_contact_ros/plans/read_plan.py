@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,7 +17,9 @@ from .forms import NOTHING, ORIGINS, UNITS, Given
 from .packing import is_first, is_header, read_csv, read_packing
 from .plan import MOST_BYTES, Plan
 
-FORMATS = ('SMDG BAPLIE, SDF, MJCF, URDF, a scene file (YAML), and packing plans as CSV or JSON')
+FORMATS = 'SMDG BAPLIE, and packing plans as CSV or JSON'
+WORLDS = ('it is a world or a model of a simulator, which is no plan; fill a Plan from it, as '
+          'docs/examples/mujoco_plan.py does')
 
 
 class ReadPlan(NamedTuple):
@@ -32,14 +34,14 @@ class ReadPlan(NamedTuple):
 
 def read_plan(path: str | os.PathLike[str], *, origin: str | None = None, unit: str | None = None,
               container: Sequence[float] | None = None) -> Plan:
-    """Return the plan of a file: SMDG BAPLIE, SDF, MJCF, URDF, a scene file, CSV or JSON.
+    """Return the plan of a file: SMDG BAPLIE, CSV or JSON.
 
     origin, unit, container: of CSV and JSON alone, what the file does not tell. origin: 'centre' or
     'corner', what `x y z` are. unit: 'm', 'cm' or 'mm'. container: (3,) the inner size of each
     container, in the unit of the file.
 
-    What a file says wrongly about some boxes is among the plan's faults. MJCF and URDF need the
-    extra `sim`. Raises OSError, and ValueError with the file and the reason for what is no plan.
+    What a file says wrongly about some boxes is among the plan's faults. Raises OSError, and
+    ValueError with the file and the reason for what is no plan.
     """
     return read_any(path, Given(origin, unit, container)).plan
 
@@ -72,7 +74,7 @@ def _read(file: Path, data: bytes, given: Given) -> ReadPlan:
     start = data[:4096].decode('latin-1').removeprefix('ï»¿').lstrip()
     ending = file.suffix.lower()
     if start[:1] in ('{', '['):
-        return _read_json(file, data, given)
+        return _read_json(data, given)
     first = next(filter(is_first, start.splitlines()), '')
     is_edi = start[:4] in ('UNA:', 'UNB+') or start[:3] in ('UNA', 'UNB', 'UNH') or ending == '.edi'
     if not is_edi and (ending in ('.csv', '.tsv') or is_header(first)):
@@ -83,10 +85,7 @@ def _read(file: Path, data: bytes, given: Given) -> ReadPlan:
         from .baplie import read_baplie
         return ReadPlan(read_baplie(data.decode('latin-1')), 'corners')
     if start.startswith('<'):
-        return ReadPlan(_read_xml(file, data), 'faces')
-    if ending in ('.yaml', '.yml'):
-        from .scene import read_scene_plan
-        return ReadPlan(read_scene_plan(file), 'faces')
+        raise ValueError(WORLDS)
     shown = start.partition('\n')[0].strip()[:60].lower()
     raise ValueError(f'line 1: {shown!r} begins no format that is read: {FORMATS}' if shown else
                      f'it is empty; what is read: {FORMATS}')
@@ -99,18 +98,6 @@ def _tells_itself(given: Given) -> None:
             raise ValueError(f'{name} must not be given: it is for CSV and JSON of packers alone')
 
 
-def _read_xml(file: Path, data: bytes) -> Plan:
-    from .sdf import parse_xml, read_sdf
-
-    root = parse_xml(data)
-    if root.tag in ('mujoco', 'robot'):
-        from .mjcf import read_mjcf
-        return read_mjcf(file)
-    if root.tag in ('sdf', 'gazebo', 'world', 'model'):
-        return read_sdf(root)
-    raise ValueError(f'line 1: <{root.tag}> begins no format that is read: {FORMATS}')
-
-
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """Return a JSON object. Raises ValueError for a key that comes twice."""
     document = dict(pairs)
@@ -120,7 +107,7 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return document
 
 
-def _read_json(file: Path, data: bytes, given: Given) -> ReadPlan:
+def _read_json(data: bytes, given: Given) -> ReadPlan:
     try:
         document = json.loads(data, object_pairs_hook=_object)
     except json.JSONDecodeError as error:
@@ -128,9 +115,4 @@ def _read_json(file: Path, data: bytes, given: Given) -> ReadPlan:
     read = read_packing(document, given)
     if read is not None:
         return ReadPlan(read.plan, 'faces', read.form)
-    if isinstance(document, Mapping) and {'boxes', 'bodies', 'pairs'} & document.keys():
-        from .scene import read_scene_plan
-        _tells_itself(given)
-        return ReadPlan(read_scene_plan(file), 'faces')
-    raise ValueError('it is JSON, but neither a packing plan (boxes: [...], see '
-                     'msg_schemas/plan.json) nor a scene file')
+    raise ValueError('it is JSON, but no packing plan (boxes: [...], see msg_schemas/plan.json)')

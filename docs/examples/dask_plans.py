@@ -5,17 +5,14 @@
 
 All machines must see FOLDER. SCHEDULER is the address of a Dask scheduler, such as
 tcp://10.0.0.5:8786 (`dask scheduler` starts one, `dask worker ADDRESS` a worker). Without it, two
-workers start on this machine. Needs the extras `cluster`, `plans` and, for MJCF, `sim`, on every
-machine.
+workers start on this machine. Needs the extras `cluster` and `plans` on every machine.
 
 It prints:
 
-    gripper.xml: overlap
     pallet.csv: unsupported, overloaded
     ship.edi: unsupported, goes with what falls
     solution.csv: outside, unsupported, unit
-    yard.sdf: overlap
-    5 plans, 0 sound
+    3 plans, 0 sound
 """
 import sys
 from pathlib import Path

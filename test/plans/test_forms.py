@@ -204,7 +204,6 @@ REFUSED = {
     'container in a file': ('a.json', '{"container": [1, 2, 0], ' + document()[1:], {},
                             r'three inner sizes above 0, not \[1, 2, 0\]'),
     'of a ship': ('a.edi', '', {'unit': 'mm'}, 'unit must not be given'),
-    'of a scene': ('a.json', '{"boxes": {}}', {'origin': 'corner'}, 'origin must not be given'),
     'decimal commas': ('a.csv', sheet('a,1,2,1,0,1,0,0,0,0,0,0,5'), {}, 'are commas decimal marks'),
 }
 
