@@ -232,9 +232,8 @@ def checked(rows: Iterable[Stowed], faults: list[Fault]) -> tuple[list[Placed], 
     for row in rows:
         size = extents_of(row.kind)
         if row.over:
-            faults.append(Fault('dimension', (row.name,), f'reaches beyond its container, which is '
-                                                          f'not judged: {", ".join(row.over)}',
-                                lacks='shape'))
+            faults.append(Fault('goods', (row.name,), 'reaches beyond its container, which is not '
+                                                      f'judged: {", ".join(row.over)}'))
         if row.slot == NOT_STOWED:
             not_stowed.append(row.number or row.slot)
         elif not row.is_container:
@@ -242,9 +241,8 @@ def checked(rows: Iterable[Stowed], faults: list[Fault]) -> tuple[list[Placed], 
         elif not re.fullmatch('(?!000)[0-9]{7}', row.slot):  # bays begin at 1
             forms[len(row.slot)].append(row.name)
         elif row.slot in placed:
-            faults.append(Fault('twice', (row.slot,), f'{row.number or "a container"} has the slot '
-                                                      f'of {placed[row.slot].number or "another"}: '
-                                                      'left out', lacks='place'))
+            faults.append(Fault('slot taken', (row.slot,), f'{row.number or "a container"} has the '
+                                f'slot of {placed[row.slot].number or "another"}: left out'))
         elif size is None:
             unknown[row.kind].append(row.slot)
         else:
@@ -301,7 +299,7 @@ def _mass(row: Stowed, faults: list[Fault]) -> float:
         elif mass > HEAVIEST:
             fault = f'its weight is {number} {unit}, more than any container'
     if fault:
-        faults.append(Fault('mass', (row.slot,), fault, lacks='sure weight' if mass else 'weight'))
+        faults.append(Fault('weight' if mass else 'mass', (row.slot,), fault))
     return mass
 
 
@@ -318,8 +316,8 @@ def stow(boxes: list[Placed], left_out: list[Slot], faults: list[Fault]) -> Plan
     lowest = [n for on_deck in (False, True)
               for n in _stack(boxes, left_out, on_deck, size, pose, held, faults)]
     if held:
-        faults.append(Fault('slot', tuple(boxes[n].slot for n in held), 'stands on what is left '
-                            'out: taken as fixed, and not judged', lacks='judgement'))
+        faults.append(Fault('held', tuple(boxes[n].slot for n in held), 'stands on what is left '
+                            'out: taken as fixed, and not judged'))
     slabs, below = size[lowest].copy(), pose[lowest].copy()
     slabs[:, 2] = SLAB
     below[:, 2] -= (size[lowest, 2] + SLAB) / 2.0
@@ -388,9 +386,9 @@ def _stack(boxes: list[Placed], left_out: list[Slot], on_deck: bool, size: np.nd
                 faults.append(Fault('gap', (box.slot,), 'has no container below it down to the '
                                                         'deck'))
             elif box.tier > min(begun, default=box.tier):
-                faults.append(Fault('slot', (box.slot,), (
+                faults.append(Fault('base', (box.slot,), (
                     f'begins a stack, as others of its bay do at tier {min(begun)}: taken as on '
-                    'the ship'), verdict='sound', lacks=''))
+                    'the ship')))
             bases[blocks[n]].add(box.tier)
         pose[n, 2] = floor + size[n, 2] / 2.0
     return lowest

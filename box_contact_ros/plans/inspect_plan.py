@@ -4,6 +4,7 @@
 """Is this plan sound? Overlaps, support, loads and limits of all boxes, in one call."""
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, replace
 from itertools import compress
 
@@ -19,6 +20,7 @@ from .inspection import OVER, Inspection
 from .judged import faults_of
 from .meetings import Meetings, beds_of, bodies_of, mass_centres, meetings_of
 from .plan import Fault, Plan
+from .read_plan import read_any
 from .room import are_beyond, beyond
 from .standing import base_areas, heights
 from .statics import Bodies, Rest, settle
@@ -30,18 +32,20 @@ MANY = 10_000
 """With more boxes progress is shown: they take a second or more."""
 
 
-def inspect_plan(plan: Plan, *, tolerance: float | None = None, friction: float = 0.5,
-                 acceleration: ArrayLike = (0.0, 0.0, -9.81), bears: str = 'faces',
+def inspect_plan(plan: Plan | str | os.PathLike[str], *, tolerance: float | None = None,
+                 friction: float = 0.5, acceleration: ArrayLike = (0.0, 0.0, -9.81),
+                 bears: str | None = None,
                  sides: bool = False, loaded_from: str | None = None) -> Inspection:
     """Return what is wrong with a plan, and what each of its boxes carries.
 
+    plan: or the path of a file, as `read_plan` takes it.
     tolerance: the gap up to which faces touch, and the depth up to which boxes do not overlap [m];
     None: of each pair 1e-4, or a quarter of its thinner box, if that is less.
     friction: Coulomb's μ of all pairs.
     acceleration: (3,) that the boxes feel, gravity included [m/s²]: (3.92, 0, −9.81) on a lorry
     that brakes along +x by 0.4 g.
     bears: 'faces', or 'corners': a box stands on its corners alone, as a container does. They bear
-    on the ground, and on corner castings of the box below.
+    on the ground, and on corner castings of the box below. None: as the file has it, else 'faces'.
     sides: whether boxes beside each other carry by friction.
     loaded_from: 'above', '+x', '-x', '+y' or '-y': where the boxes of a plan with an order come
     from, each by a straight way; None: ways are not judged.
@@ -53,6 +57,10 @@ def inspect_plan(plan: Plan, *, tolerance: float | None = None, friction: float 
     another 20 s.
     Raises ValueError, with field and value, for bad input, and for too many boxes in one place.
     """
+    if isinstance(plan, str | os.PathLike):
+        plan, of_file, _ = read_any(plan)
+        bears = bears or of_file
+    bears = bears or 'faces'
     if not isinstance(plan, Plan):
         raise ValueError(f'plan must be a Plan, not {short_repr(plan)}')
     if bears not in ('faces', 'corners'):
@@ -88,8 +96,8 @@ def _as_loaded(found: Inspection, meet: Meetings, bodies: Bodies, friction: floa
     plan, faults, ways = found.plan, [], found.ways
     steps, unknown = falls_of(plan, meet, bodies, friction)
     if names := tuple(plan.names[box] for box in unknown if found.stands[box] or found.cause[box]):
-        faults.append(Fault('support', names, 'not judged at each step: too many boxes bear on '
-                            'each other', lacks='judgement'))
+        faults.append(Fault('loads', names, 'not judged at each step: too many boxes bear on each '
+                            'other'))
     if loaded_from is not None:
         try:
             ways = blocked_ways(plan, meet, tolerances, loaded_from)
@@ -149,8 +157,8 @@ def _judged(plan: Plan, meet: Meetings, bodies: Bodies, loads: _Loads | None,
     verdict = verdict_of(plan, meet, bodies, None if loads is None else loads.rest)
     if verdict.unknown.any():
         plan = replace(plan, faults=(*plan.faults, Fault(
-            'support', tuple(compress(plan.names, verdict.unknown[body])),
-            'not judged: too many boxes bear on each other', lacks='judgement')))
+            'loads', tuple(compress(plan.names, verdict.unknown[body])),
+            'not judged: too many boxes bear on each other')))
     lower, upper = meet.pairs[meet.carries].T
     area = (meet.patches.area * (meet.normal @ up))[meet.carries]
     share = np.bincount(upper, area, count) / base_areas(plan.sizes, plan.poses, up)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -28,14 +28,20 @@ MOST_BYTES = 2**28
 VERDICTS = ('not sound', 'not all judged', 'sound')
 """On a plan, from the worst to the best."""
 FAULT_KINDS = {
+    'origin': ('sound', ''), 'tolerance': ('sound', ''), 'unit': ('not all judged', 'unit'),
+    'row': ('not all judged', 'place'), 'pose': ('not all judged', 'place'),
+    'dimension': ('not all judged', 'place'), 'slot': ('not all judged', 'place'),
+    'size type': ('not all judged', 'place'), 'slot taken': ('not sound', 'place'),
+    'cut': ('not all judged', 'part'), 'part': ('not all judged', 'part'),
+    'shape': ('not all judged', 'shape'), 'goods': ('not all judged', 'shape'),
     'gap': ('not sound', ''), 'twice': ('not sound', ''), 'overlap': ('not sound', ''),
-    'cut': ('not all judged', 'part'), 'slot': ('not all judged', 'place'),
-    'size type': ('not all judged', 'place'), 'dimension': ('not all judged', 'place'),
-    'pose': ('not all judged', 'place'), 'mass': ('not all judged', 'weight'),
-    'order': ('not all judged', 'order'), 'shape': ('not all judged', 'shape'),
-    'support': ('not all judged', 'support'), 'way': ('not all judged', 'judgement'),
-    'unit': ('not all judged', 'unit'),
-    'origin': ('not sound', 'origin'), 'column': ('sound', '')}
+    'payload': ('not sound', ''), 'mass': ('not all judged', 'weight'),
+    'weight': ('not all judged', 'sure weight'), 'limit': ('not all judged', 'limit'),
+    'friction': ('not all judged', 'friction'), 'order': ('not all judged', 'order'),
+    'support': ('not all judged', 'support'), 'held': ('not all judged', 'judgement'),
+    'loads': ('not all judged', 'judgement'), 'way': ('not all judged', 'judgement'),
+    'column': ('not all judged', 'column'), 'ignored': ('sound', 'column'),
+    'base': ('sound', ''), 'fixed': ('sound', ''), 'rounding': ('sound', '')}
 """What may be wrong with a row of a file: the best verdict with it, and what it lacks."""
 NO_ROOM = ((-np.inf,) * 3, (np.inf,) * 3)
 UNTURNED = (0.0, 0.0, 0.0, 1.0)
@@ -46,12 +52,13 @@ LACKS = {
     'sure weight': ('1 has a doubtful weight', '{:,} have a doubtful weight'),
     'limit': ('1 has no known limit', '{:,} have no known limit'),
     'order': ('1 has no place in the order', '{:,} have no place in the order'),
-    'support': ('support not judged: nothing is fixed',) * 2,
+    'support': ('support not judged',) * 2,
     'judgement': ('1 was not judged', '{:,} were not judged'),
     'unit': ('the unit is doubtful: add --unit',) * 2,
-    'origin': ('sound by another origin',) * 2,
     'shape': ('1 shape is not known', '{:,} shapes are not known'),
-    'part': ('1 part of the file was not read', '{:,} parts of the file were not read')}
+    'friction': ('1 has no known friction', '{:,} have no known friction'),
+    'part': ('1 part of the file was not read', '{:,} parts of the file were not read'),
+    'column': ('1 column was not read', '{:,} columns were not read')}
 """What boxes or rows may lack, as the last line says it of one and of more."""
 
 
@@ -59,7 +66,7 @@ LACKS = {
 class Fault:
     """What a file says wrongly, or what could not be taken from it.
 
-    Raises ValueError for a kind, a verdict or a lack that is not one of those below.
+    Raises ValueError for a kind that is not one of FAULT_KINDS.
     """
 
     kind: str
@@ -68,24 +75,21 @@ class Fault:
     """The boxes or rows that are concerned, as the file names them."""
     text: str
     """What is wrong, for people."""
-    verdict: str = field(default='', kw_only=True)
-    """The best of VERDICTS that a plan with this fault can have; '': that of its kind."""
-    lacks: str | None = field(default=None, kw_only=True)
-    """What each of the boxes or rows lacks, one of LACKS; None: what its kind says."""
 
     def __post_init__(self) -> None:
         if self.kind not in FAULT_KINDS:
             raise ValueError(f'kind must be one of {", ".join(FAULT_KINDS)}, not '
                              f'{short_repr(self.kind)}')
-        verdict, lacks = FAULT_KINDS[self.kind]
-        object.__setattr__(self, 'verdict', self.verdict or verdict)
-        if self.verdict not in VERDICTS:
-            raise ValueError(f'verdict must be one of {", ".join(VERDICTS)}, not '
-                             f'{short_repr(self.verdict)}')
-        object.__setattr__(self, 'lacks', lacks if self.lacks is None else self.lacks)
-        if self.lacks not in LACKS:
-            raise ValueError(f'lacks must be one of {", ".join(filter(None, LACKS))}, or nothing, '
-                             f'not {short_repr(self.lacks)}')
+
+    @property
+    def verdict(self) -> str:
+        """The best of VERDICTS that a plan with this fault can have."""
+        return FAULT_KINDS[self.kind][0]
+
+    @property
+    def lacks(self) -> str:
+        """What each of the boxes or rows lacks, one of LACKS."""
+        return FAULT_KINDS[self.kind][1]
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -117,6 +121,8 @@ class Plan:
     stack: np.ndarray
     """(n,) the number of the stack of each box. Stacks are loaded each by itself, among all fixed
     boxes."""
+    stacks: tuple[str, ...]
+    """The names of stacks 0, 1 and so on, such as containers; () where they have none."""
     apart: np.ndarray
     """(a, 2) pairs of boxes, by index, that neither touch nor overlap wherever they are."""
     faults: tuple[Fault, ...]
@@ -129,8 +135,9 @@ class Plan:
                  ground: ArrayLike = (), names: Sequence[str] | None = None,
                  centres: ArrayLike | None = None, limits: ArrayLike | None = None,
                  body: ArrayLike | None = None, order: ArrayLike | None = None,
-                 stack: ArrayLike | None = None, apart: ArrayLike = (),
-                 faults: Iterable[Fault] = (), room: ArrayLike | None = None) -> None:
+                 stack: ArrayLike | None = None, stacks: Sequence[str] = (),
+                 apart: ArrayLike = (), faults: Iterable[Fault] = (),
+                 room: ArrayLike | None = None) -> None:
         """Take what is known; None is what the fields say of what is not.
 
         sizes: full extents (n, 3), or (3,) of all boxes. masses: (n,), or a number for all boxes.
@@ -155,8 +162,8 @@ class Plan:
             body=_bodies(body, count),
             order=None if order is None else _numbers(order, 'order', count),
             stack=_numbers(np.zeros(count, int) if stack is None else stack, 'stack', count),
-            apart=as_places(apart, 'apart', count), faults=tuple(faults),
-            room=_rooms(room, count))
+            stacks=tuple(map(str, stacks)), apart=as_places(apart, 'apart', count),
+            faults=tuple(faults), room=_rooms(room, count))
         for name in 'order', 'stack':
             self._check_bodies(name)
         for row, fault in enumerate(self.faults):

@@ -4,8 +4,9 @@
 """A picture of a plan: what is wrong is coloured and has a label, and what is sound is pale."""
 from __future__ import annotations
 
+from collections.abc import Sequence
 from graphlib import CycleError, TopologicalSorter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,8 +14,9 @@ from ..extras import require
 from ..solver.checks import printable
 from ..solver.contact_solver import ContactSolver
 from ..solver.pose import rotation_matrix
-from .inspection import GOES, Inspection
+from .plan import Plan
 from .room import are_walls
+from .verdict import GOES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,8 +42,10 @@ UP = np.cross(VIEWER / np.linalg.norm(VIEWER), RIGHT)
 _RING = np.array([[-0.5, -0.5], [-0.5, 0.5], [0.5, 0.5], [0.5, -0.5]])
 
 
-def plot(found: Inspection) -> Figure:
-    """Return a figure of a plan, coloured by verdict; the worst boxes have their names.
+def picture(plan: Plan, verdicts: np.ndarray, rows: Sequence[Any], title: str) -> Figure:
+    """Return a figure of a plan, coloured by verdicts (n,); the worst boxes have their names.
+
+    rows: those of an `Inspection`, the worst first.
 
     It needs Matplotlib, the extra `report`.
     """
@@ -51,10 +55,10 @@ def plot(found: Inspection) -> Figure:
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
-    drawn = _drawn(found)
-    verdicts = found.verdicts[drawn]
-    faces, shades = _faces(found.plan.sizes[drawn], found.plan.poses[drawn])
-    order = _from_behind(found.plan.sizes[drawn], found.plan.poses[drawn], faces)
+    drawn = _drawn(plan)
+    verdicts = verdicts[drawn]
+    faces, shades = _faces(plan.sizes[drawn], plan.poses[drawn])
+    order = _from_behind(plan.sizes[drawn], plan.poses[drawn], faces)
     colours = np.array([to_rgb(COLOURS[verdict]) for verdict in verdicts]).reshape(-1, 1, 3)
 
     figure = Figure(figsize=(9, 6), layout='constrained')
@@ -65,7 +69,7 @@ def plot(found: Inspection) -> Figure:
         faces[order].reshape(-1, 4, 2), edgecolors='0.35', linewidths=0.4,
         facecolors=(colours * shades[:, :, None])[order].reshape(-1, 3)))
     axes.autoscale_view()
-    labels = sorted(_labels(found, drawn), key=lambda label: -faces[label[0], ..., 1].mean())
+    labels = sorted(_labels(plan, rows, drawn), key=lambda label: -faces[label[0], ..., 1].mean())
     for line, (n, text) in enumerate(labels):  # beside the boxes, the highest at the top
         axes.annotate(text, faces[n].mean(axis=(0, 1)), (1.02, 1.0 - (line + 0.5) / len(labels)),
                       textcoords='axes fraction', fontsize=8, va='center',
@@ -74,16 +78,15 @@ def plot(found: Inspection) -> Figure:
     axes.legend(handles=[Patch(facecolor=COLOURS[verdict], edgecolor='0.35', label=verdict)
                          for verdict in shown], fontsize=8, ncols=len(shown), frameon=False,
                 loc='upper center', bbox_to_anchor=(0.5, 0.0))
-    axes.set_title(found.summary(), fontsize=9)
+    axes.set_title(title, fontsize=9)
     return figure
 
 
-def _drawn(found: Inspection) -> np.ndarray:
+def _drawn(plan: Plan) -> np.ndarray:
     """Return the boxes that are drawn, by index.
 
     Walls of a container, and a ground that is far larger than the rest, are not.
     """
-    plan = found.plan
     ground = plan.ground[~are_walls(plan)[plan.ground]]
     free = np.setdiff1d(np.arange(len(plan)), plan.ground)
     if not len(free):
@@ -129,11 +132,11 @@ def _from_behind(sizes: np.ndarray, poses: np.ndarray, faces: np.ndarray) -> np.
         return np.argsort(depth, kind='stable')
 
 
-def _labels(found: Inspection, drawn: np.ndarray) -> list[tuple[int, str]]:
+def _labels(plan: Plan, rows: Sequence[Any], drawn: np.ndarray) -> list[tuple[int, str]]:
     """Return the worst boxes, by their place among the drawn ones, with their labels."""
-    place = {found.plan.names[box]: n for n, box in enumerate(drawn.tolist())}
+    place = {plan.names[box]: n for n, box in enumerate(drawn.tolist())}
     labels: dict[int, str] = {}
-    for row in found.rows():
+    for row in rows:
         for name in row.names:
             if name in place and row.kind not in QUIET:
                 labels.setdefault(place[name], printable(f'{name}: {row.kind}') + '\n'

@@ -9,6 +9,9 @@ import numpy as np
 from ..core import DEPTH_FLOOR, native
 from ..solver.pose import rotation_matrix
 
+EDGE = 1e-6
+"""What boxes share across gravity at least where one is above the other [m]: rounding is less."""
+
 
 def across_of(direction: np.ndarray) -> np.ndarray:
     """Return two unit vectors (2, 3) across a direction, and across each other."""
@@ -47,7 +50,7 @@ def heights(sizes: np.ndarray, poses: np.ndarray, frame: np.ndarray, body: np.nd
     height = np.full(len(sizes), np.nan)
     for box in np.flatnonzero(hangs[body]):
         below = (body != body[box]) & (high[:, 2] <= low[box, 2]) & (
-            (low < high[box]) & (low[box] < high))[:, :2].all(axis=1)
+            np.minimum(high, high[box]) - np.maximum(low, low[box]) > EDGE)[:, :2].all(axis=1)
         height[box] = low[box, 2] - high[below, 2].max(initial=-np.inf)
     return height
 

@@ -3,7 +3,8 @@
 
 """The example that fills a plan from a model of MuJoCo equals a reader of its own, in ten models.
 
-mujoco_plans.json has what that reader made of mujoco_models.py.
+mujoco_plans.json has what that reader made of mujoco_models.py; a robot that cannot move was
+`sound` then.
 """
 from __future__ import annotations
 
