@@ -23,7 +23,7 @@ import numpy as np
 from ..arguments import one_line, program_main, program_parser, within
 from ..extras import MissingExtra
 from ..solver.checks import printable
-from .inspect_plan import inspect_plan
+from .inspect_plan import FRICTION, inspect_plan
 from .inspection import Inspection
 from .meetings import overlaps_of
 from .plan import Fault, Plan
@@ -54,7 +54,8 @@ def judged(path: str, options: argparse.Namespace) -> tuple[Inspection, str]:
         free = np.setdiff1d(np.arange(len(plan)), plan.ground)
         limits[free] = np.minimum(limits[free], options.limit)
     ignored = {kind for kind, is_told in (
-        ('mass', options.geometry), ('order', options.order)) if is_told}
+        ('mass', options.geometry), ('order', options.order),
+        ('friction', options.geometry or options.friction is not None)) if is_told}
     loaded_from = options.loaded_from
     if loaded_from and plan.order is None and not options.order:
         if all(fault.kind != 'order' for fault in plan.faults):
@@ -67,7 +68,8 @@ def judged(path: str, options: argparse.Namespace) -> tuple[Inspection, str]:
     try:
         found = inspect_plan(
             plan, tolerance=options.tolerance, acceleration=options.acceleration or (0, 0, -9.81),
-            bears=options.bears or read.bears, sides=options.sides, loaded_from=loaded_from)
+            bears=options.bears or read.bears, sides=options.sides, loaded_from=loaded_from,
+            friction=FRICTION if options.friction is None else options.friction)
     except ValueError as error:
         option = '--' if str(error).startswith('tolerance') else ''
         raise ValueError(f'{path}: {option}{error}') from None
@@ -119,6 +121,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--tolerance', type=within(0.0), metavar='M', help='the gap up to which '
                         'faces touch, and the depth up to which boxes do not overlap (default: '
                         '1e-4, or a quarter of the thinner box)')
+    parser.add_argument('--friction', type=within(0.0), metavar='MU', help='of ground, walls and '
+                        f'boxes of which the file has none (default: {FRICTION})')
     parser.add_argument('--bears', choices=('faces', 'corners'), help='where boxes stand on each '
                         'other (default: corners for containers of a ship, faces for others)')
     parser.add_argument('--sides', action='store_true', help='boxes beside each other carry by '

@@ -28,12 +28,14 @@ from .steps import falls_of
 from .verdict import verdict_of
 from .ways import SIDES, blocked_ways
 
+FRICTION = 0.5
+"""Coulomb's μ where nobody tells one: cartons on wood."""
 MANY = 10_000
 """With more boxes progress is shown: they take a second or more."""
 
 
 def inspect_plan(plan: Plan | str | os.PathLike[str], *, tolerance: float | None = None,
-                 friction: float = 0.5, acceleration: ArrayLike = (0.0, 0.0, -9.81),
+                 friction: float = FRICTION, acceleration: ArrayLike = (0.0, 0.0, -9.81),
                  bears: str | None = None,
                  sides: bool = False, loaded_from: str | None = None) -> Inspection:
     """Return what is wrong with a plan, and what each of its boxes carries.
@@ -41,7 +43,8 @@ def inspect_plan(plan: Plan | str | os.PathLike[str], *, tolerance: float | None
     plan: or the path of a file, as `read_plan` takes it.
     tolerance: the gap up to which faces touch, and the depth up to which boxes do not overlap [m];
     None: of each pair 1e-4, or a quarter of its thinner box, if that is less.
-    friction: Coulomb's μ of all pairs.
+    friction: Coulomb's μ of ground, walls and boxes of which the plan has none; a pair has the
+    lesser one.
     acceleration: (3,) that the boxes feel, gravity included [m/s²]: (3.92, 0, −9.81) on a lorry
     that brakes along +x by 0.4 g.
     bears: 'faces', or 'corners': a box stands on its corners alone, as a container does. They bear
@@ -79,22 +82,21 @@ def inspect_plan(plan: Plan | str | os.PathLike[str], *, tolerance: float | None
     felt = as_floats(acceleration, 'acceleration', 'a vector (3,)', (3,))
     if not 0.0 < np.abs(felt).max() < np.inf:
         raise ValueError(f'acceleration must have a length, not {short_repr(acceleration)}')
-    may_meet = meetings_of(plan, tolerances, felt, bool(sides), bears == 'corners')
+    may_meet = meetings_of(plan, tolerances, felt, friction, bool(sides), bears == 'corners')
     meet = may_meet.among(plan.body, np.ones_like(may_meet.fixed))
     if faults := faults_of(plan, meet.fixed, tolerances):
         plan = replace(plan, faults=(*plan.faults, *faults))
     bodies = bodies_of(plan, meet)
     found = _judged(plan, meet, bodies, None if plan.masses is None else
-                    _loads(plan, meet, bodies, friction), tolerances)
-    return _as_loaded(found, may_meet, bodies, None if plan.masses is None else friction,
-                      tolerances, loaded_from)
+                    _loads(plan, meet, bodies), tolerances)
+    return _as_loaded(replace(found, friction=friction), may_meet, bodies, tolerances, loaded_from)
 
 
-def _as_loaded(found: Inspection, meet: Meetings, bodies: Bodies, friction: float | None,
-               tolerances: np.ndarray, loaded_from: str | None) -> Inspection:
+def _as_loaded(found: Inspection, meet: Meetings, bodies: Bodies, tolerances: np.ndarray,
+               loaded_from: str | None) -> Inspection:
     """Return what was found, with the steps and the ways of a plan that has an order."""
     plan, faults, ways = found.plan, [], found.ways
-    steps, unknown = falls_of(plan, meet, bodies, friction)
+    steps, unknown = falls_of(plan, meet, bodies)
     if names := tuple(plan.names[box] for box in unknown if found.stands[box] or found.cause[box]):
         faults.append(Fault('loads', names, 'not judged at each step: too many boxes bear on each '
                             'other'))
@@ -130,7 +132,7 @@ class _Loads:
     pressure: np.ndarray  # (k,) the greatest [Pa]; none where corners bear
 
 
-def _loads(plan: Plan, meet: Meetings, bodies: Bodies, friction: float) -> _Loads:
+def _loads(plan: Plan, meet: Meetings, bodies: Bodies) -> _Loads:
     require('plans')
     from tqdm import tqdm
 
@@ -138,7 +140,7 @@ def _loads(plan: Plan, meet: Meetings, bodies: Bodies, friction: float) -> _Load
     sides = patches.rectangle[:, (1, 3)] - patches.rectangle[:, :1]
     with tqdm(total=int((~meet.fixed).sum()), unit='box', desc='loads', leave=False,
               disable=len(plan) <= MANY) as bar:
-        rest = settle(bodies, beds_of(plan, meet), friction, bar.update)
+        rest = settle(bodies, beds_of(plan, meet), bar.update)
     centre = rest.centre @ frame
     if meet.by_corners:
         return _Loads(rest, centre, np.zeros(0))

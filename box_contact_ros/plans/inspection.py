@@ -117,6 +117,8 @@ class Inspection:
     """(3,) [m]."""
     steps: tuple[Fall, ...] = ()
     """What falls while the plan is loaded, by step; empty without an order."""
+    friction: float = np.nan
+    """Coulomb's μ of ground, walls and boxes of which the plan has none."""
     loaded_from: str | None = None
     """Where boxes come from; None: their ways are not judged."""
     ways: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), int))
@@ -313,6 +315,9 @@ class Inspection:
                 f'{self.mass / 1e3:,.0f} t' if self.mass >= 1e4 else f'{self.mass:,.1f} kg')
             if np.isfinite(self.centre_of_mass).all():
                 words.append('centre of mass {:.3f} {:.3f} {:.3f} m'.format(*self.centre_of_mass))
+            known = plan.friction[~np.isnan(plan.friction)]
+            least, most = min((self.friction, *known)), max((self.friction, *known))
+            words.append(f'friction {least:g}' + (f' to {most:g}' if most > least else ''))
         verdict, lacks = self.verdict, ', '.join(self._lacks())
         if verdict == 'not all judged':
             verdict += '; what was read is sound'

@@ -55,14 +55,14 @@ class KeptLoads:
     """What patches carry, in the frame of what bodies feel."""
 
     def __init__(self, meet: Meetings, pairs: np.ndarray, below: Sequence[list[int]],
-                 bodies: Bodies, friction: float | None) -> None:
-        """Keep no loads yet; friction: None looks at where centres are alone.
+                 bodies: Bodies, *, weighed: bool) -> None:
+        """Keep no loads yet; those that are not weighed are looked at by their centres alone.
 
         pairs: of bodies, of all patches that may bear. below: rows of what carries each body.
         """
         slope = np.minimum(meet.normal @ meet.frame[2], 1.0)
         self._slides = (slope <= 1.0 - LEVEL) & (
-            np.sqrt(1.0 - slope**2) > (np.inf if friction is None else friction) * slope)
+            np.sqrt(1.0 - slope**2) > (meet.friction if weighed else np.inf) * slope)
         self._hull = meet.bearings.hull @ meet.frame[:2].T
         self._needs, self._overlaps = meet.needs, meet.overlaps[meet.of_met]
         self._lower, self._below, self._bodies = pairs[:, 0].tolist(), below, bodies
@@ -70,7 +70,7 @@ class KeptLoads:
         self._own = [*zip(*np.vstack((bodies.weight, bodies.weight * bodies.centre[:, :2].T)
                                      ).tolist())]
         self._height = bodies.centre[:, 2].tolist()
-        self._only_looks = friction is None
+        self._only_looks = not weighed
         self._load: list[Force] = [(0.0, 0.0, 0.0)] * len(pairs)
         self._total: list[Force] = [(0.0, 0.0, 0.0)] * len(below)  # weight, and what is on top
         self._is_braced = [False] * len(below)

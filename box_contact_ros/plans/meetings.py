@@ -48,6 +48,7 @@ class Meetings:
     carries: np.ndarray  # (k,) bool: the lower one carries the upper one; else they are beside
     needs: np.ndarray  # (k,) how far a centre that it carries must be inside the hull [m]
     normal: np.ndarray  # (k, 3) from the lower box to the upper one
+    friction: np.ndarray  # (k,) the lesser of both boxes
     patches: FacePatches  # k
     bearings: Bearings  # k
     by_corners: bool
@@ -73,14 +74,15 @@ class Meetings:
             overlaps=self.overlaps[met], on_top=self.on_top[met],
             of_met=(np.cumsum(met) - 1)[self.of_met[rows]],
             **{name: getattr(self, name)[rows] for name in (
-                'row', 'pairs', 'carries', 'needs', 'normal', 'patches', 'bearings')})
+                'row', 'pairs', 'carries', 'needs', 'normal', 'friction', 'patches', 'bearings')})
 
 
-def meetings_of(plan: Plan, tolerances: np.ndarray, felt: np.ndarray, sides: bool, by_corners: bool,
-                ) -> Meetings:
+def meetings_of(plan: Plan, tolerances: np.ndarray, felt: np.ndarray, friction: float, sides: bool,
+                by_corners: bool) -> Meetings:
     """Return which boxes meet, and all patches that may bear, whatever else does.
 
     tolerances: (n,) by box [m]. felt: (3,) acceleration, gravity included [m/s²].
+    friction: of boxes that have none.
     Raises ValueError for more pairs than are judged.
     """
     fixed = np.zeros(plan.body.max(initial=-1) + 1, bool)
@@ -107,13 +109,13 @@ def meetings_of(plan: Plan, tolerances: np.ndarray, felt: np.ndarray, sides: boo
     overlaps = -contacts.separation > tolerance
     # Boxes beside each other may overlap by the tolerance: a strip that wide carries nothing.
     bear = np.flatnonzero((patches.width > tolerance) & (on_top | sides & ~overlaps))
-    patches = patches[bear]
+    patches, rubs = patches[bear], plan.frictions(friction)[pairs[bear]].min(axis=1)
     return Meetings(
         felt, np.stack((across, np.cross(up, across), up)), fixed, pairs, contacts.separation,
         overlaps, on_top, np.arange(len(bear)), bear, pairs[bear], on_top[bear],
         needs(plan.sizes, pairs[bear], contacts.separation[bear], tolerance[bear]), normal[bear],
-        patches, on_corners(plan.sizes, plan.poses, pairs[bear], normal[bear], patches,
-                            tolerance[bear], fixed[plan.body]) if by_corners else
+        rubs, patches, on_corners(plan.sizes, plan.poses, pairs[bear], normal[bear], patches,
+                                  tolerance[bear], fixed[plan.body]) if by_corners else
         on_faces(patches), by_corners)
 
 
@@ -171,7 +173,7 @@ def beds_of(plan: Plan, meet: Meetings) -> Beds:
     sides = patches.rectangle[:, (1, 3)] - patches.rectangle[:, :1]
     return Beds(
         pairs=plan.body[meet.pairs], carries=meet.carries, normal=meet.normal @ frame.T,
-        centre=patches.centre @ frame.T, area=patches.area,
+        centre=patches.centre @ frame.T, area=patches.area, friction=meet.friction,
         radius=np.sqrt((sides**2).sum(axis=(1, 2)) / 12.0),
         bearings=meet.bearings.in_frame(frame))
 

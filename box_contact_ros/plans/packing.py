@@ -42,6 +42,7 @@ GROUND, GROUND_THICKNESS, GROUND_MARGIN = 'ground', 1.0, 1.0
 ROOM = 1.0  # between the containers of one file, which are placed side by side [m]
 LONG, LONG_ROOM, FULL = 20.0, 30.0, 5.0
 """A container is longer, or shorter than a box by more, only where their units differ [m, m, 1]."""
+MOST_FRICTION = 10.0  # more is no friction [1]
 SAME = 1e-4  # by which least corners of containers may differ that have frames of their own [m]
 SQUARE = 1e-6  # by which a turn by quarters may miss them [1]
 MOST_STEPS = 2**53  # a float64 has all whole numbers up to it
@@ -303,7 +304,7 @@ class _Rows:
         return Box(name, record.number, stack, size, pose,
                    self._amount(record, name, place, 'mass', MASS_MAX, 0.0),
                    self._amount(record, name, place, 'limit', math.inf, math.inf) or 0.0,
-                   self._amount(record, name, place, 'friction', math.inf, math.nan) or 0.0,
+                   self._amount(record, name, place, 'friction', MOST_FRICTION, math.nan) or 0.0,
                    fixed, None if order is None else self.table.number(order))
 
     def _numbers(self, record: Record, kind: str, columns: Sequence[str]) -> np.ndarray:
@@ -432,6 +433,7 @@ def _on_ground(boxes: Sequence[Box], labels: Sequence[str], weighed: bool, fault
         ground=[*(n for n, box in enumerate(boxes) if box.fixed), *range(count, len(sizes))],
         names=[box.name for box in boxes] + [name for name, *_ in slabs],
         limits=[box.limit for box in boxes] + [math.inf] * len(slabs),
+        friction=[box.friction for box in boxes] + [math.nan] * len(slabs),
         order=order and [*order, *[0] * len(slabs)],
         stack=[*(box.stack for box in boxes), *[0] * len(slabs)],
         stacks=labels if len(labels) > 1 else (), faults=faults,

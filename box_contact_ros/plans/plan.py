@@ -113,6 +113,8 @@ class Plan:
     """(n, 3) of mass, in the frame of each box [m]."""
     limits: np.ndarray
     """(n,) the most that may rest on each box [kg]; infinity: no limit is known."""
+    friction: np.ndarray
+    """(n,) Coulomb's μ of each box, and a pair has the lesser; NaN: as `inspect_plan` is told."""
     body: np.ndarray
     """(n,) the number of the body of each box. The boxes of a body hold together."""
     order: np.ndarray | None
@@ -134,16 +136,17 @@ class Plan:
     def __init__(self, sizes: ArrayLike, poses: ArrayLike, masses: ArrayLike | None = None, *,
                  ground: ArrayLike = (), names: Sequence[str] | None = None,
                  centres: ArrayLike | None = None, limits: ArrayLike | None = None,
-                 body: ArrayLike | None = None, order: ArrayLike | None = None,
-                 stack: ArrayLike | None = None, stacks: Sequence[str] = (),
-                 apart: ArrayLike = (), faults: Iterable[Fault] = (),
+                 friction: ArrayLike | None = None, body: ArrayLike | None = None,
+                 order: ArrayLike | None = None, stack: ArrayLike | None = None,
+                 stacks: Sequence[str] = (), apart: ArrayLike = (), faults: Iterable[Fault] = (),
                  room: ArrayLike | None = None) -> None:
         """Take what is known; None is what the fields say of what is not.
 
         sizes: full extents (n, 3), or (3,) of all boxes. masses: (n,), or a number for all boxes.
         ground: a box or boxes. names: None are '0', '1', and so on. centres: (n, 3); None are the
-        boxes' own centres. body: (n,); None is a body for each box. order: (n,), one for a body.
-        stack: (n,); None is one stack. room: (n, 2, 3), or (2, 3) of all boxes; None is no room.
+        boxes' own centres. friction: (n,), or a number for all boxes; None is NaN. body: (n,); None
+        is a body for each box. order: (n,), one for a body. stack: (n,); None is one stack. room:
+        (n, 2, 3), or (2, 3) of all boxes; None is no room.
 
         Raises ValueError, with field, row and value, for bad input.
         """
@@ -159,7 +162,8 @@ class Plan:
             names=_names(names, count), centres=_centres(centres, count),
             limits=(np.full(count, np.inf) if limits is None else
                     _amounts(limits, 'limits', count, np.inf, 'kg')),
-            body=_bodies(body, count),
+            friction=(np.full(count, np.nan) if friction is None else
+                      _frictions(friction, count)), body=_bodies(body, count),
             order=None if order is None else _numbers(order, 'order', count),
             stack=_numbers(np.zeros(count, int) if stack is None else stack, 'stack', count),
             stacks=tuple(map(str, stacks)), apart=as_places(apart, 'apart', count),
@@ -197,6 +201,10 @@ class Plan:
             raise ValueError(f'{name}[{row}] is {numbers[row]}, and {numbers[first[row]]} of '
                              f'{name}[{first[row]}], a box of the same body')
 
+    def frictions(self, other: float) -> np.ndarray:
+        """Return the friction of each box (n,); other: that of boxes of which it is not known."""
+        return np.where(np.isnan(self.friction), other, self.friction)
+
     def __len__(self) -> int:
         """Return how many boxes there are."""
         return len(self.poses)
@@ -208,6 +216,15 @@ def _amounts(value: ArrayLike, name: str, count: int, most: float, unit: str) ->
     array = np.broadcast_to(array, count)
     for row in np.flatnonzero(~((array >= 0.0) & (array <= most)))[:1]:
         raise ValueError(f'{name}[{row}] is {array[row]:g} {unit}, not from 0 to {most:g} {unit}')
+    return array
+
+
+def _frictions(value: ArrayLike, count: int) -> np.ndarray:
+    """Return frictions (n,) from 0 on, or NaN; one stands for all."""
+    array = as_floats(value, 'friction', f'a number, or numbers ({count},)', (count,), ())
+    array = np.broadcast_to(array, count)
+    for row in np.flatnonzero((array < 0.0) | np.isinf(array))[:1]:
+        raise ValueError(f'friction[{row}] is {array[row]:g}, not 0 or more, and finite')
     return array
 
 

@@ -82,7 +82,7 @@ WORDS = {
     'mass': 'mass weight gross grossweight grossmass weightgross kg',
     'limit': 'limit maxload loadlimit maxloadontop maxontop stackinglimit stacklimit maxstackload '
              'maxstackweight maxstackingload maxtopload toploadlimit',
-    # 'friction': 'friction mu μ µ cof frictioncoefficient coefficientoffriction',
+    'friction': 'friction mu μ µ cof frictioncoefficient coefficientoffriction',
     'order': 'order sequence seq step loadorder loadingorder loadsequence loadingsequence '
              'packorder packingorder packingsequence placementorder',
     'container': ' '.join(holder + end for holder in HOLDERS for end in (

@@ -24,15 +24,14 @@ from .statics import Bodies, Work, settle
 from .verdict import verdict_of
 
 
-def falls_of(plan: Plan, meet: Meetings, bodies: Bodies, friction: float | None,
-             ) -> tuple[tuple[Fall, ...], list[int]]:
+def falls_of(plan: Plan, meet: Meetings, bodies: Bodies) -> tuple[tuple[Fall, ...], list[int]]:
     """Return what falls at which step, and the boxes of which this is not always known.
 
-    meet: all patches that may bear. friction: None judges geometry alone.
+    meet: all patches that may bear.
     """
     if plan.order is None or not meet.fixed.any():
         return (), []
-    loading = _Loading(plan, meet, bodies, friction)
+    loading = _Loading(plan, meet, bodies)
     first = np.unique(plan.body, return_index=True)[1]
     stack, order = plan.stack[first], plan.order[first]
     free = np.flatnonzero(~meet.fixed)
@@ -48,8 +47,8 @@ def falls_of(plan: Plan, meet: Meetings, bodies: Bodies, friction: float | None,
 class _Loading:
     """The bodies that have come, and which of them stand."""
 
-    def __init__(self, plan: Plan, meet: Meetings, bodies: Bodies, friction: float | None) -> None:
-        self._plan, self._meet, self._bodies, self._friction = plan, meet, bodies, friction
+    def __init__(self, plan: Plan, meet: Meetings, bodies: Bodies) -> None:
+        self._plan, self._meet, self._bodies = plan, meet, bodies
         self._work = Work(statics.MOST_WORK)
         self._here, self._stands = meet.fixed.tolist(), meet.fixed.tolist()
         self._fixed = meet.fixed.tolist()
@@ -71,7 +70,8 @@ class _Loading:
             else:
                 self._beside[lower].append(row)
                 self._beside[upper].append(row)
-        self._loads = KeptLoads(meet, plan.body[meet.pairs], self._below, bodies, friction)
+        self._loads = KeptLoads(meet, plan.body[meet.pairs], self._below, bodies,
+                                weighed=plan.masses is not None)
 
     def come(self, new: list[int], step: int) -> None:
         """Take the bodies that come at a step."""
@@ -125,8 +125,8 @@ class _Loading:
         part = self._meet.among(plan.body, self._meet.fixed | is_member)
         bodies = replace(self._bodies, fixed=~is_member, need=part.need(plan.body))
         rest = None
-        if self._friction is not None:
-            rest = settle(bodies, beds_of(plan, part), self._friction, work=self._work)
+        if plan.masses is not None:
+            rest = settle(bodies, beds_of(plan, part), work=self._work)
         verdict = verdict_of(plan, part, bodies, rest)
         if rest is not None:
             rows = part.carries

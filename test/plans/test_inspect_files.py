@@ -45,7 +45,8 @@ def judge(tmp_path, capsys):
     (sheet('a,1,1,1,0,0,0.4'), 1, 'overlap               a  ground  100.0 mm deep'),
     (sheet(f'{PAIR[0]},150', f'{PAIR[1]},', more=',mass,limit'), 1,
      'overloaded            a  200 kg on top'),
-    (sheet(*PAIR, more=',mass'), 0, '2 boxes, 300.0 kg, centre of mass 0.000 0.000 1.167 m: sound'),
+    (sheet(*PAIR, more=',mass'), 0, '2 boxes, 300.0 kg, centre of mass 0.000 0.000 1.167 m, '
+                                 'friction 0.5: sound'),
     (sheet('a,1,1,1,0,0,0.5', 'b,1,0,1,0,0,1.5'), 3, '1 box: not all judged; what was read is '
                                                      'sound, but 1 box was not placed'),
     (sheet('a,1,1,1,0,0,0.5', 'b,1,0,1,0,0,1.5', 'c,1,1,1,0,0,0.7'), 1, '2 boxes: not sound; 1 box '

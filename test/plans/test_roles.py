@@ -197,6 +197,17 @@ def test_frames(cells, frames, lines, tmp_path, capsys):
     assert '1: 1 box: ' in printed and '2: 1 box: ' in printed
 
 
+@pytest.mark.parametrize(('cells', 'options', 'status', 'words'), [
+    (('.3', ''), [], 3, '1 has no known friction'), (('.3', ''), ['--friction', '.6'], 0, '0.3 to'),
+    (('.3', '-1'), [], 3, "friction is '-1'"), (('.3', '.6'), [], 0, 'friction 0.3 to 0.6: sound'),
+    (('.3', '.6'), ['--acceleration', '3.92', '0', '-9.81'], 1, 'slides                a')])
+def test_a_column_of_friction(cells, options, status, words, tmp_path, capsys):
+    text = sheet(*(f'{name},1,1,1,{x},0,.5,9,{cell}' for name, x, cell in zip('ab', (0, 3), cells)),
+                 more=',mass,mu')
+    assert inspect_files.main([str(written(tmp_path, 'a.csv', text)), *options]) == status
+    assert words in capsys.readouterr().out
+
+
 def test_six_containers_have_six_verdicts(tmp_path):
     """In a table, and as lists of a JSON document; one hangs, one overlaps, one is overloaded."""
     goods = {n: [(.5, .5, .5, 1, 9), (.5, .5, 1.5, 1, 9)] for n in range(6)}
