@@ -45,6 +45,8 @@ UNITS = {'KGM': 1.0, 'KG': 1.0, 'T': 1000.0, 'LBR': 0.45359237, 'TNE': 1000.0}
 LIGHTEST, HEAVIEST = 1e3, 60e3
 """[kg] of a container with its goods. An empty 10 ft has 1.3 t, and the standard allows 36 t. What
 is below may have been written with a mark of thousands, or in tonnes."""
+MESSAGES = ('BAPLIE', 'MOVINS')
+"""A stowage plan, and stowage instructions, which have the same segments."""
 NOT_STOWED = '9999999'
 """The slot of a container that has none yet."""
 GROSS = ('WT', 'VGM', 'G', 'AET')
@@ -101,8 +103,9 @@ def read_baplie(text: str) -> Plan:
     """Return the plan of a file; its faults are rows. Raises ValueError where it is no BAPLIE."""
     parts = segments(text)
     kinds = {part(row, 2).split(':')[0] for row in parts if row[0] == 'UNH'}
-    if kinds and 'BAPLIE' not in kinds:
-        raise ValueError(f'its message is {" and ".join(sorted(kinds))}; a stowage plan is BAPLIE')
+    if kinds and not kinds & {*MESSAGES}:
+        raise ValueError(f'its message is {" and ".join(sorted(kinds))}; a stowage plan is '
+                         f'{" or ".join(MESSAGES)}')
     rows = list(containers(parts))
     if not rows:
         raise ValueError('it has no container: neither LOC+147 nor EQD+CN')
@@ -170,8 +173,16 @@ def containers(parts: Iterable[list[str]]) -> Iterator[Stowed]:
 def _weigh(row: Stowed, segment: list[str]) -> None:
     """Take the mass of MEA+WT++KGM:1, MEA+VGM++KGM:1 or MEA+AAE+VGM+KGM:1."""
     what = part(segment, 2) if part(segment, 1) == 'AAE' else part(segment, 1)
-    if what in GROSS and (not row.mass or (what == 'VGM' and not row.is_weighed)):
-        row.mass, row.is_weighed = _shown(part(segment, 3)), what == 'VGM'
+    mass = _shown(part(segment, 3))
+    is_weighed = what == 'VGM'
+    if what in GROSS and (not row.mass or (_is_empty(row.mass) or is_weighed and not row.is_weighed)
+                          and not _is_empty(mass)):
+        row.mass, row.is_weighed = mass, is_weighed
+
+
+def _is_empty(mass: str) -> bool:
+    """Return whether the number of a mass is missing or 0, as in KGM, KGM: and KGM:0."""
+    return not mass.partition(':')[2].strip('0. :')
 
 
 def _measure(row: Stowed, segment: list[str]) -> None:
