@@ -201,6 +201,8 @@ def main(args: Sequence[str] | None = None) -> int:
     """Judge files; return the exit status of the worst."""
     parser = _parser()
     options = parser.parse_args(args)
+    if sys.stdout is None:
+        raise OSError('stdout is closed')
     if options.picture and len(options.files) > 1:
         parser.error('--picture takes one file')
     if options.picture and os.path.realpath(options.picture) == os.path.realpath(options.files[0]):
@@ -215,8 +217,10 @@ def main(args: Sequence[str] | None = None) -> int:
         try:
             found, taken = judged(path, options)
             figure = found.plot() if options.picture else None
-        except (OSError, ValueError, MissingExtra) as error:
-            print(one_line(error), file=sys.stderr)
+        except (OSError, ValueError, MissingExtra, MemoryError) as error:
+            is_full = isinstance(error, MemoryError)
+            print(f'{printable(path)}: it needs more memory than there is' if is_full else
+                  one_line(error), file=sys.stderr)
             worst = 'not read'
             counts[worst] += 1
             continue

@@ -23,7 +23,7 @@ from .plan import Fault, Plan
 from .read_plan import read_any
 from .room import are_beyond, beyond
 from .standing import base_areas, heights
-from .statics import Bodies, Rest, settle
+from .statics import Bodies, Rest, Work, settle
 from .steps import falls_of
 from .verdict import verdict_of
 from .ways import SIDES, blocked_ways
@@ -56,8 +56,8 @@ def inspect_plan(plan: Plan | str | os.PathLike[str], *, tolerance: float | None
     A plan with an order is judged at each of its steps, too.
 
     Loads need the extra `plans`; a plan without masses does not. Boxes whose loads would take
-    more than 1 GB or about 20 s are not judged, the largest groups first; nor are steps beyond
-    another 20 s.
+    more than 1 GB or about 15 s are not judged, the largest groups first; nor are steps beyond
+    that.
     Raises ValueError, with field and value, for bad input, and for too many boxes in one place.
     """
     if isinstance(plan, str | os.PathLike):
@@ -86,17 +86,18 @@ def inspect_plan(plan: Plan | str | os.PathLike[str], *, tolerance: float | None
     meet = may_meet.among(plan.body, np.ones_like(may_meet.fixed))
     if faults := faults_of(plan, meet.fixed, tolerances):
         plan = replace(plan, faults=(*plan.faults, *faults))
-    bodies = bodies_of(plan, meet)
+    bodies, work = bodies_of(plan, meet), Work()
     found = _judged(plan, meet, bodies, None if plan.masses is None else
-                    _loads(plan, meet, bodies), tolerances)
-    return _as_loaded(replace(found, friction=friction), may_meet, bodies, tolerances, loaded_from)
+                    _loads(plan, meet, bodies, work), tolerances)
+    return _as_loaded(replace(found, friction=friction), may_meet, bodies, work, tolerances,
+                      loaded_from)
 
 
-def _as_loaded(found: Inspection, meet: Meetings, bodies: Bodies, tolerances: np.ndarray,
-               loaded_from: str | None) -> Inspection:
+def _as_loaded(found: Inspection, meet: Meetings, bodies: Bodies, work: Work,
+               tolerances: np.ndarray, loaded_from: str | None) -> Inspection:
     """Return what was found, with the steps and the ways of a plan that has an order."""
     plan, faults, ways = found.plan, [], found.ways
-    steps, unknown = falls_of(plan, meet, bodies)
+    steps, unknown = falls_of(plan, meet, bodies, work)
     if names := tuple(plan.names[box] for box in unknown if found.stands[box] or found.cause[box]):
         faults.append(Fault('loads', names, 'not judged at each step: too many boxes bear on each '
                             'other'))
@@ -132,7 +133,7 @@ class _Loads:
     pressure: np.ndarray  # (k,) the greatest [Pa]; none where corners bear
 
 
-def _loads(plan: Plan, meet: Meetings, bodies: Bodies) -> _Loads:
+def _loads(plan: Plan, meet: Meetings, bodies: Bodies, work: Work) -> _Loads:
     require('plans')
     from tqdm import tqdm
 
@@ -140,7 +141,7 @@ def _loads(plan: Plan, meet: Meetings, bodies: Bodies) -> _Loads:
     sides = patches.rectangle[:, (1, 3)] - patches.rectangle[:, :1]
     with tqdm(total=int((~meet.fixed).sum()), unit='box', desc='loads', leave=False,
               disable=len(plan) <= MANY) as bar:
-        rest = settle(bodies, beds_of(plan, meet), bar.update)
+        rest = settle(bodies, beds_of(plan, meet), work, bar.update)
     centre = rest.centre @ frame
     if meet.by_corners:
         return _Loads(rest, centre, np.zeros(0))

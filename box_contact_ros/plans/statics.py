@@ -69,7 +69,7 @@ BATCH = 300
 MOST_ENTRIES = 2_000_000
 """Of a programme's matrix: 300 bytes each."""
 MOST_WORK, STEPS = 3e9, 30
-"""Work of all programmes, 2 to 6 ns each, and steps that a programme is expected to take."""
+"""Work of a plan, and steps that a programme is expected to take."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,15 +130,23 @@ class Rest:
         return np.abs(self.missing).max(axis=1, initial=0.0) > FALLS
 
 
-def settle(bodies: Bodies, beds: Beds, report: Callable[[int], None] = lambda count: None,
-           work: Work | None = None) -> Rest:
+@dataclass
+class Work:
+    """What a plan may still take."""
+
+    left: float = MOST_WORK
+    """In units of 2 to 6 ns: of a programme's step, the entries of its matrix and factors, to the
+    power of 1.25."""
+
+
+def settle(bodies: Bodies, beds: Beds, work: Work,
+           report: Callable[[int], None] = lambda count: None) -> Rest:
     """Return what the patches carry.
 
     Small groups come first. Those that would take more than what is left of the work are not
-    solved; None is a work of MOST_WORK.
+    solved.
     report: is called with the number of bodies that were solved since.
     """
-    work = work or Work(MOST_WORK)
     load, centre = np.zeros(len(beds.pairs)), beds.centre.copy()
     own = bodies.centre
     bodies, added = add_up(bodies, beds, load, centre)
@@ -298,14 +306,6 @@ def add_up(bodies: Bodies, beds: Beds, load: np.ndarray, centre: np.ndarray,
 
 class _TooMuch(Exception):
     """Groups take more memory or time than is left."""
-
-
-@dataclass
-class Work:
-    """What the programmes may still take."""
-
-    left: float
-    """Of a step: the entries of its matrix and factors, to the power of 1.25, as measured."""
 
 
 class _Programme:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import os
+import random
 import resource
 import shutil
 import subprocess
@@ -103,6 +104,53 @@ def test_loads_that_take_too_much_are_not_judged(text, status, line, tmp_path):
     assert found == status and line in printed
     assert 'not judged: too many boxes bear on each other' in printed
     assert seconds < MOST_SECONDS and peak < MOST_MEMORY
+
+
+@pytest.mark.parametrize('order', ['at random', 'from above'])
+@pytest.mark.parametrize('weighed', [True, False])
+def test_steps_are_a_part_of_the_work(order, weighed, tmp_path):
+    """4,000 boxes with an order, which has 116 kB, took 131 s."""
+    number = [*range(4000, 0, -1)]
+    if order == 'at random':
+        random.Random(1).shuffle(number)
+    places = [(.3 * (x + z % 2 / 3) + .15, .2 * (y + z % 2 / 3) + .1, .2 * z + .1)
+              for z in range(10) for x in range(20) for y in range(20)]
+    text = sheet(*(f'{n},.3,.2,.2,{x},{y},{z},{step}{",1" * weighed}' for n, ((x, y, z), step) in
+                   enumerate(zip(places, number))), more=f',order{",mass" * weighed}')
+    status, printed, seconds, peak = judged(written(tmp_path, 'p.csv', text))
+    assert status == 1 and ' hangs' in printed and 'were not judged' in printed
+    assert seconds < MOST_SECONDS and peak < MOST_MEMORY
+
+
+def test_a_small_file_needs_little_memory(tmp_path):
+    """256 MiB were asked for at once, whatever the size."""
+    path = written(tmp_path, 'p.csv', sheet('a,1,1,1,0,0,.5'))
+    limit = 200 * 2**20
+    done = subprocess.run([sys.executable, '-c', (
+        'import resource, sys\nfrom box_contact_ros.resources import read_regular\n'
+        f'now = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()\n'
+        f'resource.setrlimit(resource.RLIMIT_AS, (now + {limit}, now + {limit}))\n'
+        'print(len(read_regular(sys.argv[1], 2**28)))'), str(path)], capture_output=True, text=True,
+        timeout=100)
+    assert (done.stdout, done.stderr) == (f'{path.stat().st_size}\n', '')
+
+
+def test_too_little_memory_is_a_line(tmp_path, monkeypatch, capsys):
+    def fails(*_, **__):
+        raise MemoryError
+    monkeypatch.setattr(inspect_files, 'inspect_plan', fails)
+    path = written(tmp_path, 'p.csv', sheet('a,1,1,1,0,0,.5'))
+    assert inspect_files.main([str(path)]) == 2
+    assert capsys.readouterr().err == f'{path}: it needs more memory than there is\n'
+
+
+def test_a_closed_stdout_is_a_line(tmp_path):
+    path = written(tmp_path, 'p.csv', sheet('a,1,1,1,0,0,.5'))
+    for options in '', '--csv', '--json':
+        done = subprocess.run(f'{sys.executable} -m box_contact_ros.plans.inspect_files {path} '
+                              f'{options} >&-', shell=True, capture_output=True, text=True,
+                              timeout=100)
+        assert (done.returncode, done.stderr) == (74, 'stdout is closed\n')
 
 
 @pytest.mark.reports
