@@ -140,7 +140,7 @@ class Inspection:
 
     @property
     def verdicts(self) -> np.ndarray:
-        """Return a word (n,) for each box: 'ground', else 'overlap', its cause, or 'sound'.
+        """Return a word (n,) for each box: 'ground', 'overlap', its cause, or 'sound'.
 
         'outside': beyond its room, and without an overlap. 'step', 'way': it stands in the whole
         plan, but not at each step, or its way is blocked. 'not judged': whether it stands is not
@@ -153,7 +153,8 @@ class Inspection:
             words[boxes[self.cause[boxes] == '']] = word
         words[self.outside.any(axis=(1, 2))] = 'outside'
         words[self.overlaps.ravel()] = 'overlap'
-        words[self.plan.ground] = 'ground'
+        ground = self.plan.ground
+        words[ground] = np.where(self.cause[ground] == '', 'ground', self.cause[ground])
         return words
 
     def __str__(self) -> str:

@@ -20,7 +20,7 @@ a body's weight, and of that times its radius of gyration.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -134,7 +134,7 @@ class Rest:
 class Work:
     """What a plan may still take."""
 
-    left: float = MOST_WORK
+    left: float = field(default_factory=lambda: MOST_WORK)
     """In units of 2 to 6 ns: of a programme's step, the entries of its matrix and factors, to the
     power of 1.25."""
 

@@ -24,7 +24,7 @@ from ..arguments import one_line, program_main, program_parser, within
 from ..extras import MissingExtra, require
 from ..plans.inspect_files import NOT_READ, add_options, judged
 from ..plans.inspection import Inspection
-from ..plans.plot import COLOURS
+from ..plans.plot import COLOURS, spans
 from ..plans.room import are_walls
 from ..solver.checks import printable
 from ..solver.pose import rotation_matrix
@@ -161,13 +161,7 @@ def worst_boxes(found: Inspection) -> dict[str, int]:
 def hit_by(sizes: np.ndarray, poses: np.ndarray, origin: np.ndarray, direction: np.ndarray,
            ) -> int | None:
     """Return the first box that a ray hits, by index, or None."""
-    axes = rotation_matrix(poses[:, 3:])
-    start = np.einsum('nij,ni->nj', axes, origin - poses[:, :3])
-    along = np.einsum('nij,i->nj', axes, direction)
-    with np.errstate(divide='ignore', invalid='ignore'):
-        ends = np.stack(((-sizes / 2.0 - start) / along, (sizes / 2.0 - start) / along))
-    near = np.nanmax(ends.min(axis=0), axis=1)
-    far = np.nanmin(ends.max(axis=0), axis=1)
+    near, far = (row[0] for row in spans(sizes, poses, origin[None], direction))
     near[(near > far) | (far < 0.0)] = np.inf
     return int(near.argmin()) if np.isfinite(near).any() else None
 

@@ -397,7 +397,7 @@ def test_the_picture_has_the_legend_of_what_it_shows():
     pytest.importorskip('matplotlib')
     found = inspect_plan(plan_of([box(0, 0.5), box(0.6, 1.5)], [10, 10]))
     figure = found.plot()
-    words = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
     assert words == ['sound', 'unsupported']
     labels = [text.get_text() for text in figure.axes[0].texts]
     assert labels == ['2: unsupported\nshare 0.40, centre 100 mm outside']
