@@ -163,8 +163,8 @@ def typed(options: argparse.Namespace) -> list[str]:
         if value is True:
             words.append(flag)
         elif isinstance(value, list) and action.nargs is None:
-            words += [word for one in value for word in (
-                flag, '='.join(one) if isinstance(one, tuple) else one)]
+            words += [f'{flag}={one}' if isinstance(one, str) else f'{flag}={"=".join(one)}'
+                      for one in value]
         elif isinstance(value, list):
             words += [flag, *(f'{one:.15g}' for one in value)]
         else:

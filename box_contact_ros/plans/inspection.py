@@ -279,7 +279,7 @@ class Inspection:
         if self.cause[box] == 'hangs':
             height = self.height[box]
             return (f'{1e3 * height:.1f} mm above what is below' if np.isfinite(height) else
-                    'above nothing') + end
+                    'above nothing' if np.isinf(height) else 'by an unknown height') + end
         return f'share {self.share[box]:.2f}, centre {_side(self.margin[box])}{end}'
 
     def _steps(self) -> Iterator[Row]:

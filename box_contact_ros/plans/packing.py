@@ -18,8 +18,10 @@ import numpy as np
 
 from ..core import LENGTH_MAX, MASS_MAX
 from ..solver.checks import pose_fault, short_repr, size_fault
+from ..solver.contacts_of import contacts_of
 from ..solver.pose import rotation_matrix
 from .forms import Form, form_of
+from .meetings import most_near
 from .plan import NO_ROOM, UNTURNED, Fault, Plan
 from .roles import (
     ANGLES,
@@ -44,6 +46,7 @@ LONG, LONG_ROOM, FULL = 20.0, 30.0, 5.0
 """A container is longer, or shorter than a box by more, only where their units differ [m, m, 1]."""
 MOST_FRICTION = 10.0  # more is no friction [1]
 SAME = 1e-4  # by which least corners of containers may differ that have frames of their own [m]
+STRAIGHT = np.array(UNTURNED)
 SQUARE = 1e-6  # by which a turn by quarters may miss them [1]
 MOST_STEPS = 2**53  # a float64 has all whole numbers up to it
 AXES = {'x': [1, 2, 0], 'y': [0, 2, 1], 'z': [0, 1, 2]}
@@ -59,17 +62,13 @@ class Box:
     stack: int
     size: np.ndarray
     pose: np.ndarray
+    half: np.ndarray
+    """Half of the extents of its bounding box (3,) [m]."""
     mass: float | None
     limit: float
     friction: float
     fixed: bool
     order: float | None
-
-    @property
-    def half(self) -> np.ndarray:
-        """Half of the extents of its bounding box (3,) [m]."""
-        reach = np.abs(rotation_matrix(self.pose[None, 3:])[0]) @ self.size / 2.0
-        return np.asarray(reach)
 
 
 class _LeftOut(Exception):
@@ -133,6 +132,9 @@ def _read(tables: Sequence[Table], table: Table, taken: Taken, given: Given, for
                                                                                0.0)
     for box in boxes:
         box.pose[0] += starts[box.stack]
+    if frames == 'one' and not (given.frames or form) and _touch(boxes):
+        faults.append(Fault('frames', (), 'containers touch in one frame: say --frames one if they '
+                                          'do, or own'))
     _name(boxes, labels)
     weighed = any(box.mass is not None for box in boxes)
     lacking = tuple(box.name for box in boxes if weighed and box.mass is None and not box.fixed)
@@ -289,7 +291,7 @@ class _Rows:
                              'place of its own')
         try:
             size = self._size(record)
-            pose = self._pose(record, size)
+            pose, half = self._pose(record, size)
             fixed = FIXED.get(str(self._single(record, 'fixed') or '').lower())
             if fixed is None:
                 raise _LeftOut('pose', f'fixed is {short_repr(self._single(record, "fixed"))}, '
@@ -301,7 +303,7 @@ class _Rows:
         if odd:
             self.faults.append(Fault('cut', (name,), odd))
         order = self._single(record, 'order')
-        return Box(name, record.number, stack, size, pose,
+        return Box(name, record.number, stack, size, pose, half,
                    self._amount(record, name, place, 'mass', MASS_MAX, 0.0),
                    self._amount(record, name, place, 'limit', math.inf, math.inf) or 0.0,
                    self._amount(record, name, place, 'friction', MOST_FRICTION, math.nan) or 0.0,
@@ -337,20 +339,21 @@ class _Rows:
             raise _LeftOut('dimension', fault)
         return size
 
-    def _pose(self, record: Record, size: np.ndarray) -> np.ndarray:
-        taken = self.taken
-        place = (self._scale * self._numbers(record, 'pose', taken.place))[:3][self._axes]
+    def _pose(self, record: Record, size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return a pose (7,), and half of the extents of the bounding box (3,) [m]."""
+        place = (self._scale * self._numbers(record, 'pose', self.taken.place))[:3][self._axes]
         turn = self._turn(record)
-        pose = np.append(place, turn)
-        fault = pose_fault(pose.tolist())
-        if not fault and taken.is_corner:
-            axes = np.abs(rotation_matrix(turn[None])[0])
-            if np.abs(axes - np.rint(axes)).max() > SQUARE:
-                fault = 'a turned box is told by its centre'
-            pose[:3] += np.rint(axes) @ size / 2.0
-        if fault:
+        pose, half = np.concatenate((place, turn)), size / 2.0
+        if fault := pose_fault(pose):
             raise _LeftOut('pose', fault)
-        return pose
+        if turn is not STRAIGHT:
+            axes = np.abs(rotation_matrix(turn[None])[0])
+            half = axes @ half
+            if self.taken.is_corner and np.abs(axes - np.rint(axes)).max() > SQUARE:
+                raise _LeftOut('pose', 'a turned box is told by its centre')
+        if self.taken.is_corner:
+            pose[:3] += half
+        return pose, half
 
     def _turn(self, record: Record) -> np.ndarray:
         """Return the quaternion x y z w of a row, in the plan's axes."""
@@ -361,8 +364,10 @@ class _Rows:
             columns = [taken.single.get(role, '') for role in ANGLES]
             angles = [self._numbers(record, 'pose', [name])[0] if self._cell(record, name)
                       not in (None, '') else 0.0 for name in columns]
+            if not any(angles):
+                return STRAIGHT
             roll, pitch, yaw = TURNS[taken.turns] * np.array(angles)
-            quaternion = np.array(UNTURNED)
+            quaternion = STRAIGHT
             for axis, angle in ((0, roll), (1, pitch), (self._axes[2], yaw)):  # about fixed axes
                 half = np.zeros(4)
                 half[axis], half[3] = math.sin(angle / 2.0), math.cos(angle / 2.0)
@@ -399,6 +404,15 @@ def _frames(boxes: Sequence[Box]) -> str:
         least[box.stack] = np.minimum(low, least.get(box.stack, low))
     corners = np.array([*least.values()])
     return 'own' if np.ptp(corners, axis=0).max() <= SAME else 'one'
+
+
+def _touch(boxes: Sequence[Box]) -> bool:
+    """Return whether boxes of two containers touch, so that one may carry the other."""
+    pairs, _ = contacts_of(np.array([box.size for box in boxes]),
+                           np.array([box.pose for box in boxes]), tolerance=SAME,
+                           most_near=most_near(len(boxes)))
+    stacks = np.array([box.stack for box in boxes])[pairs]
+    return bool((stacks[:, 0] != stacks[:, 1]).any())
 
 
 def _name(boxes: Sequence[Box], labels: Sequence[str]) -> None:

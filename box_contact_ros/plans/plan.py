@@ -40,7 +40,8 @@ FAULT_KINDS = {
     'friction': ('not all judged', 'friction'), 'order': ('not all judged', 'order'),
     'support': ('not all judged', 'support'), 'held': ('not all judged', 'judgement'),
     'loads': ('not all judged', 'judgement'), 'way': ('not all judged', 'judgement'),
-    'column': ('not all judged', 'column'), 'ignored': ('sound', 'column'),
+    'frames': ('not all judged', 'frames'), 'column': ('not all judged', 'column'),
+    'ignored': ('sound', 'column'),
     'base': ('sound', ''), 'fixed': ('sound', ''), 'rounding': ('sound', '')}
 """What may be wrong with a row of a file: the best verdict with it, and what it lacks."""
 NO_ROOM = ((-np.inf,) * 3, (np.inf,) * 3)
@@ -57,6 +58,7 @@ LACKS = {
     'unit': ('the unit is doubtful: add --unit',) * 2,
     'shape': ('1 shape is not known', '{:,} shapes are not known'),
     'friction': ('1 has no known friction', '{:,} have no known friction'),
+    'frames': ('containers touch: add --frames',) * 2,
     'part': ('1 part of the file was not read', '{:,} parts of the file were not read'),
     'column': ('1 column was not read', '{:,} columns were not read')}
 """What boxes or rows may lack, as the last line says it of one and of more."""

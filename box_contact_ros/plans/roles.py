@@ -98,7 +98,7 @@ NEUTRAL = {'item', 'items', 'box', 'boxes', 'carton', 'cartons', 'goods', 'packa
 """Words in front that all rows have in common."""
 HARMLESS = {*WORDS['name'].split(), *(
     'group customer customerid client consignee supplier vendor brand orderid orderno colour color '
-    'price cost value currency note notes comment comments remark remarks description text title '
+    'price cost currency note notes comment comments remark remarks description text title '
     'date time timestamp created url image photo country city address invoice volume version seed '
     'runtime duration score objective fitness utilization utilisation fillrate row index gtin upc '
     'author').split()}

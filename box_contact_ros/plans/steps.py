@@ -22,7 +22,7 @@ from .plan import Plan
 from .statics import Bodies, Work, settle
 from .verdict import verdict_of
 
-ROW = 200.0
+ROW = 500.0
 """Work of a patch among which a group is looked for, in the unit of `Work`."""
 
 

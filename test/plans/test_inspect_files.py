@@ -4,6 +4,7 @@
 """The program `inspect`: its lines, its exit statuses, its JSON and CSV, on small files."""
 from __future__ import annotations
 
+import argparse
 import csv
 import io
 import json
@@ -278,5 +279,30 @@ def test_the_hint_can_be_typed(tmp_path, monkeypatch, capsys):
     inspect_files.main(['a b;c.csv', '--limit', '5', '--from=-x', '--order', 'rows', '--geometry',
                         '--acceleration', '1', '0', '-9.81', '--column', 'name=name'])
     assert capsys.readouterr().out.endswith(
-        "box_contact_view --column name=name --limit 5 --acceleration 1 0 -9.81 --order rows "
+        "box_contact_view --column=name=name --limit 5 --acceleration 1 0 -9.81 --order rows "
         "--from=-x --geometry 'a b;c.csv'\n")
+
+
+@pytest.mark.parametrize('words', [
+    [], ['--limit', '5'], ['--from=-x', '--order', 'rows'], ['--acceleration', '1', '0', '-9.81'],
+    ['--unit', 'mm', '--origin', 'corner', '--container', '1', '2.5', '3', '--up', 'y'],
+    ['--column', 'mass=a=b c', '--column', 'name=$x', '--ignore', '-n', '--turns', 'degrees'],
+    ['--friction', '0.25', '--tolerance', '0.0002', '--sides', '--geometry', '--bears', 'corners'],
+    ['--frames', 'own']])
+def test_the_hint_repeats_all_options(words):
+    """So that the page judges as the program did: it said sound where --limit 5 did not."""
+    parser = argparse.ArgumentParser()
+    inspect_files.add_options(parser)
+    joined = ['--ignore=-n' if word == '--ignore' else word for word in words if word != '-n']
+    options = parser.parse_args(joined)
+    assert parser.parse_args(inspect_files.typed(options)) == options
+
+
+def test_the_page_says_what_the_program_says(tmp_path):
+    """With a limit, the plan of the page is not sound."""
+    parser = argparse.ArgumentParser()
+    inspect_files.add_options(parser)
+    path = str(written(tmp_path, 'a.csv', sheet(*PAIR, more=',mass')))
+    for limit, verdict in (('199', 'not sound'), ('201', 'sound')):
+        found, taken = inspect_files.judged(path, parser.parse_args(['--limit', limit]))
+        assert found.verdict == verdict and taken.startswith('read: x y z [m], centres')

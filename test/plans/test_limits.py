@@ -122,6 +122,15 @@ def test_steps_are_a_part_of_the_work(order, weighed, tmp_path):
     assert seconds < MOST_SECONDS and peak < MOST_MEMORY
 
 
+@pytest.mark.reports
+def test_many_boxes_that_hang(tmp_path):
+    """33 s went into how high 30,000 boxes hang."""
+    text = sheet(*(f'{n},.3,.2,.2,{n % 40 / 2},{n // 40 % 40 / 2},{n // 1600 / 2 + .2:.1f}'
+                   for n in range(30_000)))
+    status, _, seconds, peak = judged(written(tmp_path, 'p.csv', text))
+    assert status == 1 and seconds < MOST_SECONDS and peak < MOST_MEMORY
+
+
 def test_a_small_file_needs_little_memory(tmp_path):
     """256 MiB were asked for at once, whatever the size."""
     path = written(tmp_path, 'p.csv', sheet('a,1,1,1,0,0,.5'))

@@ -8,6 +8,7 @@ BOX_CONTACT_MUTANTS=10000 makes so many.
 from __future__ import annotations
 
 import io
+import json
 import os
 import random
 import re
@@ -37,7 +38,13 @@ SEEDS = {
     'ship.edi': SHIP, 'small.edi': (FILES / 'ship.edi').read_text('utf-8'),
     'rows.csv': sheet('a,1,1,1,0,0,0.5,100,500,', 'b,1,1,1,0,0,1.5,100,500,', more=',mass,limit,'
                       'fixed'),
-    'rows.json': document(mass=3, limit=4)}
+    'rows.json': document(mass=3, limit=4),
+    'goods.csv': 'id;l_mm;w_mm;h_mm;x_mm;y_mm;z_mm;yaw_deg;pallet;mu\n1;600;400;300;0;0;150;90;A;,5'
+                 '\n2;600;400;300;0;0,5;450;90;A;,4\n3;400;400;300;0;0;150;;B;,5\n',
+    'orders.json': json.dumps({name: [{'item': {
+        'id': 7, 'sequence': n, 'weight/kg': 2, 'length/mm': 600, 'width/mm': 400,
+        'height/mm': 300}, 'flb_coordinates': [0, 0, 300 * n], 'orientation': n}
+        for n in range(2)] for name in 'ab'})}
 
 
 HIDING = ((b'"', b'"'), (b'FTX+AAA+++', b"'"), (b'"note": [', b'],'), (b'# ', b'\n'), (b'?', b'?'))
@@ -47,9 +54,10 @@ HIDING = ((b'"', b'"'), (b'FTX+AAA+++', b"'"), (b'"note": [', b'],'), (b'# ', b'
 def counted(name: str, text: str) -> int:
     """Return how many boxes a file has, as a reader counts them who knows rows and tags alone."""
     if name.endswith('.csv'):
-        return sum(line.count(',') >= 6 for line in re.split('[\r\n]+', text.strip())[1:])
+        return sum(max(line.count(','), line.count(';')) >= 6
+                   for line in re.split('[\r\n]+', text.strip())[1:])
     if name.endswith('.json'):
-        return text.count('"length"')
+        return text.count('"length')
     return len(re.findall(r"'\s*LOC\+147", re.sub('[\r\n]', '', text).replace("?'", '')))
 
 
