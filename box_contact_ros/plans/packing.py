@@ -9,6 +9,7 @@ fixed, and it has no floor, z = 0 is the ground.
 from __future__ import annotations
 
 import math
+import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -33,6 +34,7 @@ from .roles import (
     Taken,
     is_harmless,
     is_named,
+    words_of,
 )
 from .room import walls
 from .table import Record, Table
@@ -168,17 +170,23 @@ def _unread(tables: Sequence[Table], table: Table, taken: Taken, given: Given) -
             isinstance(value, int | float) and not isinstance(value, bool)
             or isinstance(value, str) and value.strip().lstrip('-+.,')[:1].isdigit()
             for value in values)
-        key = _beside(name, table.path) if name in table.above else name
-        is_quiet = not is_loud or is_harmless(key) or is_named(name, given.ignore)
+        is_above = name in table.above
+        key = _beside(name, table.path) if is_above else name
+        is_quiet = (not is_loud or is_harmless(key, is_above=is_above)
+                    or is_named(name, given.ignore))
         (quiet if is_quiet else told).append(name)
     above = {path for rows in table.lists for path, _ in rows.above}
     others = [other.path for other in tables if other is not table and other.path not in above
               and not is_named(other.path, given.ignore)]
     return [Fault(kind, tuple(names), text) for kind, names, text in (
-        ('column', told, 'not read: say --column ROLE=NAME, or --ignore NAME if it decides on '
-                         'nothing'),
-        ('part', others, 'not read, and may have boxes: say --ignore NAME if not'),
+        ('column', told, f'not read: if it decides on nothing, add {_ignore(told)}; else --column'),
+        ('part', others, f'not read, and may have boxes: if not, add {_ignore(others)}'),
         ('ignored', quiet, 'not read')) if names]
+
+
+def _ignore(names: Sequence[str]) -> str:
+    """Return options that ignore some names, as they are typed."""
+    return shlex.join(words_of('--ignore', names))
 
 
 def _beside(name: str, path: str) -> str:

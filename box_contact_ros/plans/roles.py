@@ -48,8 +48,10 @@ def _lines(kind: str, formats: str, *lines: Sequence[str]) -> list[Line]:
 
 
 AXES, PLACES_OF_A_LIST = ('x', 'y', 'z'), ('0', '1', '2')
-SIDES = [line.split() for line in ('length width height', 'l w h', 'width depth height', 'w d h',
-                                   'length depth height', 'l d h', 'length width depth', 'l w d')]
+SIDES = [line.split() for line in (
+    'length width height', 'l w h', 'width depth height', 'w d h', 'length depth height', 'l d h',
+    'length width depth', 'l w d', 'länge breite höhe', 'laenge breite hoehe',
+    'longueur largeur hauteur', 'largo ancho alto')]
 """Along x, y and up: where there is no height, depth is up."""
 LINES = {
     'size': [
@@ -78,8 +80,9 @@ HOLDERS = ('container', 'pallet', 'bin', 'truck', 'trailer', 'vehicle', 'uld', '
 ROOMS = ('container', 'containers', 'bin', 'bins')
 """What has an inner size, where it has a size: that of a pallet is its own."""
 WORDS = {
-    'name': 'name label id sku item box carton article code partno ean barcode reference ref',
-    'mass': 'mass weight gross grossweight grossmass weightgross kg',
+    'name': 'name label id sku item box carton article artikel code partno ean barcode reference '
+            'ref',
+    'mass': 'mass weight gross grossweight grossmass weightgross kg gewicht masse poids peso',
     'limit': 'limit maxload loadlimit maxloadontop maxontop stackinglimit stacklimit maxstackload '
              'maxstackweight maxstackingload maxtopload toploadlimit',
     'friction': 'friction mu μ µ cof frictioncoefficient coefficientoffriction',
@@ -100,6 +103,7 @@ HARMLESS = {*WORDS['name'].split(), *(
     'group customer customerid client consignee supplier vendor brand orderid orderno colour color '
     'price cost currency note notes comment comments remark remarks description text title '
     'date time timestamp created url image photo country city address invoice volume version seed '
+    'sscc layer '
     'runtime duration score objective fitness utilization utilisation fillrate row index gtin upc '
     'author').split()}
 """Columns that decide on nothing here."""
@@ -109,6 +113,7 @@ GROUPS = {'size': (SIZE, ('lx', 'ly', 'lz')), 'place': (PLACE, LEAST, LEAST + GR
 ROLES = tuple(dict.fromkeys([*WORDS, *(
     role for ways in GROUPS.values() for way in ways for role in way)]))
 """What --column gives a column, as in `mass=gross`."""
+UNIT_WORDS = ('unit', 'units', 'lengthunit', 'lengthunits', 'dimensionunit', 'uom')
 MINE = {*SIZE, 'lx', 'ly', 'lz', 'dx', 'dy', 'dz', *PLACE, *LEAST, *GREATEST}
 """With these names, and one that is `name`, lengths are metres unless told otherwise."""
 LONG = 20.0
@@ -271,9 +276,6 @@ class Finder:
         kind = place.kind if place else ''
         if place and given.origin and kind in ('corner', 'corners') and given.origin != 'corner':
             raise ValueError(f"origin must not be 'centre': {' '.join(place.words)} are corners")
-        if place and not kind and not given.origin:
-            self.open.ask(f'are {" ".join(place.words)} centres or least corners?', '--origin',
-                          'corner')
         room = self._room()
         taken = Taken(
             size=size.words if size else (), is_along_file=not size or size.kind == 'file',
@@ -284,7 +286,12 @@ class Finder:
                                  'kg', None))
         self._ask_missing(size or kind == 'corners', place, taken)
         angles = [single[role] for role in ANGLES if role in single]
-        return replace(taken, unit=self._length_unit(taken), turns=self._angle_unit(angles))
+        taken = replace(taken, unit=self._length_unit(taken), turns=self._angle_unit(angles))
+        if place and not given.origin and (not kind or kind == 'centre' and self.open.questions and (
+                min(self.table.numbers(place.words['xyz'.index(taken.up)]), default=1.0) <= 0.0)):
+            self.open.ask(f'are {" ".join(place.words)} centres or least corners?', '--origin',
+                          'corner')
+        return taken
 
     def _lines(self, group: str) -> list[Line]:
         """Return the lines of a group whose columns are all there, with these; '' is another."""
@@ -343,7 +350,10 @@ class Finder:
 
     def _room(self) -> Line | None:
         """Return the columns of a container's inner size."""
-        by_word = {word.key: name for name, word in self.words.items()}
+        by_word = {}
+        for name in self.words:
+            path, key = self.table.above.get(name, ('', name))
+            by_word[word_of(f'{path.rpartition(".")[2]}.{key}').key] = name
         lists = _lines('file', '{}', PLACES_OF_A_LIST)
         return next((Line(line.kind, tuple(by_word[room + word] for word in line.words))
                      for room in ROOMS for line in (*LINES['size'], *lists)
@@ -363,7 +373,11 @@ class Finder:
     def _length_unit(self, taken: Taken) -> str:
         columns = (*taken.size, *taken.place, *taken.room)
         unit = self._unit(UNITS, columns, '', self.given.unit)
-        if unit:
+        for name, word in self.words.items():  # such as "units": "mm"
+            values = {*map(str, self.table.values(name))} if word.key in UNIT_WORDS else set()
+            unit = unit or next((SUFFIXES.get(value, '') for value in values if len(values) == 1),
+                                '')
+        if unit in UNITS:
             return unit
         names = {name.lower() for name in self.table.columns}
         sizes = [self.table.numbers(name) for name in taken.size or taken.place[-3:]]
@@ -394,13 +408,16 @@ class Finder:
                     map(math.isnan, self.table.numbers(name))):
                 threes.setdefault(tuple(re.findall(r'[^\W_]+', name)[:-1]), []).append(name)
         whole = [names for names in threes.values() if len(names) == 3]
+        rest = [name for names in threes.values() for name in names]
+        whole = whole or [rest] * (len(rest) == 3)
+        hint = f' (numbers are in {", ".join(rest)})' if rest else ''
         for there, what, roles, is_size in (
                 (size, 'the size', SIZE, True),
                 (place, 'the least corner, or x y z of the centre', LEAST, False)):
             if not there:
                 some = [names for names in whole if size or place or is_size == all(
                     value > 0.0 for name in names for value in self.table.numbers(name))][:1]
-                self.open.ask(f'which columns are {what} ({" ".join(roles)})?', *(
+                self.open.ask(f'which columns are {what} ({" ".join(roles)})?{hint}', *(
                     word for names in some for word in words_of(
                         '--column', map('='.join, zip(roles, names)))))
 
@@ -410,6 +427,7 @@ def is_named(name: str, some: Iterable[str]) -> bool:
     return any(name == other or name.startswith(f'{other}.') for other in some)
 
 
-def is_harmless(name: str) -> bool:
-    """Return whether a column of this name decides on nothing."""
-    return word_of(name).key in HARMLESS
+def is_harmless(name: str, *, is_above: bool) -> bool:
+    """Return whether a column of this name decides on nothing; above a list it may be its name."""
+    key = word_of(name).key
+    return key in HARMLESS or is_above and ROLE_OF.get(key) == 'container'

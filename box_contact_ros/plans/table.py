@@ -246,8 +246,9 @@ def _records(value: Any, path: str, above: tuple[tuple[str, Cells], ...], label:
 
 def _label(cells: Cells) -> str:
     """Return by which name people know what has these cells; '' where it has none."""
-    return next((str(cells[key]) for key in ('partno', 'name', 'id', 'label')
-                 if cells.get(key) not in (None, '')), '')
+    return next((str(value) for key, value in cells.items() if value not in (None, '') and (
+        key in ('partno', 'name', 'id', 'label') or key.endswith(('_id', '_name', 'Id', 'Name')))),
+        '')
 
 
 def _parted(record: Cells) -> tuple[dict[str, Any], list[tuple[str, Any]]]:

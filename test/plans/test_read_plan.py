@@ -108,7 +108,7 @@ FAULTS = {
     'quote': ('p.csv', sheet('"a', 'b,1,1,1,0,0,9', '",1,1,1,0,0,.5'), 'cut',
               'row 1', 'goes on over 1 lines'),
     'colour': ('p.csv', sheet(f'{FLAT},red', more=',Colour'), 'ignored', 'Colour', 'not read'),
-    'a number': ('p.csv', sheet(f'{FLAT},3', more=',crush'), 'column', 'crush', '--ignore NAME'),
+    'a number': ('p.csv', sheet(f'{FLAT},3', more=',crush'), 'column', 'crush', '--ignore crush'),
     'all one': ('p.csv', sheet(f'{FLAT},1', more=',Tragkraft'), 'column', 'Tragkraft', 'not read'),
     'a number in words': ('p.csv', sheet(f'{FLAT},90°', more=',turn'), 'column', 'turn',
                           'not read'),

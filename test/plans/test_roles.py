@@ -27,6 +27,15 @@ def rows(*names, make=lambda n, box: (n, *box), delimiter=','):
         names, *(make(n, box) for n, box in enumerate(BOXES)))) + '\n'
 
 
+def in_bin(bins):
+    """Return what is around the boxes."""
+    return json.dumps({'solution': {'bins': bins}})
+
+
+def item(n, box):
+    return {'id': n, **dict(zip('xyz', box)), **dict(zip(('width', 'depth', 'height'), box[3:]))}
+
+
 def centred(n, box):
     return n, *(low + side / 2 for low, side in zip(box, box[3:])), *box[3:]
 
@@ -65,6 +74,15 @@ FORMS = {
                                               'height/mm': box[5]}, 'corner': box[:3]}), ''),
     'pounds': (rows('name', 'x_min', 'y_min', 'z_min', 'lx_in', 'ly_in', 'lz_in', 'weight_lb',
                     make=lambda n, box: (n, *(value / 25.4 for value in box), 10)), ''),
+    'sides': (rows('carton_id', 'left_cm', 'front_cm', 'bottom_cm', 'length_cm', 'width_cm',
+                   'height_cm', make=lambda n, box: (n, *(value / 10 for value in box))),
+              '--column x_min=left_cm --column y_min=front_cm --column z_min=bottom_cm'),
+    'a bin': (in_bin([{'bin_id': 3, 'width': 1200, 'depth': 800, 'height': 1000, 'items': [
+        item(n, box) for n, box in enumerate(BOXES)]}]), '--unit mm --origin corner'),
+    'a unit': (json.dumps({'units': 'mm', 'boxes': [{'sku': 'x', 'corner': box[:3],
+                                                     'extent': box[3:]} for box in BOXES]}), ''),
+    'in German': (rows('Artikel', 'X', 'Y', 'Z', 'Länge', 'Breite', 'Höhe'),
+                  '--unit mm --origin corner'),
     'y is up': (rows('id', 'x', 'y', 'z', 'l', 'w', 'h', make=lambda n, box: (
         n, *np.array(centred(n, box))[[1, 3, 2]], *box[3:])), '--unit mm --up y'),
     'ends': (rows('id', 'start_x', 'start_y', 'start_z', 'end_x', 'end_y', 'end_z',

@@ -30,8 +30,8 @@ ANSWERS = [
     ('sequence.csv', [], 1, 'step 1: high hangs until low comes'),
     ('two_pallets.csv', [], 1, '1: 2 boxes: sound\n2: 2 boxes: not sound\n'),
     ('two_pallets.csv', [], 1, 'hangs                 2/d  300.0 mm above what is below'),
-    ('packer_head.csv', [], 2, 'in which unit are lengths (m, cm, mm, in, ft)?; if it is so, add '
-                               '--unit mm'),
+    ('packer_head.csv', [], 2, 'in which unit are lengths (m, cm, mm, in, ft)?; are x y z centres '
+     'or least corners?; if it is so, add --unit mm --origin corner'),
     ('packer_head.csv', ['--unit', 'mm'], 1, 'origin                17 of 17 overlaps are gone if x'
                                              ' y z are least corners: --origin corner'),
     ('packer_head.csv', ['--unit', 'mm', '--origin', 'corner'], 1, 'hangs: 4, '),
