@@ -82,9 +82,14 @@ def read_packing(tables: Sequence[Table], given: Given) -> tuple[Plan, str]:
 
     Raises ValueError where no table has them or several, and for what is open.
     """
+    names = [name for table in tables for name in (table.path, *table.columns)]
+    for name in given.ignore:
+        if not any(is_named(other, (name,)) for other in names):
+            raise ValueError(f'neither a column nor a list is called {short_repr(name)}')
+    every, tables = tables, [table for table in tables if not is_named(table.path, given.ignore)]
     if forms := [(table, form) for table in tables if (form := form_of(table))]:
         table, form = forms[0]
-        return _read(tables, table, _formed(form, given), given, form)
+        return _read(every, table, _formed(form, given), given, form)
     finders = []
     for table in tables:
         try:
@@ -97,13 +102,14 @@ def read_packing(tables: Sequence[Table], given: Given) -> tuple[Plan, str]:
     able = [finder for finder in finders if finder.taken.place and (
         finder.taken.size or len(finder.taken.place) > 3)]
     if len(able) > 1:
-        paths = ' or '.join(finder.table.path for finder in able)
-        raise ValueError(f'which list are the boxes, {paths}? Add --ignore with the others')
+        paths = [finder.table.path for finder in able]
+        raise ValueError(f'which list are the boxes, {" or ".join(paths)}?; if it is so, add '
+                         f'{_ignore(paths[1:])}')
     finder = able[0] if able else max(finders, key=lambda finder: (
         len(finder.taken.columns), len(finder.table.records)))
     if finder.open.questions:
         raise ValueError(str(finder.open))
-    return _read(tables, finder.table, finder.taken, given, None)
+    return _read(every, finder.table, finder.taken, given, None)
 
 
 def _formed(form: Form, given: Given) -> Taken:
@@ -304,6 +310,9 @@ class _Rows:
             if fixed is None:
                 raise _LeftOut('pose', f'fixed is {short_repr(self._single(record, "fixed"))}, '
                                        'neither true nor false')
+            holder = self.taken.single.get('container', '')
+            if holder and not fixed and self._cell(record, holder) in (None, ''):
+                raise _LeftOut('row', f'{holder} is missing')
         except _LeftOut as error:
             kind, text = ('row', odd) if odd else (error.args[0], f'{place}{error.args[1]}')
             self.faults.append(Fault(kind, (name,), f'{text}: left out'))

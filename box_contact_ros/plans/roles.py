@@ -255,8 +255,8 @@ class Finder:
         """Find them. Raises ValueError for what contradicts the file."""
         self.table, self.given, self.open = table, given, Open()
         told = {column: role for role, column in given.columns.items()}
-        for column in (*told, *given.ignore):
-            if not any(is_named(name, (column,)) for name in table.columns):
+        for column in told:
+            if column not in table.columns:
                 raise ValueError(f'no column is called {short_repr(column)}')
         self.words = {name: word_of(name) for name in table.columns
                       if name in told or not is_named(name, given.ignore)}
@@ -287,8 +287,9 @@ class Finder:
         self._ask_missing(size or kind == 'corners', place, taken)
         angles = [single[role] for role in ANGLES if role in single]
         taken = replace(taken, unit=self._length_unit(taken), turns=self._angle_unit(angles))
-        if place and not given.origin and (not kind or kind == 'centre' and self.open.questions and (
-                min(self.table.numbers(place.words['xyz'.index(taken.up)]), default=1.0) <= 0.0)):
+        is_low = kind == 'centre' and self.open.questions and place and min(
+            self.table.numbers(place.words['xyz'.index(taken.up)]), default=1.0) <= 0.0
+        if place and not given.origin and (not kind or is_low):
             self.open.ask(f'are {" ".join(place.words)} centres or least corners?', '--origin',
                           'corner')
         return taken

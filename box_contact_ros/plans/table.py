@@ -237,6 +237,8 @@ def _records(value: Any, path: str, above: tuple[tuple[str, Cells], ...], label:
     elif isinstance(value, Sequence) and not isinstance(value, str):
         rows = Rows(label, above)
         for number, entry in enumerate(value, 1):
+            if isinstance(entry, list):
+                entry = {str(n): part for n, part in enumerate(entry)}
             cells, lists = _parted(entry) if isinstance(entry, Mapping) else ({}, [])
             yield path, Record(number, cells, rows)
             for key, inner in lists:
@@ -260,7 +262,7 @@ def _parted(record: Cells) -> tuple[dict[str, Any], list[tuple[str, Any]]]:
         key, value = todo.pop()
         if isinstance(value, Mapping):
             todo += [(f'{key}.{inner}', part) for inner, part in [*value.items()][::-1]]
-        elif isinstance(value, list) and any(isinstance(part, Mapping) for part in value):
+        elif isinstance(value, list) and any(isinstance(part, Mapping | list) for part in value):
             lists.append((key, value))
         elif isinstance(value, list):
             todo += [(f'{key}.{n}', part) for n, part in [*enumerate(value)][::-1]]

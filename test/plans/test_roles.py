@@ -125,6 +125,7 @@ ASKED = {
     'mass in lb, limit in': (sheet('a,1,1,1,0,0,.5,9,7', more=',mass_lb,limit'), 'one unit'),
     'two lists': (json.dumps({kind: [{'x': 0, 'y': 0, 'z': 1, 'l': 1, 'w': 1, 'h': 2, kind: 1}]
                               for kind in 'ab'}), 'which list are the boxes, a or b'),
+    'bare lists': (json.dumps([[*box, 7] for box in BOXES]), '(numbers are in 0, 1, 2, 3, 4'),
     'nine': (sheet('a,1,1,1,0,0,.5,9', more=',quantity'), "quantity of a is '9': a row is one box"),
 }
 
@@ -132,7 +133,7 @@ ASKED = {
 @pytest.mark.parametrize('case', ASKED)
 def test_what_is_open_is_asked(case, tmp_path, capsys):
     text, words = ASKED[case]
-    path = written(tmp_path, 'a.json' if text[0] == '{' else 'a.csv', text)
+    path = written(tmp_path, 'a.json' if text[0] in '{[' else 'a.csv', text)
     assert inspect_files.main([str(path)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert words in line
@@ -148,7 +149,7 @@ def test_options_answer_what_is_asked(tmp_path):
                 if fault.kind == 'column']
     for options, words in (({'columns': {'mas': 'net'}}, "columns: 'mas' is none of name, mass"),
                            ({'columns': {'mass': 'nt'}}, "no column is called 'nt'"),
-                           ({'ignore': ['nt']}, "no column is called 'nt'"),
+                           ({'ignore': ['nt']}, "neither a column nor a list is called 'nt'"),
                            ({'up': 'w'}, 'up must be one of x, y, z'),
                            ({'frames': 'two'}, 'frames must be one of own, one')):
         with pytest.raises(ValueError, match=words):
@@ -242,6 +243,35 @@ def test_six_containers_have_six_verdicts(tmp_path):
         found = inspect_plan(written(tmp_path, name, text))
         assert found.verdicts_of_stacks == wanted and len({*found.plan.stacks}) == 6
         assert len({*found.plan.names}) == len(found.plan)
+
+
+def test_lists_beside_the_boxes(tmp_path):
+    """One that may have boxes is told; --ignore chooses one of two that have."""
+    boxes = [{'id': n, **dict(zip(('x_min', 'y_min', 'z_min', 'l', 'w', 'h'), box))}
+             for n, box in enumerate(BOXES)]
+    path = written(tmp_path, 'a.json', json.dumps({'goods': boxes, 'left': [{'id': 9}]}))
+    (fault,) = read_plan(path, unit='mm').faults
+    assert (fault.kind, fault.names, fault.verdict) == ('part', ('left',), 'not all judged')
+    assert not read_plan(path, unit='mm', ignore=['left']).faults
+    path = written(tmp_path, 'a.json', json.dumps({'old': [{**box, 'n': 1} for box in boxes],
+                                                   'new': boxes[:1]}))
+    with pytest.raises(ValueError, match='are the boxes, old or new.*add --ignore new'):
+        read_plan(path, unit='mm')
+    plan = read_plan(path, unit='mm', ignore=['old'])
+    assert plan.names == ('0', 'ground') and not plan.faults
+
+
+def test_bare_lists_are_columns_by_number(tmp_path):
+    path = written(tmp_path, 'a.json', json.dumps({'boxes': BOXES}))
+    names = ('x_min', 'y_min', 'z_min', 'length', 'width', 'height')
+    plan = read_plan(path, unit='mm', columns=dict(zip(names, '012345')))
+    assert len(plan) == 4 and inspect_plan(plan).sound
+
+
+def test_a_row_without_a_container_is_left_out(tmp_path):
+    text = sheet('a,1,1,1,0,0,.5,1', 'b,1,1,1,3,0,.5,', more=',pallet')
+    (fault,) = read_plan(written(tmp_path, 'a.csv', text)).faults
+    assert fault.text == 'row 2: pallet is missing: left out' and fault.names == ('b',)
 
 
 def test_a_container_with_an_inner_size(tmp_path):
