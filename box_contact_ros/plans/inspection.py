@@ -200,7 +200,7 @@ class Inspection:
 
     @cached_property
     def verdicts_of_stacks(self) -> list[str]:
-        """The verdict of the boxes of each of the plan's `stacks`."""
+        """Return the verdict of the boxes of each of the plan's `stacks`."""
         plan = self.plan
         stack_of = dict(zip(plan.names, plan.stack.tolist())) | {
             name: stack for stack, name in enumerate(plan.stacks)}

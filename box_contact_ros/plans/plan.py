@@ -85,12 +85,12 @@ class Fault:
 
     @property
     def verdict(self) -> str:
-        """The best of VERDICTS that a plan with this fault can have."""
+        """Return the best of VERDICTS that a plan with this fault can have."""
         return FAULT_KINDS[self.kind][0]
 
     @property
     def lacks(self) -> str:
-        """What each of the boxes or rows lacks, one of LACKS."""
+        """Return what each of the boxes or rows lacks, one of LACKS."""
         return FAULT_KINDS[self.kind][1]
 
 

@@ -65,12 +65,12 @@ class View:
     """(n, 3)."""
 
     @property
-    def picture(self) -> np.ndarray:
-        """The directions to the right and the upper edge of the picture (2, 3)."""
-        return _picture(self.viewer)
+    def edges(self) -> np.ndarray:
+        """Return the directions to the right and the upper edge of the picture (2, 3)."""
+        return _edges(self.viewer)
 
 
-def _picture(viewer: np.ndarray) -> np.ndarray:
+def _edges(viewer: np.ndarray) -> np.ndarray:
     right = np.cross((0.0, 0.0, 1.0), viewer) / np.hypot(*viewer[:2])
     return np.stack((right, np.cross(viewer / np.linalg.norm(viewer), right)))
 
@@ -152,7 +152,7 @@ def _drawn(plan: Plan) -> np.ndarray:
 def view_from(viewer: np.ndarray, sizes: np.ndarray, poses: np.ndarray) -> View:
     """Return boxes as they are seen from a direction."""
     axes = rotation_matrix(poses[:, 3:])
-    faces = _on_faces(viewer, sizes, poses, _RING) @ _picture(viewer).T
+    faces = _on_faces(viewer, sizes, poses, _RING) @ _edges(viewer).T
     return View(viewer, faces, np.take(SHADES[::-1], np.abs(axes).argmax(axis=1)))
 
 
@@ -188,7 +188,7 @@ def _best_view(sizes: np.ndarray, poses: np.ndarray, faulty: Sequence[int],
         area = np.abs(one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0]) / 2.0
         total = float((seen.reshape(len(faulty), 3, len(SPOTS)).mean(axis=2) * area).sum())
         if total > most:
-            best, most = (view, spots @ view.picture.T, seen), total
+            best, most = (view, spots @ view.edges.T, seen), total
     assert best is not None
     return best
 

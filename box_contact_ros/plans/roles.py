@@ -262,7 +262,6 @@ class Finder:
                       if name in told or not is_named(name, given.ignore)}
         for name, role in told.items():
             self.words[name] = Word('', role.replace('_', ''), self.words[name].unit)
-        self.told = {word_of(role).key for role in told.values()}
         self.taken = self._taken()
 
     def _taken(self) -> Taken:
@@ -286,6 +285,9 @@ class Finder:
                                  'kg', None))
         self._ask_missing(size or kind == 'corners', place, taken)
         angles = [single[role] for role in ANGLES if role in single]
+        if turn and angles:
+            self.open.ask(f'which is the turn, {" ".join(turn.words)} or {" ".join(angles)}?',
+                          *words_of('--ignore', angles))
         taken = replace(taken, unit=self._length_unit(taken), turns=self._angle_unit(angles))
         is_low = kind == 'centre' and self.open.questions and place and min(
             self.table.numbers(place.words['xyz'.index(taken.up)]), default=1.0) <= 0.0

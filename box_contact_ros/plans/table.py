@@ -99,7 +99,7 @@ class Table:
 
     @cached_property
     def decimal_mark(self) -> str:
-        """The decimal mark of texts, as those tell that cannot have a mark of thousands."""
+        """Return the decimal mark of texts, as those tell that cannot have a mark of thousands."""
         if self.mark:
             return self.mark
         found = {parts[2] for column in self.columns for value in self.values(column)
@@ -109,12 +109,12 @@ class Table:
 
     @cached_property
     def lists(self) -> list[Rows]:
-        """The lists of the rows, in order."""
+        """Return the lists of the rows, in order."""
         return [*{id(record.rows): record.rows for record in self.records}.values()]
 
     @cached_property
     def _cells_above(self) -> dict[str, list[Cells]]:
-        """All that stands above rows, by path."""
+        """Return all that stands above rows, by path."""
         found: dict[str, dict[int, Cells]] = {}
         for rows in self.lists:
             for path, cells in rows.above:

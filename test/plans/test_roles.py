@@ -118,6 +118,8 @@ ASKED = {
     'net alone': (sheet('a,1,1,1,0,0,.5,9', more=',net'), 'is net the mass?; if it is so, add '
                   '--column mass=net'),
     'radians or degrees': (sheet('a,1,1,1,0,0,.5,1.5', more=',yaw'), 'is yaw in degrees or radi'),
+    'two turns': (sheet('a,1,1,1,0,0,.5,0,0,0,1,90', more=',qx,qy,qz,qw,yaw'), 'which is the turn, '
+                  'qx qy qz qw or yaw?; if it is so, add --ignore yaw'),
     'two containers': (sheet('a,1,1,1,0,0,.5,1,2', more=',pallet,truck'), 'which is the container, '
                        'pallet or truck'),
     'mixed units': ('name,x_mm,y_mm,z_mm,l_cm,w_cm,h_cm\na,0,0,5,1,1,1\n', 'do not have one unit'),
