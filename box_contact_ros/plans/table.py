@@ -232,8 +232,9 @@ def _records(value: Any, path: str, above: tuple[tuple[str, Cells], ...], label:
         cells, lists = _parted(value)
         if cells:
             above = (*above, (path, cells))
+        name = _label(cells)
         for key, inner in lists:
-            yield from _records(inner, _joined(path, key), above, _label(cells) or key)
+            yield from _records(inner, _joined(path, key), above, name or key)
     elif isinstance(value, Sequence) and not isinstance(value, str):
         rows = Rows(label, above)
         for number, entry in enumerate(value, 1):
@@ -241,9 +242,10 @@ def _records(value: Any, path: str, above: tuple[tuple[str, Cells], ...], label:
                 entry = {str(n): part for n, part in enumerate(entry)}
             cells, lists = _parted(entry) if isinstance(entry, Mapping) else ({}, [])
             yield path, Record(number, cells, rows)
+            name = _label(cells) if lists else ''
             for key, inner in lists:
                 yield from _records(inner, _joined(path, key), (*above, (path, cells)),
-                                    _label(cells) or f'{key} {number}')
+                                    name or f'{key} {number}')
 
 
 def _label(cells: Cells) -> str:
