@@ -182,6 +182,11 @@ REFUSED = {
     'container': ('a.csv', sheet('a,1,1,1,0,0,.5'), {'container': (1, 2)}, 'container must be'),
     'container in a file': ('a.json', '{"container": [1, 2, 0], ' + document()[1:], {},
                             r'three inner sizes above 0, not \[1, 2, 0\]'),
+    'a bin twice': ('a.csv', packingsolver(False).replace('ITEM,', 'BIN,0,1,0,0,0,0,9,9,9,\nITEM,',
+                                                            1),
+                    {'unit': 'mm'}, 'the bin 0 comes twice'),
+    'copies': ('a.csv', packingsolver(False).replace('ITEM,0,1', 'ITEM,0,2'), {'unit': 'mm'},
+               "COPIES of 0 is '2': a row is one box"),
     'of a ship': ('a.edi', '', {'unit': 'mm'}, 'unit must not be given'),
     'decimal commas': ('a.csv', sheet('a,1,2,1,0,1,0,0,0,0,0,0,5'), {}, 'are commas decimal marks'),
 }
@@ -327,3 +332,19 @@ def test_a_load_leans_on_a_wall(tmp_path: Path) -> None:
     assert [str(row) for row in found.rows()][:1] == [
         'outside               high  12.0 mm beyond +x']
     assert not len(found.overlaps) and found.verdict == 'not sound'
+
+
+@pytest.mark.parametrize(('changed', 'status', 'words'), [
+    ({'orientation': '1'}, 1, 'overlap'), ({'orientation': 2}, 3, 'orientation is 2: left out'),
+    ({'orientation': 0}, 0, 'sound'), ({'orientation': None}, 3, 'orientation is None: left out'),
+    ({'orientation': 0, 'flb_coordinates': [150, 0, 0, 7]}, 3, 'flb_coordinates.3')])
+def test_an_order_of_bed_bpp_that_is_odd(changed, status, words, tmp_path, capsys) -> None:
+    """An orientation that was a text was not a turn, and a fourth coordinate was passed over."""
+    pytest.importorskip('clarabel')
+    goods = {'sequence': 1, 'weight/kg': 1, 'length/mm': 100, 'width/mm': 300, 'height/mm': 100}
+    first = {'flb_coordinates': [0, 0, 0], 'orientation': 0, 'item': goods}
+    second = {**first, 'flb_coordinates': [150, 0, 0], 'item': {**goods, 'sequence': 2}, **changed}
+    third = {**first, 'flb_coordinates': [300, 0, 0], 'item': {**goods, 'sequence': 3}}
+    path = written(tmp_path, 'a.json', json.dumps({'o': [first, second, third]}))
+    assert inspect_files.main([str(path)]) == status
+    assert words in capsys.readouterr().out
