@@ -510,19 +510,7 @@ def hull_edges(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     A hull without an inside has edges on either side, or one without a normal.
     """
-    ordered = sorted({*map(tuple, points.tolist())})
-    corners: list[tuple[float, float]] = []
-    for side in ordered, ordered[::-1]:
-        begun = len(corners)
-        for x, y in side:
-            while len(corners) > begun + 1:
-                (ax, ay), (bx, by) = corners[-2:]
-                if (bx - ax) * (y - ay) > (by - ay) * (x - ax):
-                    break
-                corners.pop()
-            corners.append((x, y))
-        corners.pop()
-    start = np.array(corners or ordered)
+    start = native.hull(np.ascontiguousarray(points))
     along = np.roll(start, -1, axis=0) - start
     length = np.linalg.norm(along, axis=1, keepdims=True)
     return start, np.column_stack((-along[:, 1], along[:, 0])) / np.where(length > 0.0, length, 1.0)
