@@ -168,7 +168,7 @@ setup(
         'bag': ['rosbags'],
         'soup': ['python-fcl'],
         # The statics of plans.
-        'plans': ['clarabel>=0.11', 'defusedxml', 'scipy', 'tqdm'],
+        'plans': ['clarabel>=0.11', 'scipy', 'tqdm'],
         'train': ['torch==2.13.0', 'tqdm'],
         'report': ['matplotlib', 'tqdm'],
         'fuzz': ['gmpy2', 'mpmath', 'tqdm'],

@@ -16,6 +16,7 @@ import csv
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import cache, partial
 from itertools import compress
 from pathlib import Path
@@ -37,7 +38,7 @@ SIZES, LAYER, SPREAD = (100, 900), 200, (240, 900)  # [mm]
 HEIGHTS = (100, 200, 300)  # of goods [mm]
 MASSES, LOADED = (1.0, 40.0), (2e3, 30e3)
 LEFT = 0.95  # of the boxes of real plans
-FRICTION = 0.5
+FRICTION, FRICTIONS, MOST_FELT = 0.5, (0.1, 0.9), 0.3
 NEED = 1e-4
 """The tolerance of `inspect_plan`: its boxes stand by more."""
 RIM, ROBUST = 1e-4, 5e-3
@@ -119,21 +120,22 @@ KINDS: dict[str, Callable[[np.random.Generator], Plan]] = {
 """Boxes of any height, of one, and of few, as real goods have; then a real pallet and ship."""
 
 
-def compare(plan: Plan) -> Found:
-    """Judge a plan of upright boxes by both."""
-    stands = inspect_plan(plan, friction=FRICTION).stands
+def compare(plan: Plan, felt: tuple[float, float] = (0.0, 0.0)) -> Found:
+    """Judge a plan of upright boxes by both; felt: beside gravity, along x and y [of gravity]."""
+    stands = inspect_plan(plan, friction=FRICTION, acceleration=9.81 * np.array(
+        [*felt, -1.0])).stands
     fixed = np.isin(np.arange(len(plan)), plan.ground)
     as_it_is, beyond, robust = (
-        Upright(plan.sizes, plan.poses, plan.masses, fixed, sooner=by)
-        for by in (0.0, NEED + RIM, NEED + ROBUST))
+        Upright(plan.sizes, plan.poses, plan.masses, fixed, plan.frictions(FRICTION), felt,
+                sooner=by) for by in (0.0, NEED + RIM, NEED + ROBUST))
     groups = as_it_is.groups()
     stand = [boxes for boxes in groups if stands[boxes].all()]
     fall = [boxes for boxes in groups if not stands[boxes].all()]
     faults = [f'boxes {boxes} stand, and have no loads'
-              for boxes in compress(stand, ~as_it_is.holds(stand, FRICTION))]
-    held = beyond.holds(fall, INSCRIBED * FRICTION)
+              for boxes in compress(stand, ~as_it_is.holds(stand, 1.0))]
+    held = beyond.holds(fall, INSCRIBED)
     for boxes in compress(fall, held):
-        much = robust.holds([boxes], INSCRIBED * FRICTION).all()
+        much = robust.holds([boxes], INSCRIBED).all()
         faults.append(f'boxes {boxes}: {stands[boxes].sum()} of them stand, and there are loads'
                       f'{", robustly" if much else ""}')
     on_rim = np.count_nonzero(as_it_is.holds(fall) & ~held)
@@ -141,8 +143,14 @@ def compare(plan: Plan) -> Found:
 
 
 def examine(seed: int, number: int) -> Found:
-    """Draw and judge the plan of a number."""
-    return compare(draw(seed, number))
+    """Draw and judge the plan of a number; each third has a friction of each box, and brakes."""
+    plan = draw(seed, number)
+    if number % 3:
+        return compare(plan)
+    rng = np.random.default_rng([seed, number, 3])
+    felt = rng.uniform(-MOST_FELT, MOST_FELT, 2)
+    return compare(replace(plan, friction=rng.uniform(*FRICTIONS, len(plan))),
+                   (float(felt[0]), float(felt[1])))
 
 
 def fuzz(total: int, *, seed: int = 1, workers: int = 1) -> int:

@@ -22,7 +22,7 @@ MODULES = {
             'rcl_interfaces', 'std_msgs', 'std_srvs', 'visualization_msgs'),
     'sim': ('mujoco',), 'view': ('viser',), 'soup': ('fcl',), 'train': ('torch',),
     'report': ('matplotlib', 'PIL', 'tqdm'), 'fuzz': ('gmpy2', 'mpmath'),
-    'plans': ('clarabel', 'scipy', 'defusedxml')}
+    'plans': ('clarabel', 'scipy')}
 """The modules of each extra; an extra is missing where its first module is."""
 EXTRA_OF = {module: extra for extra, modules in MODULES.items() for module in modules}
 APT = ', or apt install ros-jazzy-ros-base and source /opt/ros/jazzy/setup.bash'

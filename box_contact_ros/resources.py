@@ -71,8 +71,8 @@ def open_regular(path: str | os.PathLike[str]) -> BinaryIO:
 
 def read_regular(path: str | os.PathLike[str], most_bytes: int) -> bytes:
     """Return the bytes of a file. Raises OSError for what is no file, or has more bytes."""
-    with open_regular(path) as file:
-        content = file.read(most_bytes + 1)
+    with open_regular(path) as file:  # which asks for as much memory as it may read
+        content = file.read(min(os.fstat(file.fileno()).st_size, most_bytes) + 1)
     if len(content) > most_bytes:
         raise OSError(f'it has more than {most_bytes} bytes')
     return content

@@ -121,7 +121,7 @@ EXTRAS = {
     'sim': ('mujoco',), 'bag': ('rosbags',), 'soup': ('fcl',), 'view': ('viser',),
     'train': ('safetensors', 'torch', 'tqdm'), 'report': ('matplotlib', 'tqdm'),
     'peers': ('coal', 'pybullet'), 'fuzz': ('mpmath',),
-    'plans': ('clarabel', 'defusedxml', 'scipy', 'tqdm'),
+    'plans': ('clarabel', 'scipy', 'tqdm'),
     'test': ('catkin_pkg', 'gmpy2', 'hypothesis')}
 """The modules of each extra of setup.py that tests import."""
 

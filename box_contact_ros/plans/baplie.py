@@ -45,6 +45,8 @@ UNITS = {'KGM': 1.0, 'KG': 1.0, 'T': 1000.0, 'LBR': 0.45359237, 'TNE': 1000.0}
 LIGHTEST, HEAVIEST = 1e3, 60e3
 """[kg] of a container with its goods. An empty 10 ft has 1.3 t, and the standard allows 36 t. What
 is below may have been written with a mark of thousands, or in tonnes."""
+MESSAGES = ('BAPLIE', 'MOVINS')
+"""A stowage plan, and stowage instructions, which have the same segments."""
 NOT_STOWED = '9999999'
 """The slot of a container that has none yet."""
 GROSS = ('WT', 'VGM', 'G', 'AET')
@@ -101,8 +103,9 @@ def read_baplie(text: str) -> Plan:
     """Return the plan of a file; its faults are rows. Raises ValueError where it is no BAPLIE."""
     parts = segments(text)
     kinds = {part(row, 2).split(':')[0] for row in parts if row[0] == 'UNH'}
-    if kinds and 'BAPLIE' not in kinds:
-        raise ValueError(f'its message is {" and ".join(sorted(kinds))}; a stowage plan is BAPLIE')
+    if kinds and not kinds & {*MESSAGES}:
+        raise ValueError(f'its message is {" and ".join(sorted(kinds))}; a stowage plan is '
+                         f'{" or ".join(MESSAGES)}')
     rows = list(containers(parts))
     if not rows:
         raise ValueError('it has no container: neither LOC+147 nor EQD+CN')
@@ -170,8 +173,16 @@ def containers(parts: Iterable[list[str]]) -> Iterator[Stowed]:
 def _weigh(row: Stowed, segment: list[str]) -> None:
     """Take the mass of MEA+WT++KGM:1, MEA+VGM++KGM:1 or MEA+AAE+VGM+KGM:1."""
     what = part(segment, 2) if part(segment, 1) == 'AAE' else part(segment, 1)
-    if what in GROSS and (not row.mass or (what == 'VGM' and not row.is_weighed)):
-        row.mass, row.is_weighed = _shown(part(segment, 3)), what == 'VGM'
+    mass = _shown(part(segment, 3))
+    is_weighed = what == 'VGM'
+    if what in GROSS and (not row.mass or (_is_empty(row.mass) or is_weighed and not row.is_weighed)
+                          and not _is_empty(mass)):
+        row.mass, row.is_weighed = mass, is_weighed
+
+
+def _is_empty(mass: str) -> bool:
+    """Return whether the number of a mass is missing or 0, as in KGM, KGM: and KGM:0."""
+    return not mass.partition(':')[2].strip('0. :')
 
 
 def _measure(row: Stowed, segment: list[str]) -> None:
@@ -232,9 +243,8 @@ def checked(rows: Iterable[Stowed], faults: list[Fault]) -> tuple[list[Placed], 
     for row in rows:
         size = extents_of(row.kind)
         if row.over:
-            faults.append(Fault('dimension', (row.name,), f'reaches beyond its container, which is '
-                                                          f'not judged: {", ".join(row.over)}',
-                                lacks='shape'))
+            faults.append(Fault('goods', (row.name,), 'reaches beyond its container, which is not '
+                                                      f'judged: {", ".join(row.over)}'))
         if row.slot == NOT_STOWED:
             not_stowed.append(row.number or row.slot)
         elif not row.is_container:
@@ -242,9 +252,8 @@ def checked(rows: Iterable[Stowed], faults: list[Fault]) -> tuple[list[Placed], 
         elif not re.fullmatch('(?!000)[0-9]{7}', row.slot):  # bays begin at 1
             forms[len(row.slot)].append(row.name)
         elif row.slot in placed:
-            faults.append(Fault('twice', (row.slot,), f'{row.number or "a container"} has the slot '
-                                                      f'of {placed[row.slot].number or "another"}: '
-                                                      'left out', lacks='place'))
+            faults.append(Fault('slot taken', (row.slot,), f'{row.number or "a container"} has the '
+                                f'slot of {placed[row.slot].number or "another"}: left out'))
         elif size is None:
             unknown[row.kind].append(row.slot)
         else:
@@ -301,7 +310,7 @@ def _mass(row: Stowed, faults: list[Fault]) -> float:
         elif mass > HEAVIEST:
             fault = f'its weight is {number} {unit}, more than any container'
     if fault:
-        faults.append(Fault('mass', (row.slot,), fault, lacks='sure weight' if mass else 'weight'))
+        faults.append(Fault('weight' if mass else 'mass', (row.slot,), fault))
     return mass
 
 
@@ -318,8 +327,8 @@ def stow(boxes: list[Placed], left_out: list[Slot], faults: list[Fault]) -> Plan
     lowest = [n for on_deck in (False, True)
               for n in _stack(boxes, left_out, on_deck, size, pose, held, faults)]
     if held:
-        faults.append(Fault('slot', tuple(boxes[n].slot for n in held), 'stands on what is left '
-                            'out: taken as fixed, and not judged', lacks='judgement'))
+        faults.append(Fault('held', tuple(boxes[n].slot for n in held), 'stands on what is left '
+                            'out: taken as fixed, and not judged'))
     slabs, below = size[lowest].copy(), pose[lowest].copy()
     slabs[:, 2] = SLAB
     below[:, 2] -= (size[lowest, 2] + SLAB) / 2.0
@@ -388,9 +397,9 @@ def _stack(boxes: list[Placed], left_out: list[Slot], on_deck: bool, size: np.nd
                 faults.append(Fault('gap', (box.slot,), 'has no container below it down to the '
                                                         'deck'))
             elif box.tier > min(begun, default=box.tier):
-                faults.append(Fault('slot', (box.slot,), (
+                faults.append(Fault('base', (box.slot,), (
                     f'begins a stack, as others of its bay do at tier {min(begun)}: taken as on '
-                    'the ship'), verdict='sound', lacks=''))
+                    'the ship')))
             bases[blocks[n]].add(box.tier)
         pose[n, 2] = floor + size[n, 2] / 2.0
     return lowest

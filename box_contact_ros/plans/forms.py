@@ -1,294 +1,113 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The forms in which packers write a plan: the columns or keys of each, its unit and its origin.
+"""The forms of packers whose axes or turns differ from those of other tables, as data.
 
-A form is known by its whole header, or by the keys of its JSON.
+A table is known by its whole header, one of JSON by columns that no other has.
 """
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
-from ..solver.checks import short_repr
-from .plan import Fault
-
-EXTENTS, PLACE, TURN = ('length', 'width', 'height'), ('x', 'y', 'z'), ('qx', 'qy', 'qz', 'qw')
-LEAST, GREATEST = ('x_min', 'y_min', 'z_min'), ('x_max', 'y_max', 'z_max')
-SIZES = (EXTENTS, ('lx', 'ly', 'lz'), ('dx', 'dy', 'dz'), GREATEST)
-"""What the columns of a box's size may be called; with the last, two corners tell it."""
-PLACES = (PLACE, LEAST)
-"""What the columns of a box's place may be called: its centre, its least corner."""
-ORIGINS = ('centre', 'corner')
-UNITS = {'m': 1.0, 'cm': 1e-2, 'mm': 1e-3}
-
-
-class Given(NamedTuple):
-    """What the caller tells of a packing plan, where the file does not."""
-
-    origin: str | None = None
-    """One of ORIGINS: what `x y z` are."""
-    unit: str | None = None
-    """One of UNITS."""
-    container: Sequence[float] | None = None
-    """(3,) inner size, in the unit of the file."""
-
-
-NOTHING = Given()
+from .roles import Taken
+from .table import Table
 
 
 @dataclass(frozen=True)
 class Form:
-    """A form of a packer.
-
-    Raises ValueError for a header and keys that are not as many.
-    """
+    """A form of a packer."""
 
     title: str
-    unit: str | None
+    header: tuple[str, ...]
+    """All columns of a CSV file in lower case, or some of a JSON document."""
+    taken: Taken
+    unit: str | None = None
     """One of UNITS; None: the form has none."""
-    header: tuple[str, ...] = ()
-    """Of a table, in lower case."""
-    keys: tuple[str, ...] = ()
-    """What each column is called by us; '': it is not read."""
-    repeats: bool = True
-    """Whether a name is that of a kind of box, so that the row's number tells boxes apart."""
+    turned: tuple[str, Mapping[int, tuple[int, ...]]] = ('', {})
+    """A column, and which of the sizes are along x y z by its number."""
+    above: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Keys of what is just above: `room`, and `most`, the greatest mass in it [kg]."""
+    kinds: str = ''
+    """The column that tells items from bins and stacks."""
+    frames: str = 'own'
     in_line: bool = False
     """Whether a container begins where the one before it ends, along x."""
-    note: str = ''
-    """What a reader may take otherwise."""
 
 
-def _table(title: str, unit: str | None, header: str, keys: str, **more: Any) -> Form:
-    return Form(title, unit, tuple(header.lower().split(',')), tuple(keys.split(',')), **more)
+def _csv(title: str, header: str, unit: str | None, taken: Taken, **more: object) -> Form:
+    return Form(title, tuple(header.lower().split(',')), replace(taken, is_corner=True), unit,
+                **more)  # type: ignore[arg-type]
 
 
-CORNERS = 'x_min,y_min,z_min,x_max,y_max,z_max'
-ENDS = 'X origin,Y origin,Z origin,X extremity,Y extremity,Z extremity'
-TABLES = (
-    _table('a solution of packingsolver', None,
-           'TYPE,ID,COPIES,BIN,X,Y,Z,LX,LY,LZ,ROTATION',
-           'type,name,,stack,x_min,y_min,z_min,lx,ly,lz,'),
-    _table('a solution of packingsolver', None,
-           'TYPE,ID,COPIES,BIN,STACK,X,Y,Z,LX,LY,LZ,GROUP_ID',
-           'type,name,,stack,,x_min,y_min,z_min,lx,ly,lz,'),
-    _table('items of the ROADEF challenge 2022', 'mm',
-           f'Item ident,Id truck,Id stack,Item code,{ENDS}', f',stack,,name,{CORNERS}',
-           repeats=False),
-    _table('stacks of the ROADEF challenge 2022', 'mm',
-           f'Id truck,Id stack,Stack code,{ENDS}', f'stack,,name,{CORNERS}', repeats=False),
-    _table("a solution of D-Wave's 3d-bin-packing", None,
-           "case_id,bin_location,orientation,x,y,z,x',y',z'",
-           'name,stack,,x_min,y_min,z_min,lx,ly,lz', in_line=True))
-"""Of CSV files and tables of text, each by its whole header."""
-OWN = Form('', 'm')
-BED_BPP = Form('orders of BED-BPP', 'mm')
-VIEWER = Form('containers of 3d-bin-container-packing', 'mm')
-BENCHMARK = Form('a pallet of palletizing-benchmark', 'm')
-PY3DBP = Form('what py3dbp packed', None, note=', and z, the depth, is up')
-ROTATIONS = dict(enumerate(((0, 1, 2), (1, 0, 2), (1, 2, 0), (2, 1, 0), (2, 0, 1), (0, 2, 1))))
-"""Which of width, height and depth are along x, y and z, by py3dbp's `rotation_type`."""
-AMOUNT = re.compile(
-    '.*(mass|weight|gewicht|poids|peso|limit|capacity|strength|payload|traglast|auflast).*|'
-    'kgs?|kilos?|kilograms?|lbs?|kn|tons?|tonnes?|gross|net|tare|brutto|'
-    'netto|vgm|max|maximum|stackable|maxload')
-"""Words in the names of columns that may mean a mass or a limit."""
-Row = Mapping[str, Any]
+XYZ, LENGTHS = ('x', 'y', 'z'), ('lx', 'ly', 'lz')
+ENDS = tuple(f'{axis} {end}' for end in ('origin', 'extremity') for axis in XYZ)
+SOLVER = Taken(LENGTHS, True, XYZ, single={'name': 'id', 'container': 'bin', 'count': 'copies'},
+               quiet=frozenset(('type', 'rotation', 'stack', 'group_id')))
+TRUCKS = Taken((), True, ENDS, quiet=frozenset(('item ident', 'id stack')))
+FORMS = (
+    _csv('a solution of packingsolver', 'TYPE,ID,COPIES,BIN,X,Y,Z,LX,LY,LZ,ROTATION', None, SOLVER,
+         kinds='type'),
+    _csv('a solution of packingsolver', 'TYPE,ID,COPIES,BIN,STACK,X,Y,Z,LX,LY,LZ,GROUP_ID', None,
+         SOLVER, kinds='type'),
+    _csv('items of the ROADEF challenge 2022',
+         f'Item ident,Id truck,Id stack,Item code,{",".join(ENDS)}', 'mm',
+         replace(TRUCKS, single={'name': 'item code', 'container': 'id truck'})),
+    _csv('stacks of the ROADEF challenge 2022', f'Id truck,Id stack,Stack code,{",".join(ENDS)}',
+         'mm', replace(TRUCKS, single={'name': 'stack code', 'container': 'id truck'})),
+    _csv("a solution of D-Wave's 3d-bin-packing",
+         "case_id,bin_location,orientation,x,y,z,x',y',z'", None,
+         Taken(("x'", "y'", "z'"), True, XYZ, quiet=frozenset(('orientation',)),
+               single={'name': 'case_id', 'container': 'bin_location'}), frames='one',
+         in_line=True),
+    Form('orders of BED-BPP', ('flb_coordinates.2', 'orientation', 'item.length/mm'), Taken(
+        ('item.length/mm', 'item.width/mm', 'item.height/mm'), True,
+        ('flb_coordinates.0', 'flb_coordinates.1', 'flb_coordinates.2'), True,
+        single={'name': 'item.sequence', 'mass': 'item.weight/kg'},
+        quiet=frozenset(('item.product_group', 'item.article', 'item.id'))), 'mm',
+         ('orientation', {0: (0, 1, 2), 1: (1, 0, 2)})),
+    Form('what py3dbp packed, whose depth is up',
+         ('position.2', 'rotation_type', 'width', 'height', 'depth'), Taken(
+             ('width', 'height', 'depth'), True, ('position.0', 'position.1', 'position.2'), True,
+             single={'name': 'name', 'mass': 'weight'}), None,
+         ('rotation_type', dict(enumerate(((0, 1, 2), (1, 0, 2), (1, 2, 0), (2, 1, 0), (2, 0, 1),
+                                           (0, 2, 1))))),
+         {'room': ('width', 'height', 'depth'), 'most': ('max_weight',)}))
 
 
-class Item(NamedTuple):
-    """A row of a file: its number from 1, the container or order it is in, and what it says."""
-
-    number: int
-    stack: str
-    row: Any
-
-
-@dataclass
-class Packing:
-    """What a file says, by our keys and in its own unit."""
-
-    form: Form
-    items: Iterable[Item]
-    rooms: dict[str, Sequence[Any]] = field(default_factory=dict)
-    """The inner size of each container (3,)."""
-    most: dict[str, Any] = field(default_factory=dict)
-    """The most that may be in each container [kg]."""
-    faults: list[Fault] = field(default_factory=list)
+def form_of(table: Table) -> Form | None:
+    """Return the form of a table, with the names as the table has them, or None."""
+    columns = [' '.join(name.split()).lower() for name in table.columns]
+    for form in FORMS:
+        if form.header == tuple(columns):
+            return _renamed(form, dict(zip(columns, table.columns)), table)
+        if {*form.header} <= {*table.columns} and not {*form.header} & {*table.above}:
+            names = {name: name for name in table.columns}
+            if 'partno' in names:
+                names['name'] = 'partno'
+            return _renamed(form, names, table)
+    return None
 
 
-def table_form(header: Sequence[str]) -> Form | None:
-    """Return the form that has this header, or None."""
-    columns = tuple(' '.join(name.split()).lower() for name in header)
-    return next((form for form in TABLES if form.header == columns), None)
+def is_header(cells: list[str]) -> bool:
+    """Return whether these cells are the header of a form."""
+    return tuple(' '.join(cell.split()).lower() for cell in cells) in {
+        form.header for form in FORMS}
 
 
-def table_packing(form: Form, rows: Iterable[tuple[int, Row]]) -> Packing:
-    """Return what a table of a form says; rows: numbered, by the form's keys."""
-    packing = Packing(form, [])
-    items = []
-    for number, row in rows:
-        values = dict(row)
-        stack, kind = str(values.pop('stack', '')), str(values.pop('type', 'ITEM')).upper()
-        if kind == 'BIN':
-            packing.rooms[stack] = [values.get(key) for key in ('lx', 'ly', 'lz')]
-        elif kind == 'ITEM':
-            label = (stack, values.get('name'), number if form.repeats else None)
-            items.append(Item(number, stack, {**values, 'name': '/'.join(
-                str(part) for part in label if part is not None)}))
-        elif kind != 'STACK':  # which is the box around items
-            packing.faults.append(Fault('shape', (f'row {number}',), f'{kind}: not read'))
-    packing.items = items
-    return packing
-
-
-def document_packing(document: Any) -> Packing | None:
-    """Return what a JSON document of a known packer says, or None if it has another form."""
-    readers: tuple[Callable[[Any], Packing | None], ...] = (
-        _benchmark, _viewer, _bed_bpp, _py3dbp, _py3dbp_answer)
-    return next(filter(None, (read(document) for read in readers)), None)
-
-
-def _lists(document: Any, key: str, *within: str) -> bool:
-    """Return whether a key has a list of objects, each with some keys."""
-    return isinstance(document, Mapping) and isinstance(document.get(key), list) and all(
-        isinstance(entry, Mapping) and entry.keys() >= {*within} for entry in document[key])
-
-
-def _items(stack: str, entries: Iterable[Any], read: Callable[[Any], Row], *,
-           numbered: bool = False) -> Iterator[Item]:
-    """Yield what is read of entries. Raises ValueError for one that lacks a key.
-
-    numbered: whether names are those of kinds of boxes, so that a number tells boxes apart.
-    """
-    for n, entry in enumerate(entries, 1):
-        try:
-            row = read(entry)
-        except (LookupError, TypeError, AttributeError) as error:
-            raise ValueError(f'{stack or "boxes"}, entry {n}: it lacks {error}') from None
-        parts = [*([stack] if stack else []), row['name'] or n, *([n] if numbered else [])]
-        yield Item(n, stack, {**row, 'name': '/'.join(map(str, parts))})
-
-
-def _amounts(goods: Row, *read: str) -> Row:
-    """Return what may mean a mass or a limit and is not read."""
-    return {key: value for key, value in goods.items() if key not in read and means_amount(key)}
-
-
-def _benchmark(document: Any) -> Packing | None:
-    if not (_lists(document, 'boxes', 'position', 'dimensions') and 'kind' in document):
-        return None
-    if document['kind'] != 'placed':
-        raise ValueError(f'its kind is {short_repr(document["kind"])}: the boxes have no place')
-
-    def read(entry: Any) -> Row:
-        return {'name': f'{entry["sku_id"]}/{entry["id"]}', 'mass': entry['weight'],
-                **dict(zip(EXTENTS, map(entry['dimensions'].__getitem__, sides))),
-                **dict(zip(PLACE, map(entry['position'].__getitem__, PLACE))),
-                **_amounts(entry, 'weight'), **_amounts(container)}
-    sides = ('width', 'depth', 'height')
-    container = document.get('container')
-    container = container if isinstance(container, Mapping) else {}
-    packing = Packing(BENCHMARK, list(_items('', document['boxes'], read)))
-    if container:
-        packing.rooms[''] = [container.get(side) for side in sides]
-    return packing
-
-
-def _viewer(document: Any) -> Packing | None:
-    if not _lists(document, 'containers'):
-        return None
-
-    def read(entry: Any) -> Row:
-        goods = entry['stackable']
-        return {'name': goods.get('name'), **{key: goods[key] for key in ('dx', 'dy', 'dz')},
-                **dict(zip(LEAST, map(entry.__getitem__, PLACE))), **_amounts(goods),
-                **_amounts(container)}
-    items: list[Item] = []
-    packing = Packing(VIEWER, items)
-    for container in document['containers']:
-        stack = str(container.get('name'))
-        if not _lists(container.get('stack'), 'placements'):
-            raise ValueError(f'container {stack}: it lacks a stack with placements')
-        items += _items(stack, container['stack']['placements'], read, numbered=True)
-        if 'loadDx' in container:
-            packing.rooms[stack] = [container.get(key) for key in ('loadDx', 'loadDy', 'loadDz')]
-    return packing
-
-
-def _bed_bpp(document: Any) -> Packing | None:
-    if not (isinstance(document, Mapping) and document and all(
-            _lists(document, name, 'flb_coordinates') and document[name] for name in document)):
-        return None
-
-    def read(entry: Any) -> Row:
-        item = entry['item']
-        extents = [item[f'{side}/mm'] for side in EXTENTS]
-        if entry['orientation'] == 1:
-            extents[:2] = extents[1::-1]
-        return {'name': item['sequence'], 'mass': item['weight/kg'], **dict(zip(EXTENTS, extents)),
-                **dict(zip(LEAST, entry['flb_coordinates'])), **_amounts(item, 'weight/kg')}
-    return Packing(BED_BPP, [item for name, order in document.items()
-                             for item in _items(name, order, read)])
-
-
-def _py3dbp(document: Any) -> Packing | None:
-    """Read the attributes of its bins and their items."""
-    bins = document.get('bins', [document]) if isinstance(document, Mapping) else document
-    sides = ('width', 'height', 'depth')
-    if not _lists({'bins': bins}, 'bins', 'items', *sides) or not all(
-            _lists(one, 'items', 'position', 'rotation_type') for one in bins):
-        return None
-
-    def read(entry: Any) -> Row:
-        extents = [entry[side] for side in sides]
-        return {'name': entry.get('partno') or entry['name'], 'mass': entry['weight'],
-                **dict(zip(LEAST, entry['position'])), **dict(zip(EXTENTS, map(
-                    extents.__getitem__, ROTATIONS[entry['rotation_type']]))),
-                **_amounts(entry, 'weight'), **_amounts(one, 'max_weight')}
-    items: list[Item] = []
-    packing = Packing(PY3DBP, items)
-    for one in bins:
-        stack = str(one.get('partno') or one.get('name'))
-        items += _items(stack, one['items'], read, numbered=True)
-        packing.rooms[stack] = [one[side] for side in sides]
-        if 'max_weight' in one:
-            packing.most[stack] = one['max_weight']
-        packing.faults += _unfitted(one.get('unfitted_items'))
-    return packing
-
-
-def _py3dbp_answer(document: Any) -> Packing | None:
-    """Read the answer of its web service, where a place is a corner and half of a size, floored."""
-    answer: Any = document.get('data', document) if isinstance(document, Mapping) else None
-    if not (_lists(answer, 'box', 'WHD') and _lists(answer, 'fitItem', 'WHD', 'position')):
-        return None
-
-    def read(entry: Any) -> Row:
-        return {'name': entry['partNumber'], 'mass': entry['weight'],
-                **dict(zip(EXTENTS, entry['WHD'])), **dict(zip(LEAST, (
-                    place - side // 2 for place, side in zip(entry['position'], entry['WHD'])))),
-                **_amounts(entry, 'weight')}
-    packing = Packing(PY3DBP, list(_items('', answer['fitItem'], read)),
-                      faults=list(_unfitted(answer.get('unfitItem'))))
-    for box in answer['box'][:1]:
-        packing.rooms[''] = box['WHD']
-        if 'weight' in box:
-            packing.most[''] = box['weight']
-    return packing
-
-
-def _unfitted(entries: Any) -> Iterator[Fault]:
-    names = tuple(str(entry.get('partno') or entry.get('partNumber') or entry.get('name'))
-                  for entry in (entries if isinstance(entries, list) else ())
-                  if isinstance(entry, Mapping))
-    if names:
-        yield Fault('slot', names, 'not packed, as the file has it')
-
-
-def means_amount(key: str) -> bool:
-    """Return whether a name may mean a mass or a limit, such as gross_weight, kg or maxLoad."""
-    words = re.findall('[a-zäöüß]+', re.sub('([a-z])([A-Z])', r'\1 \2', key).lower())
-    return any(map(AMOUNT.fullmatch, words)) or words[-1:] == ['load']
+def _renamed(form: Form, names: Mapping[str, str], table: Table) -> Form:
+    """Return a form with columns as a table has them, and without those that it has not."""
+    near = {key: name for name, (path, key) in table.above.items()
+            if path == table.records[0].rows.above[-1][0]} if table.above else {}
+    above = {what: tuple(near[key] for key in keys) for what, keys in form.above.items()
+             if all(key in near for key in keys)}
+    taken = form.taken
+    single = {role: names[name] for role, name in taken.single.items() if name in names}
+    return replace(
+        form, above=above, kinds=names.get(form.kinds, ''), turned=(
+            names.get(form.turned[0], ''), form.turned[1]), taken=replace(
+            taken, size=tuple(map(names.__getitem__, taken.size)),
+            place=tuple(map(names.__getitem__, taken.place)), single=single,
+            room=above.get('room', ()), quiet=frozenset(
+                (*(names[name] for name in taken.quiet if name in names), *above.get('most', ()),
+                 names.get(form.turned[0], '')))))

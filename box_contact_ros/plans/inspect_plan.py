@@ -4,6 +4,7 @@
 """Is this plan sound? Overlaps, support, loads and limits of all boxes, in one call."""
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, replace
 from itertools import compress
 
@@ -19,29 +20,35 @@ from .inspection import OVER, Inspection
 from .judged import faults_of
 from .meetings import Meetings, beds_of, bodies_of, mass_centres, meetings_of
 from .plan import Fault, Plan
+from .read_plan import read_any
 from .room import are_beyond, beyond
 from .standing import base_areas, heights
-from .statics import Bodies, Rest, settle
+from .statics import Bodies, Rest, Work, settle
 from .steps import falls_of
 from .verdict import verdict_of
 from .ways import SIDES, blocked_ways
 
+FRICTION = 0.5
+"""Coulomb's μ where nobody tells one: cartons on wood."""
 MANY = 10_000
 """With more boxes progress is shown: they take a second or more."""
 
 
-def inspect_plan(plan: Plan, *, tolerance: float | None = None, friction: float = 0.5,
-                 acceleration: ArrayLike = (0.0, 0.0, -9.81), bears: str = 'faces',
+def inspect_plan(plan: Plan | str | os.PathLike[str], *, tolerance: float | None = None,
+                 friction: float = FRICTION, acceleration: ArrayLike = (0.0, 0.0, -9.81),
+                 bears: str | None = None,
                  sides: bool = False, loaded_from: str | None = None) -> Inspection:
     """Return what is wrong with a plan, and what each of its boxes carries.
 
+    plan: or the path of a file, as `read_plan` takes it.
     tolerance: the gap up to which faces touch, and the depth up to which boxes do not overlap [m];
     None: of each pair 1e-4, or a quarter of its thinner box, if that is less.
-    friction: Coulomb's μ of all pairs.
+    friction: Coulomb's μ of ground, walls and boxes of which the plan has none; a pair has the
+    lesser one.
     acceleration: (3,) that the boxes feel, gravity included [m/s²]: (3.92, 0, −9.81) on a lorry
     that brakes along +x by 0.4 g.
     bears: 'faces', or 'corners': a box stands on its corners alone, as a container does. They bear
-    on the ground, and on corner castings of the box below.
+    on the ground, and on corner castings of the box below. None: as the file has it, else 'faces'.
     sides: whether boxes beside each other carry by friction.
     loaded_from: 'above', '+x', '-x', '+y' or '-y': where the boxes of a plan with an order come
     from, each by a straight way; None: ways are not judged.
@@ -49,10 +56,14 @@ def inspect_plan(plan: Plan, *, tolerance: float | None = None, friction: float 
     A plan with an order is judged at each of its steps, too.
 
     Loads need the extra `plans`; a plan without masses does not. Boxes whose loads would take
-    more than 1 GB or about 20 s are not judged, the largest groups first; nor are steps beyond
-    another 20 s.
+    more than 1 GB or about 15 s are not judged, the largest groups first; nor are steps beyond
+    that.
     Raises ValueError, with field and value, for bad input, and for too many boxes in one place.
     """
+    if isinstance(plan, str | os.PathLike):
+        plan, of_file, _ = read_any(plan)
+        bears = bears or of_file
+    bears = bears or 'faces'
     if not isinstance(plan, Plan):
         raise ValueError(f'plan must be a Plan, not {short_repr(plan)}')
     if bears not in ('faces', 'corners'):
@@ -71,25 +82,25 @@ def inspect_plan(plan: Plan, *, tolerance: float | None = None, friction: float 
     felt = as_floats(acceleration, 'acceleration', 'a vector (3,)', (3,))
     if not 0.0 < np.abs(felt).max() < np.inf:
         raise ValueError(f'acceleration must have a length, not {short_repr(acceleration)}')
-    may_meet = meetings_of(plan, tolerances, felt, bool(sides), bears == 'corners')
+    may_meet = meetings_of(plan, tolerances, felt, friction, bool(sides), bears == 'corners')
     meet = may_meet.among(plan.body, np.ones_like(may_meet.fixed))
     if faults := faults_of(plan, meet.fixed, tolerances):
         plan = replace(plan, faults=(*plan.faults, *faults))
-    bodies = bodies_of(plan, meet)
+    bodies, work = bodies_of(plan, meet), Work()
     found = _judged(plan, meet, bodies, None if plan.masses is None else
-                    _loads(plan, meet, bodies, friction), tolerances)
-    return _as_loaded(found, may_meet, bodies, None if plan.masses is None else friction,
-                      tolerances, loaded_from)
+                    _loads(plan, meet, bodies, work), tolerances)
+    return _as_loaded(replace(found, friction=friction), may_meet, bodies, work, tolerances,
+                      loaded_from)
 
 
-def _as_loaded(found: Inspection, meet: Meetings, bodies: Bodies, friction: float | None,
+def _as_loaded(found: Inspection, meet: Meetings, bodies: Bodies, work: Work,
                tolerances: np.ndarray, loaded_from: str | None) -> Inspection:
     """Return what was found, with the steps and the ways of a plan that has an order."""
     plan, faults, ways = found.plan, [], found.ways
-    steps, unknown = falls_of(plan, meet, bodies, friction)
+    steps, unknown = falls_of(plan, meet, bodies, work)
     if names := tuple(plan.names[box] for box in unknown if found.stands[box] or found.cause[box]):
-        faults.append(Fault('support', names, 'not judged at each step: too many boxes bear on '
-                            'each other', lacks='judgement'))
+        faults.append(Fault('loads', names, 'not judged at each step: too many boxes bear on each '
+                            'other'))
     if loaded_from is not None:
         try:
             ways = blocked_ways(plan, meet, tolerances, loaded_from)
@@ -122,7 +133,7 @@ class _Loads:
     pressure: np.ndarray  # (k,) the greatest [Pa]; none where corners bear
 
 
-def _loads(plan: Plan, meet: Meetings, bodies: Bodies, friction: float) -> _Loads:
+def _loads(plan: Plan, meet: Meetings, bodies: Bodies, work: Work) -> _Loads:
     require('plans')
     from tqdm import tqdm
 
@@ -130,7 +141,7 @@ def _loads(plan: Plan, meet: Meetings, bodies: Bodies, friction: float) -> _Load
     sides = patches.rectangle[:, (1, 3)] - patches.rectangle[:, :1]
     with tqdm(total=int((~meet.fixed).sum()), unit='box', desc='loads', leave=False,
               disable=len(plan) <= MANY) as bar:
-        rest = settle(bodies, beds_of(plan, meet), friction, bar.update)
+        rest = settle(bodies, beds_of(plan, meet), work, bar.update)
     centre = rest.centre @ frame
     if meet.by_corners:
         return _Loads(rest, centre, np.zeros(0))
@@ -149,8 +160,8 @@ def _judged(plan: Plan, meet: Meetings, bodies: Bodies, loads: _Loads | None,
     verdict = verdict_of(plan, meet, bodies, None if loads is None else loads.rest)
     if verdict.unknown.any():
         plan = replace(plan, faults=(*plan.faults, Fault(
-            'support', tuple(compress(plan.names, verdict.unknown[body])),
-            'not judged: too many boxes bear on each other', lacks='judgement')))
+            'loads', tuple(compress(plan.names, verdict.unknown[body])),
+            'not judged: too many boxes bear on each other')))
     lower, upper = meet.pairs[meet.carries].T
     area = (meet.patches.area * (meet.normal @ up))[meet.carries]
     share = np.bincount(upper, area, count) / base_areas(plan.sizes, plan.poses, up)

@@ -4,25 +4,27 @@
 """What is wrong with a plan, and what each of its boxes carries: the answer of `inspect_plan`."""
 from __future__ import annotations
 
+import json
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from functools import cached_property
 from itertools import groupby
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..solver.checks import printable
 from .plan import LACKS, VERDICTS, Plan
 from .room import SIDES
+from .verdict import CAUSES, GOES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-CAUSES = ('hangs', 'unsupported', 'tips under its load', 'slides', 'goes with what falls',
-          'overloaded')
-"""What may be wrong with a box, the worst first."""
-GOES = 'goes with what falls'
+HINTS = 'origin', 'tolerance'
+"""Kinds that come first: what the file seems to mean, and the option that says so."""
 LEFT_OUT = ('place', 'part', 'shape')
 """What rows lack that come first: others may fall because these are left out."""
 OVER = 1e-6
@@ -115,6 +117,8 @@ class Inspection:
     """(3,) [m]."""
     steps: tuple[Fall, ...] = ()
     """What falls while the plan is loaded, by step; empty without an order."""
+    friction: float = np.nan
+    """Coulomb's μ of ground, walls and boxes of which the plan has none."""
     loaded_from: str | None = None
     """Where boxes come from; None: their ways are not judged."""
     ways: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), int))
@@ -125,8 +129,7 @@ class Inspection:
     def verdict(self) -> str:
         """Return 'not sound' for what is certainly wrong, else 'not all judged', or 'sound'."""
         faults = {fault.verdict for fault in self.plan.faults}
-        if (len(self.overlaps) or self.outside.any() or self.steps or len(self.ways)
-                or (self.cause != '').any()):
+        if self._wrong().any():
             faults.add('not sound')
         return next((verdict for verdict in VERDICTS if verdict in faults), 'sound')
 
@@ -137,7 +140,7 @@ class Inspection:
 
     @property
     def verdicts(self) -> np.ndarray:
-        """Return a word (n,) for each box: 'ground', else 'overlap', its cause, or 'sound'.
+        """Return a word (n,) for each box: 'ground', 'overlap', its cause, or 'sound'.
 
         'outside': beyond its room, and without an overlap. 'step', 'way': it stands in the whole
         plan, but not at each step, or its way is blocked. 'not judged': whether it stands is not
@@ -150,7 +153,8 @@ class Inspection:
             words[boxes[self.cause[boxes] == '']] = word
         words[self.outside.any(axis=(1, 2))] = 'outside'
         words[self.overlaps.ravel()] = 'overlap'
-        words[self.plan.ground] = 'ground'
+        ground = self.plan.ground
+        words[ground] = np.where(self.cause[ground] == '', 'ground', self.cause[ground])
         return words
 
     def __str__(self) -> str:
@@ -158,7 +162,10 @@ class Inspection:
         return self.text()
 
     def text(self, most: int | None = MOST_LINES) -> str:
-        """Return a line for each row, at most so many (None: all), and one for the whole plan."""
+        """Return a line for each row, at most so many (None: all), and one for the whole plan.
+
+        Before several rows a line counts them by kind. Each container has a line of its own.
+        """
         rows = self.rows()
         lines = [str(row) for row in rows]
         if most is not None and len(rows) > most:
@@ -169,20 +176,71 @@ class Inspection:
             rest = len(rows) - most - more
             hidden = [f'{more:,} more'] * (more > 0) + [f'{rest:,} that go with these'] * (rest > 0)
             lines = [lines[n] for n in shown] + [f'and {" and ".join(hidden)}']
-        return '\n'.join((*lines, self.summary()))
+        if len(rows) > 1:
+            counts = Counter(row.kind for row in rows if row.kind not in (*HINTS, 'ignored'))
+            lines.insert(0, ', '.join(f'{kind}: {count:,}' for kind, count in counts.items()))
+        return '\n'.join((*lines, *self._of_supports(), *self._of_stacks(), self.summary()))
+
+    def _of_supports(self) -> Iterator[str]:
+        """Yield what each fixed box with a limit carries, as axles do."""
+        plan = self.plan
+        on_top = self.load / np.linalg.norm(self.acceleration)
+        for box in plan.ground[np.isfinite(plan.limits[plan.ground])].tolist():
+            if np.isfinite(on_top[box]):
+                yield printable(f'{plan.names[box]} carries {on_top[box]:,.0f} kg of '
+                                f'{plan.limits[box]:,.0f} kg')
+
+    def _of_stacks(self) -> Iterator[str]:
+        """Yield the verdict of each container, of several."""
+        plan = self.plan
+        free = ~np.isin(np.arange(len(plan)), plan.ground)
+        for stack, name in enumerate(plan.stacks if len(plan.stacks) > 1 else ()):
+            boxes = self._boxes((plan.stack == stack) & free)
+            yield printable(f'{name}: {boxes}: {self.verdicts_of_stacks[stack]}')
+
+    @cached_property
+    def verdicts_of_stacks(self) -> list[str]:
+        """Return the verdict of the boxes of each of the plan's `stacks`."""
+        plan = self.plan
+        stack_of = dict(zip(plan.names, plan.stack.tolist())) | {
+            name: stack for stack, name in enumerate(plan.stacks)}
+        found: dict[int, set[str]] = {stack: set() for stack in range(len(plan.stacks))}
+        for fault in plan.faults:
+            of = {stack_of.get(name, -1) for name in fault.names} or {-1}
+            for stack in found if -1 in of else of & found.keys():
+                found[stack].add(fault.verdict)
+        wrong = self._wrong()
+        wrong[plan.ground] = False
+        for stack in {*plan.stack[wrong].tolist()} & found.keys():
+            found[stack].add('not sound')
+        return [next((verdict for verdict in VERDICTS if verdict in some), 'sound')
+                for some in found.values()]
+
+    def _wrong(self) -> np.ndarray:
+        """Return which boxes (n,) have something that is certainly wrong."""
+        wrong = (self.cause != '') | self.outside.any(axis=(1, 2))
+        wrong[self.overlaps.ravel()] = True
+        wrong[self.ways[:, 0]] = True
+        wrong[[fall.box for fall in self.steps]] = True
+        return wrong
+
+    @staticmethod
+    def _boxes(which: np.ndarray) -> str:
+        count = np.count_nonzero(which)
+        return f'{count:,} box' if count == 1 else f'{count:,} boxes'
 
     def rows(self) -> list[Row]:
-        """Return what is wrong: first what was left out, then the worst.
+        """Return what is wrong: first hints and what was left out, then the worst.
 
         What goes with a box that falls comes after it. A box has a row for each of its faults.
         """
         plan, names = self.plan, self.plan.names
-        told: dict[str, list[Row]] = {word: [] for word in ('left out', *VERDICTS)}
+        told: dict[str, list[Row]] = {word: [] for word in ('hints', 'left out', *VERDICTS)}
         for fault in plan.faults:
-            is_first = fault.lacks in LEFT_OUT and fault.verdict != 'sound'
-            told['left out' if is_first else fault.verdict].append(
-                Row(fault.kind, fault.names, fault.text))
-        rows = told['left out'] + told['not sound']
+            word = 'hints' if fault.kind in HINTS else (
+                'left out' if fault.lacks in LEFT_OUT else fault.verdict)
+            told[word].append(Row(fault.kind, fault.names, fault.text))
+        rows = told['hints'] + told['left out'] + told['not sound']
         for n in np.argsort(-self.depths, kind='stable').tolist():
             a, b = self.overlaps[n].tolist()
             rows.append(Row('overlap', (names[a], names[b]), f'{1e3 * self.depths[n]:.1f} mm deep'))
@@ -212,17 +270,16 @@ class Inspection:
                 if self.cause[box] == cause:
                     yield Row(cause, (names[box],), self._why(box, since))
                     for other in goes.get(box, ()):
-                        yield Row(GOES, (names[other],),
-                                  f'with {names[box]}; {self._why(other, since)}')
+                        yield Row(GOES, (names[other],), f'with {names[box]}')
         for other in goes.get(-1, ()):
-            yield Row(GOES, (names[other],), self._why(other, since))
+            yield Row(GOES, (names[other],), 'and with others')
 
     def _why(self, box: int, since: Mapping[int, int]) -> str:
         end = f', from step {since[box]} on' if box in since else ''
         if self.cause[box] == 'hangs':
             height = self.height[box]
             return (f'{1e3 * height:.1f} mm above what is below' if np.isfinite(height) else
-                    'above nothing') + end
+                    'above nothing' if np.isinf(height) else 'by an unknown height') + end
         return f'share {self.share[box]:.2f}, centre {_side(self.margin[box])}{end}'
 
     def _steps(self) -> Iterator[Row]:
@@ -253,15 +310,15 @@ class Inspection:
     def summary(self) -> str:
         """Return one line on the whole plan."""
         plan = self.plan
-        boxes = len(plan) - len(plan.ground)
-        words = [f'{boxes:,} box' if boxes == 1 else f'{boxes:,} boxes']
+        words = [self._boxes(~np.isin(np.arange(len(plan)), plan.ground))]
         if plan.masses is not None and np.isfinite(self.mass) and self.mass > 0.0:
             words.append(
                 f'{self.mass / 1e3:,.0f} t' if self.mass >= 1e4 else f'{self.mass:,.1f} kg')
             if np.isfinite(self.centre_of_mass).all():
                 words.append('centre of mass {:.3f} {:.3f} {:.3f} m'.format(*self.centre_of_mass))
-        if not boxes:
-            words.append('nothing can touch')
+            known = plan.friction[~np.isnan(plan.friction)]
+            least, most = min((self.friction, *known)), max((self.friction, *known))
+            words.append(f'friction {least:g}' + (f' to {most:g}' if most > least else ''))
         verdict, lacks = self.verdict, ', '.join(self._lacks())
         if verdict == 'not all judged':
             verdict += '; what was read is sound'
@@ -284,8 +341,37 @@ class Inspection:
 
         It needs Matplotlib, the extra `report`.
         """
-        from .plot import plot
-        return plot(self)
+        from .plot import picture
+        return picture(self.plan, self.verdicts, self.rows(), self.summary())
+
+    def to_json(self, **first: str) -> str:
+        """Return all that was found as a line of JSON, as msg_schemas/inspection.json has it.
+
+        NaN and infinity are null. Boxes are named in pairs, and in the order of `names` elsewhere.
+        first: what comes before it.
+        """
+        plan = self.plan
+        values = {one.name: getattr(self, one.name) for one in fields(self) if one.name != 'plan'}
+        for pairs in ('overlaps', 'carried_by', 'ways'):
+            values[pairs] = [[plan.names[a], plan.names[b]] for a, b in values[pairs].tolist()]
+        values['steps'] = [{'step': step, 'name': plan.names[box], 'cause': cause, 'until': until}
+                           for step, box, cause, until in self.steps]
+        return json.dumps({
+            **first, 'verdict': self.verdict, 'sound': self.sound, 'names': list(plan.names),
+            'ground': plan.ground.tolist(), 'faults': [row._asdict() for row in self.rows()],
+            'containers': [{'name': name, 'verdict': verdict}
+                           for name, verdict in zip(plan.stacks, self.verdicts_of_stacks)],
+            **{name: _plain(value) for name, value in values.items()}})
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list):
+        return [_plain(part) for part in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
 
 
 def _side(margin: float) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..solver.contacts_of import TooManyNear, contacts_of
-from .crowd import most_near
+from .meetings import most_near
 from .plan import Fault, Plan
 
 STEPS = 2.0**-22
@@ -22,8 +22,10 @@ def faults_of(plan: Plan, fixed: np.ndarray, tolerances: np.ndarray) -> list[Fau
     """Return the faults; fixed: by body, tolerances: (n,) by box [m]."""
     is_fixed = fixed[plan.body]
     faults = [*_fixed_overlaps(plan, np.flatnonzero(is_fixed), tolerances)]
-    if len(plan) and not fixed.any():
+    if not fixed.any():
         faults.append(Fault('support', (), 'not judged: nothing is fixed'))
+    elif is_fixed.all():
+        faults.append(Fault('support', (), 'not judged: nothing may move'))
     free = np.flatnonzero(~is_fixed)
     if plan.masses is None and np.isfinite(plan.limits[free]).any():
         faults.append(Fault('mass', tuple(plan.names[box] for box in free),
@@ -33,9 +35,8 @@ def faults_of(plan: Plan, fixed: np.ndarray, tolerances: np.ndarray) -> list[Fau
     shares = np.frexp(place)[0] * SHORT
     if tolerances.max(initial=0.0) < need and (place == place.astype(np.float32)).all() and (
             shares != np.rint(shares)).any():
-        faults.append(Fault('pose', (), f'coordinates are float32: they need a tolerance of '
-                            f'{need:.2g} m, and it is {tolerances.max():.2g} m', verdict='sound',
-                            lacks=''))
+        faults.append(Fault('rounding', (), f'coordinates are float32: they need a tolerance of '
+                            f'{need:.2g} m, and it is {tolerances.max():.2g} m'))
     return faults
 
 
@@ -50,12 +51,12 @@ def _fixed_overlaps(plan: Plan, fixed: np.ndarray, tolerances: np.ndarray) -> It
     rows = -contacts.separation > tolerances[pairs].min(axis=1)
     rows &= plan.body[pairs[:, 0]] != plan.body[pairs[:, 1]]
     rows &= ~np.isin(pairs @ (len(plan), 1), np.sort(plan.apart, axis=1) @ (len(plan), 1))
-    taken = {name for fault in plan.faults if fault.lacks == 'judgement' for name in fault.names}
+    taken = {name for fault in plan.faults if fault.kind == 'held' for name in fault.names}
     may_move = np.array([name in taken for name in plan.names], bool)[pairs].any(axis=1)
-    for some, verdict, end in ((rows & may_move, '', ''),
-                               (rows & ~may_move, 'sound', ', and both are fixed')):
+    for some, kind, end in ((rows & may_move, 'overlap', ''),
+                            (rows & ~may_move, 'fixed', ', and both are fixed')):
         if some.any():
             depth = -contacts.separation[some]
             more = f'; {len(depth) - 1:,} more pairs overlap less' if len(depth) > 1 else ''
-            yield Fault('overlap', tuple(plan.names[box] for box in pairs[some][depth.argmax()]),
-                        f'{1e3 * depth.max():.1f} mm deep{end}{more}', verdict=verdict, lacks='')
+            yield Fault(kind, tuple(plan.names[box] for box in pairs[some][depth.argmax()]),
+                        f'{1e3 * depth.max():.1f} mm deep{end}{more}')

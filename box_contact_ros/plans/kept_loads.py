@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .meetings import Meetings
-from .statics import LEVEL, SEEN, Bodies, hull_edges, pulled_in
+from .statics import LEVEL, SEEN, Bodies, Work, hull_edges, pulled_in
 
 SURELY = 2.0
 """How far within a hull forces are [of what the body needs]: on a rim the programmes decide."""
@@ -27,6 +27,8 @@ EXACT, SHARINGS = 1e-10, 30
 """Part of a force that may be left of it, and the steps in which it is shared."""
 VISITS = 4
 """How often bodies are visited, on average: more where two carry each other."""
+VISIT = 2500.0
+"""Work of a visit, in the unit of `Work`."""
 Planes = list[tuple[float, float, float]]
 """Normals (x, y) into a polygon, and how far along them its edges are."""
 Force = tuple[float, float, float]
@@ -55,14 +57,14 @@ class KeptLoads:
     """What patches carry, in the frame of what bodies feel."""
 
     def __init__(self, meet: Meetings, pairs: np.ndarray, below: Sequence[list[int]],
-                 bodies: Bodies, friction: float | None) -> None:
-        """Keep no loads yet; friction: None looks at where centres are alone.
+                 bodies: Bodies, work: Work, *, weighed: bool) -> None:
+        """Keep no loads yet; those that are not weighed are looked at by their centres alone.
 
         pairs: of bodies, of all patches that may bear. below: rows of what carries each body.
         """
         slope = np.minimum(meet.normal @ meet.frame[2], 1.0)
         self._slides = (slope <= 1.0 - LEVEL) & (
-            np.sqrt(1.0 - slope**2) > (np.inf if friction is None else friction) * slope)
+            np.sqrt(1.0 - slope**2) > (meet.friction if weighed else np.inf) * slope)
         self._hull = meet.bearings.hull @ meet.frame[:2].T
         self._needs, self._overlaps = meet.needs, meet.overlaps[meet.of_met]
         self._lower, self._below, self._bodies = pairs[:, 0].tolist(), below, bodies
@@ -70,7 +72,7 @@ class KeptLoads:
         self._own = [*zip(*np.vstack((bodies.weight, bodies.weight * bodies.centre[:, :2].T)
                                      ).tolist())]
         self._height = bodies.centre[:, 2].tolist()
-        self._only_looks = friction is None
+        self._only_looks, self._work = not weighed, work
         self._load: list[Force] = [(0.0, 0.0, 0.0)] * len(pairs)
         self._total: list[Force] = [(0.0, 0.0, 0.0)] * len(below)  # weight, and what is on top
         self._is_braced = [False] * len(below)
@@ -99,6 +101,7 @@ class KeptLoads:
             if not todo:
                 return True
             body = heapq.heappop(todo)[1]
+            self._work.left -= VISIT
             force = more.pop(body)
             self._total[body] = _sum(self._total[body], force)
             shares = self._shares(body, force, here)

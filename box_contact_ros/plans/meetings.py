@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..solver.contacts_of import contacts_of
+from ..solver.contacts_of import TooManyNear, contacts_of
 from ..solver.faces import FacePatches, face_patches
 from ..solver.pose import rotation_matrix
 from .bearings import Bearings, on_corners, on_faces
-from .crowd import most_near
 from .plan import Plan
 from .standing import across_of, needs
 from .statics import Beds, Bodies
@@ -21,6 +20,15 @@ BESIDE = np.sqrt(0.5)
 """Cosine between gravity and a normal below which two boxes are beside each other: that of 45°."""
 WEIGHTLESS = 1e-4
 """Weight of a body without a mass, divided by that of the heaviest: it must be carried too."""
+
+
+MOST_PAIRS, MOST_EACH = 200_000, 10
+"""Pairs that are judged, in all and for each box more: those that do not overlap have few."""
+
+
+def most_near(count: int) -> int:
+    """Return how many pairs of so many boxes are judged: 2,000 in one place take 1.3 GB."""
+    return MOST_PAIRS + MOST_EACH * count
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +48,7 @@ class Meetings:
     carries: np.ndarray  # (k,) bool: the lower one carries the upper one; else they are beside
     needs: np.ndarray  # (k,) how far a centre that it carries must be inside the hull [m]
     normal: np.ndarray  # (k, 3) from the lower box to the upper one
+    friction: np.ndarray  # (k,) the lesser of both boxes
     patches: FacePatches  # k
     bearings: Bearings  # k
     by_corners: bool
@@ -65,19 +74,26 @@ class Meetings:
             overlaps=self.overlaps[met], on_top=self.on_top[met],
             of_met=(np.cumsum(met) - 1)[self.of_met[rows]],
             **{name: getattr(self, name)[rows] for name in (
-                'row', 'pairs', 'carries', 'needs', 'normal', 'patches', 'bearings')})
+                'row', 'pairs', 'carries', 'needs', 'normal', 'friction', 'patches', 'bearings')})
 
 
-def meetings_of(plan: Plan, tolerances: np.ndarray, felt: np.ndarray, sides: bool, by_corners: bool,
-                ) -> Meetings:
+def meetings_of(plan: Plan, tolerances: np.ndarray, felt: np.ndarray, friction: float, sides: bool,
+                by_corners: bool) -> Meetings:
     """Return which boxes meet, and all patches that may bear, whatever else does.
 
     tolerances: (n,) by box [m]. felt: (3,) acceleration, gravity included [m/s²].
+    friction: of boxes that have none.
+    Raises ValueError for more pairs than are judged.
     """
     fixed = np.zeros(plan.body.max(initial=-1) + 1, bool)
     fixed[plan.body[plan.ground]] = True
-    pairs, contacts = contacts_of(plan.sizes, plan.poses, fixed=fixed[plan.body],
-                                  tolerance=tolerances, most_near=most_near(len(plan)))
+    try:
+        pairs, contacts = contacts_of(plan.sizes, plan.poses, fixed=fixed[plan.body],
+                                      tolerance=tolerances, most_near=most_near(len(plan)))
+    except TooManyNear as error:
+        names = ' and '.join(plan.names[box] for box in error.pairs[0])
+        raise ValueError(f'more than {most_near(len(plan)):,} pairs of boxes overlap or touch, '
+                         f'such as {names}: too many to be judged') from None
     rows = plan.body[pairs[:, 0]] != plan.body[pairs[:, 1]]
     if len(plan.apart):
         rows &= ~np.isin(pairs @ (len(plan), 1), np.sort(plan.apart, axis=1) @ (len(plan), 1))
@@ -93,14 +109,25 @@ def meetings_of(plan: Plan, tolerances: np.ndarray, felt: np.ndarray, sides: boo
     overlaps = -contacts.separation > tolerance
     # Boxes beside each other may overlap by the tolerance: a strip that wide carries nothing.
     bear = np.flatnonzero((patches.width > tolerance) & (on_top | sides & ~overlaps))
-    patches = patches[bear]
+    patches, rubs = patches[bear], plan.frictions(friction)[pairs[bear]].min(axis=1)
     return Meetings(
         felt, np.stack((across, np.cross(up, across), up)), fixed, pairs, contacts.separation,
         overlaps, on_top, np.arange(len(bear)), bear, pairs[bear], on_top[bear],
         needs(plan.sizes, pairs[bear], contacts.separation[bear], tolerance[bear]), normal[bear],
-        patches, on_corners(plan.sizes, plan.poses, pairs[bear], normal[bear], patches,
-                            tolerance[bear], fixed[plan.body]) if by_corners else
+        rubs, patches, on_corners(plan.sizes, plan.poses, pairs[bear], normal[bear], patches,
+                                  tolerance[bear], fixed[plan.body]) if by_corners else
         on_faces(patches), by_corners)
+
+
+def overlaps_of(plan: Plan, tolerance: float) -> int:
+    """Return how many pairs of boxes overlap by more than a tolerance [m], up to `most_near`."""
+    fixed = np.isin(np.arange(len(plan)), plan.ground)
+    try:
+        _, contacts = contacts_of(plan.sizes, plan.poses, fixed=fixed,
+                                  most_near=most_near(len(plan)))
+    except TooManyNear:
+        return most_near(len(plan))
+    return int(np.count_nonzero(-contacts.separation > tolerance))
 
 
 def _patches(plan: Plan, pairs: np.ndarray, normal: np.ndarray, tolerance: np.ndarray,
@@ -146,7 +173,7 @@ def beds_of(plan: Plan, meet: Meetings) -> Beds:
     sides = patches.rectangle[:, (1, 3)] - patches.rectangle[:, :1]
     return Beds(
         pairs=plan.body[meet.pairs], carries=meet.carries, normal=meet.normal @ frame.T,
-        centre=patches.centre @ frame.T, area=patches.area,
+        centre=patches.centre @ frame.T, area=patches.area, friction=meet.friction,
         radius=np.sqrt((sides**2).sum(axis=(1, 2)) / 12.0),
         bearings=meet.bearings.in_frame(frame))
 

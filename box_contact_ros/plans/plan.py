@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -28,14 +28,21 @@ MOST_BYTES = 2**28
 VERDICTS = ('not sound', 'not all judged', 'sound')
 """On a plan, from the worst to the best."""
 FAULT_KINDS = {
+    'origin': ('sound', ''), 'tolerance': ('sound', ''), 'unit': ('not all judged', 'unit'),
+    'row': ('not all judged', 'place'), 'pose': ('not all judged', 'place'),
+    'dimension': ('not all judged', 'place'), 'slot': ('not all judged', 'place'),
+    'size type': ('not all judged', 'place'), 'slot taken': ('not sound', 'place'),
+    'cut': ('not all judged', 'part'), 'part': ('not all judged', 'part'),
+    'shape': ('not all judged', 'shape'), 'goods': ('not all judged', 'shape'),
     'gap': ('not sound', ''), 'twice': ('not sound', ''), 'overlap': ('not sound', ''),
-    'cut': ('not all judged', 'part'), 'slot': ('not all judged', 'place'),
-    'size type': ('not all judged', 'place'), 'dimension': ('not all judged', 'place'),
-    'pose': ('not all judged', 'place'), 'mass': ('not all judged', 'weight'),
-    'order': ('not all judged', 'order'), 'shape': ('not all judged', 'shape'),
-    'support': ('not all judged', 'support'), 'way': ('not all judged', 'judgement'),
-    'unit': ('not all judged', 'unit'), 'gravity': ('not all judged', ''),
-    'origin': ('not sound', 'origin'), 'column': ('sound', '')}
+    'payload': ('not sound', ''), 'mass': ('not all judged', 'weight'),
+    'weight': ('not all judged', 'sure weight'), 'limit': ('not all judged', 'limit'),
+    'friction': ('not all judged', 'friction'), 'order': ('not all judged', 'order'),
+    'support': ('not all judged', 'support'), 'held': ('not all judged', 'judgement'),
+    'loads': ('not all judged', 'judgement'), 'way': ('not all judged', 'judgement'),
+    'frames': ('not all judged', 'frames'), 'column': ('not all judged', 'column'),
+    'ignored': ('sound', 'column'),
+    'base': ('sound', ''), 'fixed': ('sound', ''), 'rounding': ('sound', '')}
 """What may be wrong with a row of a file: the best verdict with it, and what it lacks."""
 NO_ROOM = ((-np.inf,) * 3, (np.inf,) * 3)
 UNTURNED = (0.0, 0.0, 0.0, 1.0)
@@ -46,12 +53,14 @@ LACKS = {
     'sure weight': ('1 has a doubtful weight', '{:,} have a doubtful weight'),
     'limit': ('1 has no known limit', '{:,} have no known limit'),
     'order': ('1 has no place in the order', '{:,} have no place in the order'),
-    'support': ('support not judged: nothing is fixed',) * 2,
+    'support': ('support not judged',) * 2,
     'judgement': ('1 was not judged', '{:,} were not judged'),
     'unit': ('the unit is doubtful: add --unit',) * 2,
-    'origin': ('sound by another origin',) * 2,
     'shape': ('1 shape is not known', '{:,} shapes are not known'),
-    'part': ('1 part of the file was not read', '{:,} parts of the file were not read')}
+    'friction': ('1 has no known friction', '{:,} have no known friction'),
+    'frames': ('containers touch: add --frames',) * 2,
+    'part': ('1 part of the file was not read', '{:,} parts of the file were not read'),
+    'column': ('1 column was not read', '{:,} columns were not read')}
 """What boxes or rows may lack, as the last line says it of one and of more."""
 
 
@@ -59,7 +68,7 @@ LACKS = {
 class Fault:
     """What a file says wrongly, or what could not be taken from it.
 
-    Raises ValueError for a kind, a verdict or a lack that is not one of those below.
+    Raises ValueError for a kind that is not one of FAULT_KINDS.
     """
 
     kind: str
@@ -68,24 +77,21 @@ class Fault:
     """The boxes or rows that are concerned, as the file names them."""
     text: str
     """What is wrong, for people."""
-    verdict: str = field(default='', kw_only=True)
-    """The best of VERDICTS that a plan with this fault can have; '': that of its kind."""
-    lacks: str | None = field(default=None, kw_only=True)
-    """What each of the boxes or rows lacks, one of LACKS; None: what its kind says."""
 
     def __post_init__(self) -> None:
         if self.kind not in FAULT_KINDS:
             raise ValueError(f'kind must be one of {", ".join(FAULT_KINDS)}, not '
                              f'{short_repr(self.kind)}')
-        verdict, lacks = FAULT_KINDS[self.kind]
-        object.__setattr__(self, 'verdict', self.verdict or verdict)
-        if self.verdict not in VERDICTS:
-            raise ValueError(f'verdict must be one of {", ".join(VERDICTS)}, not '
-                             f'{short_repr(self.verdict)}')
-        object.__setattr__(self, 'lacks', lacks if self.lacks is None else self.lacks)
-        if self.lacks not in LACKS:
-            raise ValueError(f'lacks must be one of {", ".join(filter(None, LACKS))}, or nothing, '
-                             f'not {short_repr(self.lacks)}')
+
+    @property
+    def verdict(self) -> str:
+        """Return the best of VERDICTS that a plan with this fault can have."""
+        return FAULT_KINDS[self.kind][0]
+
+    @property
+    def lacks(self) -> str:
+        """Return what each of the boxes or rows lacks, one of LACKS."""
+        return FAULT_KINDS[self.kind][1]
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -109,6 +115,8 @@ class Plan:
     """(n, 3) of mass, in the frame of each box [m]."""
     limits: np.ndarray
     """(n,) the most that may rest on each box [kg]; infinity: no limit is known."""
+    friction: np.ndarray
+    """(n,) Coulomb's μ of each box, and a pair has the lesser; NaN: as `inspect_plan` is told."""
     body: np.ndarray
     """(n,) the number of the body of each box. The boxes of a body hold together."""
     order: np.ndarray | None
@@ -117,6 +125,8 @@ class Plan:
     stack: np.ndarray
     """(n,) the number of the stack of each box. Stacks are loaded each by itself, among all fixed
     boxes."""
+    stacks: tuple[str, ...]
+    """The names of stacks 0, 1 and so on, such as containers; () where they have none."""
     apart: np.ndarray
     """(a, 2) pairs of boxes, by index, that neither touch nor overlap wherever they are."""
     faults: tuple[Fault, ...]
@@ -128,15 +138,17 @@ class Plan:
     def __init__(self, sizes: ArrayLike, poses: ArrayLike, masses: ArrayLike | None = None, *,
                  ground: ArrayLike = (), names: Sequence[str] | None = None,
                  centres: ArrayLike | None = None, limits: ArrayLike | None = None,
-                 body: ArrayLike | None = None, order: ArrayLike | None = None,
-                 stack: ArrayLike | None = None, apart: ArrayLike = (),
-                 faults: Iterable[Fault] = (), room: ArrayLike | None = None) -> None:
+                 friction: ArrayLike | None = None, body: ArrayLike | None = None,
+                 order: ArrayLike | None = None, stack: ArrayLike | None = None,
+                 stacks: Sequence[str] = (), apart: ArrayLike = (), faults: Iterable[Fault] = (),
+                 room: ArrayLike | None = None) -> None:
         """Take what is known; None is what the fields say of what is not.
 
         sizes: full extents (n, 3), or (3,) of all boxes. masses: (n,), or a number for all boxes.
         ground: a box or boxes. names: None are '0', '1', and so on. centres: (n, 3); None are the
-        boxes' own centres. body: (n,); None is a body for each box. order: (n,), one for a body.
-        stack: (n,); None is one stack. room: (n, 2, 3), or (2, 3) of all boxes; None is no room.
+        boxes' own centres. friction: (n,), or a number for all boxes; None is NaN. body: (n,); None
+        is a body for each box. order: (n,), one for a body. stack: (n,); None is one stack. room:
+        (n, 2, 3), or (2, 3) of all boxes; None is no room.
 
         Raises ValueError, with field, row and value, for bad input.
         """
@@ -152,11 +164,12 @@ class Plan:
             names=_names(names, count), centres=_centres(centres, count),
             limits=(np.full(count, np.inf) if limits is None else
                     _amounts(limits, 'limits', count, np.inf, 'kg')),
-            body=_bodies(body, count),
+            friction=(np.full(count, np.nan) if friction is None else
+                      _frictions(friction, count)), body=_bodies(body, count),
             order=None if order is None else _numbers(order, 'order', count),
             stack=_numbers(np.zeros(count, int) if stack is None else stack, 'stack', count),
-            apart=as_places(apart, 'apart', count), faults=tuple(faults),
-            room=_rooms(room, count))
+            stacks=tuple(map(str, stacks)), apart=as_places(apart, 'apart', count),
+            faults=tuple(faults), room=_rooms(room, count))
         for name in 'order', 'stack':
             self._check_bodies(name)
         for row, fault in enumerate(self.faults):
@@ -190,6 +203,10 @@ class Plan:
             raise ValueError(f'{name}[{row}] is {numbers[row]}, and {numbers[first[row]]} of '
                              f'{name}[{first[row]}], a box of the same body')
 
+    def frictions(self, other: float) -> np.ndarray:
+        """Return the friction of each box (n,); other: that of boxes of which it is not known."""
+        return np.where(np.isnan(self.friction), other, self.friction)
+
     def __len__(self) -> int:
         """Return how many boxes there are."""
         return len(self.poses)
@@ -201,6 +218,15 @@ def _amounts(value: ArrayLike, name: str, count: int, most: float, unit: str) ->
     array = np.broadcast_to(array, count)
     for row in np.flatnonzero(~((array >= 0.0) & (array <= most)))[:1]:
         raise ValueError(f'{name}[{row}] is {array[row]:g} {unit}, not from 0 to {most:g} {unit}')
+    return array
+
+
+def _frictions(value: ArrayLike, count: int) -> np.ndarray:
+    """Return frictions (n,) from 0 on, or NaN; one stands for all."""
+    array = as_floats(value, 'friction', f'a number, or numbers ({count},)', (count,), ())
+    array = np.broadcast_to(array, count)
+    for row in np.flatnonzero((array < 0.0) | np.isinf(array))[:1]:
+        raise ValueError(f'friction[{row}] is {array[row]:g}, not 0 or more, and finite')
     return array
 
 

@@ -13,11 +13,18 @@ from typing import Any, NamedTuple
 
 from ..resources import read_regular
 from ..solver.checks import short_repr
-from .forms import NOTHING, ORIGINS, UNITS, Given
-from .packing import is_first, is_header, read_csv, read_packing
+from .baplie import read_baplie
+from .forms import is_header
+from .packing import read_packing
 from .plan import MOST_BYTES, Plan
+from .roles import NOTHING, Given
+from .table import Table, header_of, is_first, read_csv, read_tables
 
-FORMATS = ('SMDG BAPLIE, SDF, MJCF, URDF, a scene file (YAML), and packing plans as CSV or JSON')
+FORMATS = 'SMDG BAPLIE, and packing plans as CSV or JSON'
+WORLDS = ('it is a world or a model of a simulator, which is no plan; fill a Plan from it, as '
+          'docs/examples/mujoco_plan.py does')
+FEWEST = 4
+"""Columns of a table whose file's ending does not tell that it is one."""
 
 
 class ReadPlan(NamedTuple):
@@ -26,45 +33,43 @@ class ReadPlan(NamedTuple):
     plan: Plan
     bears: str
     """'corners' of containers, else 'faces', as `inspect_plan` takes it."""
-    form: str = ''
-    """How the file of a known packer was read, for people; '' for other files."""
+    taken: str = ''
+    """What was taken of a table, for people; '' for other files."""
 
 
 def read_plan(path: str | os.PathLike[str], *, origin: str | None = None, unit: str | None = None,
-              container: Sequence[float] | None = None) -> Plan:
-    """Return the plan of a file: SMDG BAPLIE, SDF, MJCF, URDF, a scene file, CSV or JSON.
+              container: Sequence[float] | None = None, columns: Mapping[str, str] | None = None,
+              ignore: Sequence[str] = (), up: str | None = None, turns: str | None = None,
+              frames: str | None = None) -> Plan:
+    """Return the plan of a file: SMDG BAPLIE, CSV or JSON.
 
-    origin, unit, container: of CSV and JSON alone, what the file does not tell. origin: 'centre' or
-    'corner', what `x y z` are. unit: 'm', 'cm' or 'mm'. container: (3,) the inner size of each
-    container, in the unit of the file.
+    The options are of CSV and JSON alone, what the file does not tell. origin: 'centre' or
+    'corner', what `x y z` are. unit: 'm', 'cm', 'mm', 'in' or 'ft', of all lengths. container: (3,)
+    the inner size of each container, in the unit of the file. columns: by role, such as {'mass':
+    'gross'}. ignore: columns that decide on nothing. up: 'x', 'y' or 'z', the axis of the file that
+    is up. turns: 'degrees' or 'radians'. frames: 'own' or 'one', whether each container has a frame
+    of its own.
 
-    What a file says wrongly about some boxes is among the plan's faults. MJCF and URDF need the
-    extra `sim`. Raises OSError, and ValueError with the file and the reason for what is no plan.
+    What a file says wrongly about some boxes is among the plan's faults. Raises OSError, and
+    ValueError with the file and the reason for what is no plan, or with all that is open about it.
     """
-    return read_any(path, Given(origin, unit, container)).plan
+    return read_any(path, Given(origin, unit, container, columns or {}, ignore, up, turns,
+                                frames)).plan
 
 
 def read_any(path: str | os.PathLike[str], given: Given = NOTHING) -> ReadPlan:
     """Return the plan of a file as `read_plan` does, and how its boxes stand on each other."""
     file = Path(path)
-    for name, value, words in (('origin', given.origin, ORIGINS), ('unit', given.unit, [*UNITS])):
-        if value is not None and value not in words:
-            raise ValueError(f'{name} must be one of {", ".join(words)}, not {short_repr(value)}')
+    given.check()
     try:
-        data = read_regular(file, MOST_BYTES)
-        return _read(file, data, given)
+        return _read(file, read_regular(file, MOST_BYTES), given)
     except OSError as error:
         if error.filename is not None:
             raise
         raise ValueError(f'{file}: {error}') from None
     except RecursionError:
         raise ValueError(f'{file}: it is nested too deeply') from None
-    except UnicodeDecodeError as error:
-        raise ValueError(f'{file}: byte {error.start} is not UTF-8; what is read: {FORMATS}'
-                         ) from None
     except ValueError as error:
-        if str(error).startswith(str(file)):
-            raise
         raise ValueError(f'{file}: {error}') from None
 
 
@@ -72,43 +77,29 @@ def _read(file: Path, data: bytes, given: Given) -> ReadPlan:
     start = data[:4096].decode('latin-1').removeprefix('ï»¿').lstrip()
     ending = file.suffix.lower()
     if start[:1] in ('{', '['):
-        return _read_json(file, data, given)
+        plan, taken = read_packing(_tables(data), given)
+        return ReadPlan(plan, 'faces', taken)
     first = next(filter(is_first, start.splitlines()), '')
     is_edi = start[:4] in ('UNA:', 'UNB+') or start[:3] in ('UNA', 'UNB', 'UNH') or ending == '.edi'
-    if not is_edi and (ending in ('.csv', '.tsv') or is_header(first)):
-        plan, form = read_csv(data.decode('utf-8'), given)
-        return ReadPlan(plan, 'faces', form)
-    _tells_itself(given)
+    if not is_edi and (ending in ('.csv', '.tsv') or _is_table(first)):
+        plan, taken = read_packing([read_csv(data.decode('utf-8'))], given)
+        return ReadPlan(plan, 'faces', taken)
+    for name, value in given._asdict().items():
+        if value:
+            raise ValueError(f'{name} must not be given: it is for CSV and JSON alone')
     if is_edi:
-        from .baplie import read_baplie
         return ReadPlan(read_baplie(data.decode('latin-1')), 'corners')
     if start.startswith('<'):
-        return ReadPlan(_read_xml(file, data), 'faces')
-    if ending in ('.yaml', '.yml'):
-        from .scene import read_scene_plan
-        return ReadPlan(read_scene_plan(file), 'faces')
+        raise ValueError(WORLDS)
     shown = start.partition('\n')[0].strip()[:60].lower()
     raise ValueError(f'line 1: {shown!r} begins no format that is read: {FORMATS}' if shown else
                      f'it is empty; what is read: {FORMATS}')
 
 
-def _tells_itself(given: Given) -> None:
-    """Raise ValueError for what is given of a file that tells it itself."""
-    for name, value in given._asdict().items():
-        if value is not None:
-            raise ValueError(f'{name} must not be given: it is for CSV and JSON of packers alone')
-
-
-def _read_xml(file: Path, data: bytes) -> Plan:
-    from .sdf import parse_xml, read_sdf
-
-    root = parse_xml(data)
-    if root.tag in ('mujoco', 'robot'):
-        from .mjcf import read_mjcf
-        return read_mjcf(file)
-    if root.tag in ('sdf', 'gazebo', 'world', 'model'):
-        return read_sdf(root)
-    raise ValueError(f'line 1: <{root.tag}> begins no format that is read: {FORMATS}')
+def _is_table(line: str) -> bool:
+    """Return whether a line is a header, whatever its file is called."""
+    cells, delimiter = header_of(line)
+    return is_header(cells) or bool(delimiter) and len(cells) >= FEWEST
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -120,17 +111,13 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return document
 
 
-def _read_json(file: Path, data: bytes, given: Given) -> ReadPlan:
+def _tables(data: bytes) -> list[Table]:
+    """Return the tables of a JSON document. Raises ValueError where it has none."""
     try:
         document = json.loads(data, object_pairs_hook=_object)
     except json.JSONDecodeError as error:
         raise ValueError(f'line {error.lineno}: it is not JSON: {error.msg}') from None
-    read = read_packing(document, given)
-    if read is not None:
-        return ReadPlan(read.plan, 'faces', read.form)
-    if isinstance(document, Mapping) and {'boxes', 'bodies', 'pairs'} & document.keys():
-        from .scene import read_scene_plan
-        _tells_itself(given)
-        return ReadPlan(read_scene_plan(file), 'faces')
-    raise ValueError('it is JSON, but neither a packing plan (boxes: [...], see '
-                     'msg_schemas/plan.json) nor a scene file')
+    tables = read_tables(document)
+    if not tables:
+        raise ValueError('it is JSON, but has no list of boxes')
+    return tables

@@ -9,6 +9,13 @@ import numpy as np
 from ..core import DEPTH_FLOOR, native
 from ..solver.pose import rotation_matrix
 
+EDGE = 1e-6
+"""What boxes share across gravity at least where one is above the other [m]: rounding is less."""
+
+
+MOST_LOOKS = 200_000_000
+"""Of boxes that hang at what may be below them: some 5 s."""
+
 
 def across_of(direction: np.ndarray) -> np.ndarray:
     """Return two unit vectors (2, 3) across a direction, and across each other."""
@@ -39,15 +46,24 @@ def heights(sizes: np.ndarray, poses: np.ndarray, frame: np.ndarray, body: np.nd
     """Return how high the boxes (n,) of bodies that hang are above what is below [m].
 
     frame: (3, 3) rows: two directions across gravity, and the one against it. hangs: by body.
-    By bounding boxes along the frame. Infinity: above nothing; NaN: the box does not hang.
+    By bounding boxes along the frame. Infinity: above nothing; NaN: the box does not hang, or more
+    boxes are near than are looked at.
     """
     half = np.abs(frame @ rotation_matrix(poses[:, 3:])) @ sizes[:, :, None] / 2.0
     middle, half = poses[:, :3] @ frame.T, half[:, :, 0]
     low, high = middle - half, middle + half
     height = np.full(len(sizes), np.nan)
+    order = np.argsort(low[:, 0], kind='stable')
+    start, widest, left = low[order, 0], (high - low)[:, 0].max(initial=0.0), MOST_LOOKS
     for box in np.flatnonzero(hangs[body]):
-        below = (body != body[box]) & (high[:, 2] <= low[box, 2]) & (
-            (low < high[box]) & (low[box] < high))[:, :2].all(axis=1)
+        first, last = np.searchsorted(start, (low[box, 0] - widest, high[box, 0]))
+        left -= last - first
+        if left < 0:
+            break
+        others = order[first:last]
+        shared = np.minimum(high[others], high[box]) - np.maximum(low[others], low[box])
+        below = others[(body[others] != body[box]) & (high[others, 2] <= low[box, 2])
+                       & (shared[:, :2] > EDGE).all(axis=1)]
         height[box] = low[box, 2] - high[below, 2].max(initial=-np.inf)
     return height
 

@@ -20,7 +20,7 @@ a body's weight, and of that times its radius of gyration.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -69,7 +69,7 @@ BATCH = 300
 MOST_ENTRIES = 2_000_000
 """Of a programme's matrix: 300 bytes each."""
 MOST_WORK, STEPS = 3e9, 30
-"""Work of all programmes, 2 to 6 ns each, and steps that a programme is expected to take."""
+"""Work of a plan, and steps that a programme is expected to take."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +104,8 @@ class Beds:
     """(k,) of gyration about the normal [m]."""
     area: np.ndarray
     """(k,) [m²]."""
+    friction: np.ndarray
+    """(k,) Coulomb's μ."""
     bearings: Bearings
     """(k,) where they press; between the points of the hull is all that they can."""
 
@@ -128,18 +130,26 @@ class Rest:
         return np.abs(self.missing).max(axis=1, initial=0.0) > FALLS
 
 
-def settle(bodies: Bodies, beds: Beds, friction: float,
-           report: Callable[[int], None] = lambda count: None, work: Work | None = None) -> Rest:
+@dataclass
+class Work:
+    """What a plan may still take."""
+
+    left: float = field(default_factory=lambda: MOST_WORK)
+    """In units of 2 to 6 ns: of a programme's step, the entries of its matrix and factors, to the
+    power of 1.25."""
+
+
+def settle(bodies: Bodies, beds: Beds, work: Work,
+           report: Callable[[int], None] = lambda count: None) -> Rest:
     """Return what the patches carry.
 
     Small groups come first. Those that would take more than what is left of the work are not
-    solved; None is a work of MOST_WORK.
+    solved.
     report: is called with the number of bodies that were solved since.
     """
-    work = work or Work(MOST_WORK)
     load, centre = np.zeros(len(beds.pairs)), beds.centre.copy()
     own = bodies.centre
-    bodies, added = add_up(bodies, beds, friction, load, centre)
+    bodies, added = add_up(bodies, beds, load, centre)
     report(len(added))
     missing = np.zeros((len(bodies.weight), 6))
     left = np.flatnonzero(~np.isin(beds.pairs[:, 1], added))
@@ -165,7 +175,7 @@ def settle(bodies: Bodies, beds: Beds, friction: float,
                 try:
                     part = _Programme(bodies, beds, members, rows, flat and way != GRIPPING,
                                       is_tight | (way == GRIPPING), work)
-                    load[rows], centre[rows], missing[members] = part.settle(friction, way)
+                    load[rows], centre[rows], missing[members] = part.settle(way)
                 except _TooMuch:
                     load[rows] = missing[members] = np.nan
 
@@ -190,7 +200,7 @@ def settle(bodies: Bodies, beds: Beds, friction: float,
     has_others = np.bincount(lower, minlength=len(group)) > 0
     is_first = np.bincount(upper[falls[lower]], minlength=len(group)) == 0
     may_turn = falls & is_first & (has_others | (inside > bodies.need))
-    if friction:
+    if beds.friction.any():
         solve(rests & any_of(may_turn[free], group[free]) & is_level & (size <= MOST_GRIPPING)
               & _have_rings(bodies, beds, left, of_patch, size), GRIPPING)
     return Rest(load, centre, missing, pressed_margins(beds, load, centre, len(own)))
@@ -252,7 +262,7 @@ def _batches(groups: np.ndarray, size: np.ndarray, most: int) -> Iterator[np.nda
         yield from np.split(groups, np.flatnonzero(np.diff(number)) + 1)
 
 
-def add_up(bodies: Bodies, beds: Beds, friction: float, load: np.ndarray, centre: np.ndarray,
+def add_up(bodies: Bodies, beds: Beds, load: np.ndarray, centre: np.ndarray,
            ) -> tuple[Bodies, np.ndarray]:
     """Write the loads of bodies that have one carrier, from above, as far as they hold.
 
@@ -279,7 +289,8 @@ def add_up(bodies: Bodies, beds: Beds, friction: float, load: np.ndarray, centre
                                     np.arange(len(row) + 1) * hull.shape[1],
                                     np.ascontiguousarray(at[:, :2]))
         cosine = np.minimum(normal[:, 2], 1.0)
-        slides = (cosine <= 1.0 - LEVEL) & (np.sqrt(1.0 - cosine**2) > friction * cosine)
+        slides = (cosine <= 1.0 - LEVEL) & (
+            np.sqrt(1.0 - cosine**2) > beds.friction[row] * cosine)
         holds = (inside > bodies.need[box]) & ~slides
         box, row = box[holds], row[holds]
         added.append(box)
@@ -297,14 +308,6 @@ class _TooMuch(Exception):
     """Groups take more memory or time than is left."""
 
 
-@dataclass
-class Work:
-    """What the programmes may still take."""
-
-    left: float
-    """Of a step: the entries of its matrix and factors, to the power of 1.25, as measured."""
-
-
 class _Programme:
     """The quadratic programmes of some groups.
 
@@ -317,6 +320,7 @@ class _Programme:
         self.flat, self.members, self.rows, self.beds = flat, members, rows, beds
         self.work = work
         self.unit = bodies.weight[members].mean()
+        self.friction = beds.friction[rows]
         self.weight = bodies.weight[members] / self.unit
         place = np.full(len(bodies.weight), -1)
         place[members] = np.arange(len(members))
@@ -364,12 +368,12 @@ class _Programme:
                                                     np.concatenate(columns))),
                           (len(self.keep) * len(self.members), len(force)))
 
-    def settle(self, friction: float, way: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def settle(self, way: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return loads (k,), centres of pressure (k, 3), and what is missing (n, 6)."""
         bound = np.zeros(len(self.rows))
         at = self.beds.centre[self.rows]
         for _ in range(1 if self.flat or way == GRIPPING else PASSES_MAX):
-            rubs = self._gripping(friction) if way == GRIPPING else self._rubbing(bound, at)
+            rubs = self._gripping() if way == GRIPPING else self._rubbing(bound, at)
             force, missing = self._solve(rubs, way == SURE)
             load = np.bincount(self.patch, force, minlength=len(self.rows))
             moment = np.stack([np.bincount(self.patch, force * self.point[:, axis],
@@ -377,7 +381,7 @@ class _Programme:
             presses = load > NOISE
             at = np.where(presses[:, None], moment / np.where(presses, load, 1.0)[:, None],
                           self.beds.centre[self.rows])
-            before, bound = bound, friction * np.where(presses, load, 0.0)
+            before, bound = bound, self.friction * np.where(presses, load, 0.0)
             if np.abs(bound - before).max(initial=0.0) < SETTLED:
                 break
         whole = np.zeros((len(self.members), 6))
@@ -466,15 +470,15 @@ class _Programme:
             self._wrenches(rubs, None, radius[:, None] * normal)), format='csc'),
             np.tile(self.beds.area[self.rows].mean() / self.beds.area[rows], 3), bound[rubs], share)
 
-    def _gripping(self, friction: float) -> _Friction:
+    def _gripping(self) -> _Friction:
         """Return friction at all points of level patches, up to its share of what presses there."""
-        from scipy.sparse import hstack, identity
+        from scipy.sparse import diags, hstack
 
         count = len(self.point)
         return _Friction(hstack([self._wrenches(self.patch, self.point, np.tile(along, (count, 1)))
                                  for along in np.eye(3)[:2]], format='csc'),
                          np.tile(1.0 / self.stiffness, 2), np.zeros(count),
-                         friction * identity(count, format='csc'))
+                         diags(self.friction[self.patch], format='csc'))
 
 
 @dataclass(frozen=True, eq=False)
@@ -506,19 +510,7 @@ def hull_edges(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     A hull without an inside has edges on either side, or one without a normal.
     """
-    ordered = sorted({*map(tuple, points.tolist())})
-    corners: list[tuple[float, float]] = []
-    for side in ordered, ordered[::-1]:
-        begun = len(corners)
-        for x, y in side:
-            while len(corners) > begun + 1:
-                (ax, ay), (bx, by) = corners[-2:]
-                if (bx - ax) * (y - ay) > (by - ay) * (x - ax):
-                    break
-                corners.pop()
-            corners.append((x, y))
-        corners.pop()
-    start = np.array(corners or ordered)
+    start = native.hull(np.ascontiguousarray(points))
     along = np.roll(start, -1, axis=0) - start
     length = np.linalg.norm(along, axis=1, keepdims=True)
     return start, np.column_stack((-along[:, 1], along[:, 0])) / np.where(length > 0.0, length, 1.0)

@@ -15,29 +15,34 @@ from itertools import groupby
 
 import numpy as np
 
-from . import statics
 from .inspection import Fall
-from .kept_loads import KeptLoads
+from .kept_loads import VISIT, KeptLoads
 from .meetings import Meetings, beds_of
 from .plan import Plan
 from .statics import Bodies, Work, settle
 from .verdict import verdict_of
 
+ROW = 500.0
+"""Work of a patch among which a group is looked for, in the unit of `Work`."""
 
-def falls_of(plan: Plan, meet: Meetings, bodies: Bodies, friction: float | None,
+
+def falls_of(plan: Plan, meet: Meetings, bodies: Bodies, work: Work,
              ) -> tuple[tuple[Fall, ...], list[int]]:
     """Return what falls at which step, and the boxes of which this is not always known.
 
-    meet: all patches that may bear. friction: None judges geometry alone.
+    meet: all patches that may bear. Where the work is done, later steps are not judged.
     """
     if plan.order is None or not meet.fixed.any():
         return (), []
-    loading = _Loading(plan, meet, bodies, friction)
+    loading = _Loading(plan, meet, bodies, work)
     first = np.unique(plan.body, return_index=True)[1]
     stack, order = plan.stack[first], plan.order[first]
     free = np.flatnonzero(~meet.fixed)
     come = free[np.lexsort((order[free], stack[free]))].tolist()
-    for (_, step), new in groupby(come, key=lambda body: (stack[body], order[body])):
+    for (label, step), new in groupby(come, key=lambda body: (stack[body], order[body])):
+        if work.left <= 0.0:
+            loading.is_unknown |= ~meet.fixed & (stack >= label)
+            break
         loading.come([*new], int(step))
     falls = [Fall(step, box, cause, until) for body, step, cause, until in loading.falls()
              for box in np.flatnonzero(plan.body == body).tolist()]
@@ -48,9 +53,8 @@ def falls_of(plan: Plan, meet: Meetings, bodies: Bodies, friction: float | None,
 class _Loading:
     """The bodies that have come, and which of them stand."""
 
-    def __init__(self, plan: Plan, meet: Meetings, bodies: Bodies, friction: float | None) -> None:
-        self._plan, self._meet, self._bodies, self._friction = plan, meet, bodies, friction
-        self._work = Work(statics.MOST_WORK)
+    def __init__(self, plan: Plan, meet: Meetings, bodies: Bodies, work: Work) -> None:
+        self._plan, self._meet, self._bodies, self._work = plan, meet, bodies, work
         self._here, self._stands = meet.fixed.tolist(), meet.fixed.tolist()
         self._fixed = meet.fixed.tolist()
         count = len(self._here)
@@ -71,7 +75,8 @@ class _Loading:
             else:
                 self._beside[lower].append(row)
                 self._beside[upper].append(row)
-        self._loads = KeptLoads(meet, plan.body[meet.pairs], self._below, bodies, friction)
+        self._loads = KeptLoads(meet, plan.body[meet.pairs], self._below, bodies,
+                                work, weighed=plan.masses is not None)
 
     def come(self, new: list[int], step: int) -> None:
         """Take the bodies that come at a step."""
@@ -112,6 +117,7 @@ class _Loading:
                     if self._here[other] and not self._fixed[other] and other not in group:
                         group.add(other)
                         todo.append(other)
+        self._work.left -= VISIT * len(group)
         return sorted(group)
 
     def _solve(self, group: list[int], step: int) -> None:
@@ -120,13 +126,14 @@ class _Loading:
         if self.is_unknown[members].any():  # a group that takes too much only grows
             self.is_unknown[members] = True
             return
+        self._work.left -= ROW * len(self._ends)
         is_member = np.zeros(len(self._here), bool)
         is_member[members] = True
         part = self._meet.among(plan.body, self._meet.fixed | is_member)
         bodies = replace(self._bodies, fixed=~is_member, need=part.need(plan.body))
         rest = None
-        if self._friction is not None:
-            rest = settle(bodies, beds_of(plan, part), self._friction, work=self._work)
+        if plan.masses is not None:
+            rest = settle(bodies, beds_of(plan, part), self._work)
         verdict = verdict_of(plan, part, bodies, rest)
         if rest is not None:
             rows = part.carries

@@ -14,6 +14,10 @@ from .plan import Plan
 from .standing import hull_margins, standing
 from .statics import LEVEL, Bodies, Rest
 
+GOES = 'goes with what falls'
+CAUSES = ('hangs', 'unsupported', 'tips under its load', 'slides', GOES, 'overloaded')
+"""What may be wrong with a box, the worst first."""
+
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
@@ -58,15 +62,15 @@ def verdict_of(plan: Plan, meet: Meetings, bodies: Bodies, rest: Rest | None) ->
     goes = np.bincount(upper[falling], minlength=count) > 0
     cause = np.select(
         [stands, hangs, margin <= bodies.need, goes, slides],
-        ['', 'hangs', 'unsupported', 'goes with what falls', 'slides'], 'tips under its load')
+        ['', 'hangs', 'unsupported', GOES, 'slides'], 'tips under its load')
     if not fixed.any():  # so that nothing is known of what stands
         cause[:] = ''
     goes_with = np.arange(count)
-    falling = falling[cause[upper[falling]] == 'goes with what falls']
+    falling = falling[cause[upper[falling]] == GOES]
     goes_with[upper[falling]] = lower[falling]
     for _ in range(count.bit_length()):
         goes_with = goes_with[goes_with]
-    goes_with[(cause != 'goes with what falls') | (cause[goes_with] == cause)] = -1
+    goes_with[(cause != GOES) | (cause[goes_with] == cause)] = -1
     return Verdict(stands & ~unknown, unknown, cause, goes_with, hangs & ~stands,
                    np.where(fixed, np.inf, margin),
                    np.where(fixed & (rest is not None), np.inf, loaded))

@@ -15,8 +15,7 @@ from ..core import DEPTH_FLOOR, LENGTH_MIN
 from ..solver.contact_solver import ContactSolver
 from ..solver.contacts_of import contacts_of
 from ..solver.pose import rotation_matrix
-from .crowd import most_near
-from .meetings import Meetings
+from .meetings import Meetings, most_near
 from .plan import Plan
 from .room import ROUNDING
 from .statics import LEVEL

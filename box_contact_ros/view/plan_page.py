@@ -22,11 +22,9 @@ import numpy as np
 
 from ..arguments import one_line, program_main, program_parser, within
 from ..extras import MissingExtra, require
-from ..plans.inspect_files import NOT_READ, add_given, given_of
-from ..plans.inspect_plan import inspect_plan
+from ..plans.inspect_files import NOT_READ, add_options, judged
 from ..plans.inspection import Inspection
-from ..plans.plot import COLOURS
-from ..plans.read_plan import read_any
+from ..plans.plot import COLOURS, spans
 from ..plans.room import are_walls
 from ..solver.checks import printable
 from ..solver.pose import rotation_matrix
@@ -45,8 +43,12 @@ AWAY = 3.0
 class PlanPage:
     """A page of one plan, which stays as it is."""
 
-    def __init__(self, host: str, port: int, title: str, found: Inspection) -> None:
-        """Serve a plan at a port, or the next that is free. Raises OSError."""
+    def __init__(self, host: str, port: int, title: str, found: Inspection, taken: str = '',
+                 ) -> None:
+        """Serve a plan at a port, or the next that is free. Raises OSError.
+
+        taken: what was taken of the file.
+        """
         from .server import Server
 
         self.found = found
@@ -57,7 +59,7 @@ class PlanPage:
         gui.main_panel.dock_right()
         gui.main_panel.set_width(PANEL_WIDTH)
         self._clicked = gui.add_html(_section('clicked', CLICK_HINT), order=0.0)
-        gui.add_html(table(title, found), order=1.0)
+        gui.add_html(table(title, found, taken), order=1.0)
         self._middle = np.zeros(3)  # of what is drawn [m]
         self._drawn = ~are_walls(found.plan)
         self._shown = self._drawn
@@ -159,13 +161,7 @@ def worst_boxes(found: Inspection) -> dict[str, int]:
 def hit_by(sizes: np.ndarray, poses: np.ndarray, origin: np.ndarray, direction: np.ndarray,
            ) -> int | None:
     """Return the first box that a ray hits, by index, or None."""
-    axes = rotation_matrix(poses[:, 3:])
-    start = np.einsum('nij,ni->nj', axes, origin - poses[:, :3])
-    along = np.einsum('nij,i->nj', axes, direction)
-    with np.errstate(divide='ignore', invalid='ignore'):
-        ends = np.stack(((-sizes / 2.0 - start) / along, (sizes / 2.0 - start) / along))
-    near = np.nanmax(ends.min(axis=0), axis=1)
-    far = np.nanmin(ends.max(axis=0), axis=1)
+    near, far = (row[0] for row in spans(sizes, poses, origin[None], direction))
     near[(near > far) | (far < 0.0)] = np.inf
     return int(near.argmin()) if np.isfinite(near).any() else None
 
@@ -185,8 +181,8 @@ def lines_of(found: Inspection, box: int) -> list[str]:
     return lines
 
 
-def table(title: str, found: Inspection) -> str:
-    """Return the summary, a legend of the colours that are there, and the rows, as HTML."""
+def table(title: str, found: Inspection, taken: str = '') -> str:
+    """Return what was taken, the summary, a legend of the colours, and the rows, as HTML."""
     verdicts = found.verdicts
     legend = ' &ensp;'.join(
         f'<span style="white-space:nowrap"><span style="color:{colour}">■</span> {verdict} '
@@ -195,9 +191,12 @@ def table(title: str, found: Inspection) -> str:
     rows = found.rows()
     shown = ''.join(f'<div>{html.escape(str(row))}</div>' for row in rows[:MOST_ROWS])
     more = f'<div>and {len(rows) - MOST_ROWS:,} more</div>' if len(rows) > MOST_ROWS else ''
-    return (_section('file', html.escape(title)) + _section('verdict', html.escape(
-        found.summary()), 'font-weight:600') + _section('legend', legend)
-        + _section('rows', shown + more, 'font-family:monospace;white-space:pre-wrap'))
+    return ''.join((
+        _section('file', html.escape(title)),
+        _section('taken', html.escape(printable(taken))) if taken else '',
+        _section('verdict', html.escape(found.summary()), 'font-weight:600'),
+        _section('legend', legend),
+        _section('rows', shown + more, 'font-family:monospace;white-space:pre-wrap')))
 
 
 def _section(name: str, content: str, style: str = '') -> str:
@@ -215,15 +214,15 @@ def main(args: Sequence[str] | None = None) -> int:
                         'reaches it sees the page')
     parser.add_argument('--port', type=within(1, 65535), default=8080, help='port to serve at, or '
                         'the next that is free')
-    add_given(parser)
+    add_options(parser)
     options = parser.parse_args(args)
     ended = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ended.set())
     try:
         require('view')
-        plan, bears, _ = read_any(options.file, given_of(options))
-        page = PlanPage(options.host, options.port, options.file, inspect_plan(plan, bears=bears))
+        found, taken = judged(options.file, options)
+        page = PlanPage(options.host, options.port, options.file, found, taken)
     except (OSError, ValueError, MissingExtra) as error:
         print(one_line(error), file=sys.stderr)
         return NOT_READ

@@ -240,7 +240,7 @@ def trihedron(folder: Path) -> None:
 
 
 def pallets(folder: Path) -> None:
-    """Draw pallets.png, a real order, and pallet.png, a packer's file, coloured by cause."""
+    """Draw a real order, a packer's file and a lorry with its trailer, coloured by cause."""
     examples = Path(__file__).parents[1] / 'examples'
     orders = read_plan(examples / 'pallets' / 'packing_plans.json')
     kept = [n for n, name in enumerate(orders.names)
@@ -248,7 +248,9 @@ def pallets(folder: Path) -> None:
     order = Plan(orders.sizes[kept], orders.poses[kept], orders.masses[kept],
                  ground=len(kept) - 1, names=[orders.names[n].removeprefix(ORDER) for n in kept])
     packed = read_plan(examples / 'files' / 'solution.csv', unit='mm')
-    for name, plan, size in (('pallets', order, (6.6, 6.0)), ('pallet', packed, (7.0, 3.6))):
+    lorry = read_plan(examples / 'files' / 'semitrailer.csv')
+    for name, plan, size in (('pallets', order, (9.0, 6.0)), ('pallet', packed, (9.0, 4.5)),
+                             ('lorry', lorry, (9.0, 4.0))):
         figure = inspect_plan(plan).plot()
         figure.set_size_inches(*size)
         figure.savefig(folder / f'{name}.png', dpi=80, metadata={'Software': None})

@@ -33,6 +33,7 @@ ARGUMENTS = {'save_yard.py': ('/tmp/yard.yaml',)}
 RUNS = {'lift.py': 10, 'lockstep_client.py': 2}
 """A simulator that is started anew repeats the stamps of its last run, and finds what it left."""
 NEEDS = {'mujoco_loop.py': 'mujoco', 'container_stack.py': 'mujoco',
+         'mujoco_plan.py': 'mujoco',
          'dask_plans.py': 'distributed',
          'tf_to_pose.py': 'tf2_ros'} | dict.fromkeys(CLIENTS, 'box_contact_msgs.msg')
 QUICK = {'vectorised_env.py': 'main(100)'}

@@ -26,8 +26,8 @@ def test_the_page_shows_what_is_printed(arguments, printed, monkeypatch, capsys)
     assert capsys.readouterr().out == printed
 
 
-def test_the_page_has_a_packers_file_a_ship_and_a_world():
-    assert [Path(arguments).suffix for arguments, _ in SHOWN] == ['.csv', '.edi', '.sdf']
+def test_the_page_has_a_packers_file_a_lorry_and_a_ship():
+    assert [Path(arguments).suffix for arguments, _ in SHOWN] == ['.csv', '.csv', '.edi']
 
 
 def test_every_fault_is_on_the_page():

@@ -6,15 +6,12 @@ from __future__ import annotations
 
 import json
 import re
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from box_contact_ros.plans import inspect_files
 from box_contact_ros.plans.inspect_plan import inspect_plan
-from box_contact_ros.plans.packing import means_amount
 from box_contact_ros.plans.plan import Plan
 from box_contact_ros.plans.read_plan import read_any, read_plan
 from box_contact_ros.solver.contacts_of import contacts_of
@@ -50,43 +47,6 @@ def document(**changed: object) -> str:
     return json.dumps({'boxes': [box, {**box, 'name': 'b', 'z': 1.5, **changed}]})
 
 
-BOX = '<geometry><box><size>1 1 1</size></box></geometry>'
-
-
-def collision(shape: str = BOX, name: str = 'c', more: str = '') -> str:
-    """Return a link with a collision."""
-    return f'<link name="l"><collision name="{name}">{more}{shape}</collision></link>'
-
-
-def model(name: str, content: str, z: float = 0.5) -> str:
-    """Return a model at a height."""
-    return f'<model name="{name}"><pose>0 0 {z} 0 0 0</pose>{content}</model>'
-
-
-FLOOR = ('<model name="floor"><static>1</static><link name="l"><collision name="c"><geometry>'
-         '<plane/></geometry></collision></link></model>')
-
-
-def world(*content: str) -> str:
-    """Return a world with a floor."""
-    return f'<sdf version="1.9"><world name="w">{FLOOR}{"".join(content)}</world></sdf>'
-
-
-A = model('a', collision())
-
-
-def mjcf(*content: str, more: str = '') -> str:
-    """Return a model of MuJoCo with a floor."""
-    return (f'<mujoco><worldbody><geom name="floor" type="plane" size="1 1 1"/>{"".join(content)}'
-            f'</worldbody>{more}</mujoco>')
-
-
-def body(name: str, z: float, *, x: float = 0.0, kind: str = 'box', more: str = '') -> str:
-    """Return a free body of MuJoCo, a cube of 1 m."""
-    return (f'<body name="{name}" pos="{x} 0 {z}"><freejoint/><geom name="{name}" type="{kind}" '
-            f'size=".5 .5 .5" {more}/></body>')
-
-
 PLACED = '0010082 22G1'
 FAULTS = {
     # BAPLIE
@@ -95,15 +55,16 @@ FAULTS = {
     'gap in the hold': ('p.edi', baplie('0010002 22G1', '0010008 22G1'), 'gap', '0010008',
                         'down to tier 02'),
     'gap to the deck': ('p.edi', baplie('0010086 22G1'), 'gap', '0010086', 'down to the deck'),
-    'slot twice': ('p.edi', baplie(PLACED, PLACED), 'twice', '0010082', 'TEST0000001 has the slot'),
+    'slot twice': ('p.edi', baplie(PLACED, PLACED), 'slot taken', '0010082',
+                   'TEST0000001 has the slot'),
     'number twice': ('p.edi', baplie(PLACED, '0010084 22G1').replace('TEST0000001', 'TEST0000000'),
                      'twice', '0010084', 'TEST0000000 is at 0010082, too'),
     'slot of 6': ('p.edi', baplie(PLACED, '010082 22G1'), 'slot', '010082', 'of 6 characters'),
     'not stowed': ('p.edi', baplie(PLACED, '9999999 22G1'), 'slot', 'TEST0000001', 'not stowed'),
-    'light': ('p.edi', baplie(PLACED, '0010084 22G1 MEA+WT++KGM:24.500'), 'mass', '0010084',
+    'light': ('p.edi', baplie(PLACED, '0010084 22G1 MEA+WT++KGM:24.500'), 'weight', '0010084',
               '24.500 KGM, less than any container'),
     'on breakbulk': ('p.edi', baplie(PLACED, '0010084 22G1', '0010088 22G1').replace(
-        'EQD+CN+TEST0000001', 'EQD+BB+TEST0000001'), 'slot', '0010088', 'stands on what is left'),
+        'EQD+CN+TEST0000001', 'EQD+BB+TEST0000001'), 'held', '0010088', 'stands on what is left'),
     'slot of 8': ('p.edi', baplie(PLACED, '00010082 22G1'), 'slot', '00010082', 'of 8 characters'),
     'slot of signs': ('p.edi', baplie(PLACED, '00100$$ 22G1'), 'slot', '00100$$', '7 digits'),
     'no slot': ('p.edi', baplie(PLACED, '- 22G1'), 'slot', 'TEST0000001', 'without a slot'),
@@ -114,18 +75,18 @@ FAULTS = {
     'negative weight': ('p.edi', baplie(PLACED, '0010084 22G1 MEA+WT++KGM:-5'), 'mass', '0010084',
                         'its weight is -5'),
     'unit': ('p.edi', baplie(PLACED, '0010084 22G1 MEA+WT++XYZ:5'), 'mass', '0010084', 'unit XYZ'),
-    'too heavy': ('p.edi', baplie(PLACED, '0010084 22G1 MEA+WT++KGM:99999999'), 'mass', '0010084',
+    'too heavy': ('p.edi', baplie(PLACED, '0010084 22G1 MEA+WT++KGM:99999999'), 'weight', '0010084',
                   'more than any container'),
-    'heavy': ('p.edi', baplie(PLACED, '0010084 22G1 MEA+VGM++KGM:215000'), 'mass', '0010084',
+    'heavy': ('p.edi', baplie(PLACED, '0010084 22G1 MEA+VGM++KGM:215000'), 'weight', '0010084',
               '215000 KGM, more than any container'),
     'weight of 0': ('p.edi', baplie(PLACED, '0010084 22G1 MEA+VGM++KGM:0'), 'mass', '0010084',
                     'its weight is 0'),
     'over-height with an empty element': (
-        'p.edi', baplie('0010082 22U1 MEA+WT++KGM:9000 DIM+9++CMT:::45'), 'dimension', '0010082',
+        'p.edi', baplie('0010082 22U1 MEA+WT++KGM:9000 DIM+9++CMT:::45'), 'goods', '0010082',
         '45 cm in height'),
-    'over-height': ('p.edi', baplie('0010082 22U1 MEA+WT++KGM:9000 DIM+9+CMT:::79'), 'dimension',
+    'over-height': ('p.edi', baplie('0010082 22U1 MEA+WT++KGM:9000 DIM+9+CMT:::79'), 'goods',
                     '0010082', '79 cm in height'),
-    'over-width': ('p.edi', baplie('0010082 22P1 MEA+WT++KGM:9000 DIM+7+CMT::30'), 'dimension',
+    'over-width': ('p.edi', baplie('0010082 22P1 MEA+WT++KGM:9000 DIM+7+CMT::30'), 'goods',
                    '0010082', '30 cm on the right'),
     'end missing': ('p.edi', baplie(PLACED, end='RFF+BM:1'), 'cut', '', 'no UNT'),
     'cut': ('p.edi', baplie(PLACED, end='UNT+99+1'), 'cut', '', 'counts 99 segments, and there '
@@ -137,17 +98,24 @@ FAULTS = {
     'size': ('p.csv', sheet(FLAT, 'b,1,-1,1,0,0,1.5'), 'dimension', 'b', '(1, -1, 1) is not '
                                                                          'positive'),
     'size in words': ('p.csv', sheet(FLAT, 'b,1,one,1,0,0,1.5'), 'dimension', 'b', "width is 'one"),
-    'short row': ('p.csv', sheet(FLAT, 'b,1,1,1,0,0'), 'cut', 'b', 'row 2 has 6 cells, and the '
+    'short row': ('p.csv', sheet(FLAT, 'b,1,1,1,0,0'), 'row', 'b', 'row 2 has 6 cells, and the '
                                                                    'header 7: left out'),
     'row without its end': ('p.csv', sheet(f'{FLAT},', 'b,1,1,1,0,0,1.5', more=',fixed'), 'cut',
                             'b', 'row 2 has 7 cells, and the header 8'),
-    'long row': ('p.csv', sheet(FLAT, 'b,1,1,1,1,0,0,1.5,,'), 'cut', 'b', 'has 8 cells'),
-    'end of the file': ('p.csv', sheet(f'{FLAT},2', 'b,1,1,1,0,0,1', more=',mass').strip(), 'cut',
-                        'b', 'left out'),
+    'long row': ('p.csv', sheet(FLAT, 'b,1,1,1,1,0,0,1.5,,'), 'row', 'row 2', 'has 8 cells'),
+    'end of the file': ('p.csv', sheet(f'{FLAT},2', 'b,1,1,1,0,0,1', more=',mass').strip(), 'row',
+                        'row 2', 'left out'),
     'quote': ('p.csv', sheet('"a', 'b,1,1,1,0,0,9', '",1,1,1,0,0,.5'), 'cut',
-              'a\nb,1,1,1,0,0,9', 'goes on over 1 lines'),
-    'colour': ('p.csv', sheet(f'{FLAT},red', more=',Colour'), 'column', 'Colour', 'not read'),
-    'weight': ('p.csv', sheet(f'{FLAT},3', more=',weight'), 'column', 'weight', 'may mean masses'),
+              'row 1', 'goes on over 1 lines'),
+    'colour': ('p.csv', sheet(f'{FLAT},red', more=',Colour'), 'ignored', 'Colour', 'not read'),
+    'a number': ('p.csv', sheet(f'{FLAT},3', more=',crush'), 'column', 'crush', '--ignore crush'),
+    'all one': ('p.csv', sheet(f'{FLAT},1', more=',Tragkraft'), 'column', 'Tragkraft', 'not read'),
+    'a number in words': ('p.csv', sheet(f'{FLAT},90°', more=',turn'), 'column', 'turn',
+                          'not read'),
+    'words that differ': ('p.csv', sheet(f'{FLAT},up', 'b,1,1,1,0,0,1.5,', more=',way'), 'column',
+                          'way', 'not read'),
+    'words alike': ('p.csv', sheet(f'{FLAT},up', 'b,1,1,1,0,0,1.5,up', more=',way'), 'ignored',
+                    'way', 'not read'),
     'no name of a column': ('p.csv', sheet(f'{FLAT},3,', more=',,fixed'), 'column', 'column 8',
                             'not read'),
     'place': ('p.csv', sheet(FLAT, 'b,1,1,1,nan,0,1.5'), 'pose', 'b', "x is 'nan'"),
@@ -160,80 +128,29 @@ FAULTS = {
              "mass is '-2'"),
     'mass missing': ('p.csv', sheet(f'{FLAT},2', 'b,1,1,1,0,0,1.5,', more=',mass'), 'mass', 'b',
                      'no mass'),
-    'limit': ('p.csv', sheet(f'{FLAT},x', more=',limit'), 'mass', 'a', "limit is 'x'"),
+    'limit': ('p.csv', sheet(f'{FLAT},x', more=',limit'), 'limit', 'a', "limit is 'x'"),
     'fixed': ('p.csv', sheet(f'{FLAT},', 'b,1,1,1,0,0,1.5,perhaps', more=',fixed'), 'pose', 'b',
               "fixed is 'perhaps'"),
-    'name twice': ('p.csv', sheet(FLAT, 'a,1,1,1,0,0,1.5'), 'twice', 'a', '2 boxes'),
     'no name': ('p.csv', sheet(FLAT, ',1,1,0,0,0,1.5'), 'dimension', 'row 2', '(1, 1, 0)'),
     'digits with _': ('p.csv', sheet(FLAT, 'b,1_0,1,1,0,0,1.5'), 'dimension', 'b', "'1_0'"),
     # JSON
     'text': ('p.json', document(width='wide'), 'dimension', 'b', "width is 'wide'"),
     'true': ('p.json', document(width=True), 'dimension', 'b', 'width is True'),
-    'null': ('p.json', document(x=None), 'pose', 'b', 'x is None'),
+    'null': ('p.json', document(x=None), 'pose', 'b', 'x is missing'),
     'NaN': ('p.json', document(x=float('nan')), 'pose', 'b', 'x is nan'),
-    'list': ('p.json', document(length=[1]), 'dimension', 'b', r'length is [1]'),
     'huge': ('p.json', document(length=10**400), 'dimension', 'b', 'length is 1000'),
-    'key': ('p.json', document(colour='red'), 'column', 'colour', 'not read'),
-    'limit by another key': ('p.json', document(maxLoad=3), 'column', 'maxLoad', 'may mean'),
-    'boxes in a key': ('p.json', document(parts=[{'name': 'c'}]), 'column', 'parts',
+    'key': ('p.json', document(colour='red'), 'ignored', 'colour', 'not read'),
+    'a number by another key': ('p.json', document(strength=3), 'column', 'strength', '--column'),
+    'boxes in a key': ('p.json', document(parts=[{'name': 'c'}]), 'part', 'boxes.parts',
                        'may have boxes'),
-    'key beside boxes': ('p.json', '{"by": "me", ' + document()[1:], 'column', 'by', 'not read'),
+    'key beside boxes': ('p.json', '{"by": "me", ' + document()[1:], 'ignored', 'by', 'not read'),
+    'a number beside boxes': ('p.json', '{"most": 7, ' + document()[1:], 'column', 'most',
+                              'not read'),
     'order with a limit': ('p.json', json.dumps({'1': [{'item': {
         'length/mm': 1, 'width/mm': 1, 'height/mm': 1, 'sequence': 1, 'weight/kg': 1,
         'max_load/kg': 1}, 'flb_coordinates': [0, 0, 0], 'orientation': 0}]}), 'column',
-        'max_load/kg', 'may mean'),
+        'item.max_load/kg', 'not read'),
     'no row': ('p.json', '{"boxes": [7, ' + document()[11:], 'dimension', 'row 1', 'missing'),
-    # SDF
-    'SDF size': ('p.sdf', world(A, model('b', collision(BOX.replace('1 1 1', '-1 1 1')))),
-                 'dimension', 'b::l::c', 'size: (-1, 1, 1) is not positive'),
-    'SDF size in words': ('p.sdf', world(A, model('b', collision(BOX.replace('1 1', 'x')))),
-                          'dimension', 'b::l::c', "its <size> is 'x 1'"),
-    'SDF pose': ('p.sdf', world(A, '<model name="b"><pose>1 2 3 4</pose></model>'), 'pose', 'b',
-                 "its pose is '1 2 3 4', not 6 numbers"),
-    'relative_to': ('p.sdf', world(A, model('b', collision(
-        more='<pose relative_to="lid">0 0 0 0 0 0</pose>'))), 'pose', 'b::l::c', 'relative to lid'),
-    'placement_frame': ('p.sdf', world(A, model('b" placement_frame="f', collision())), 'pose', 'b',
-                        'placement_frame f'),
-    'model twice': ('p.sdf', world(A, A), 'twice', 'a', 'two models'),
-    'collision twice': ('p.sdf', world(A.replace('</link>', f'<collision name="c">{BOX}'
-                                                            '</collision></link>')),
-                        'twice', 'a::l::c', 'two collisions'),
-    'include': ('p.sdf', world(A, '<include><uri>crane</uri></include>'), 'shape', 'crane',
-                'included'),
-    'mesh': ('p.sdf', world(A, model('b', collision('<geometry><mesh/></geometry>'))), 'shape',
-             'b::l::c', '1 mesh'),
-    'on a ball': ('p.sdf', world(A, model('b', collision(), 2.5), model('c', collision(
-        '<geometry><sphere><radius>.5</radius></sphere></geometry>'), 1.5)), 'shape',
-        'a::l::c  b::l::c', 'not judged'),
-    'scale': ('p.sdf', world(A, model('b', collision()), '<state><model name="b"><scale>2 2 2'
-                             '</scale></model></state>'), 'dimension', 'b', 'scales it by 2 2 2'),
-    'population': ('p.sdf', world(A, '<population name="p"/>'), 'shape', 'p', '<population>'),
-    'SDF mass': ('p.sdf', world(A.replace('<collision', '<inertial><mass>-1</mass></inertial>'
-                                          '<collision')), 'mass', 'a::l', 'its mass is -1'),
-    'bits': ('p.sdf', world(A.replace('</geometry>', '</geometry><surface><contact><collide_bitmask'
-                                      '>x</collide_bitmask></contact></surface>')), 'shape',
-             'a::l::c', "collide_bitmask 'x'"),
-    'model beside a world': ('p.sdf', world(A).replace('</sdf>', f'{A}</sdf>'), 'shape', 'a',
-                             'beside the world'),
-    'another world': ('p.sdf', world(A).replace('</sdf>', '<world name="v"/></sdf>'), 'shape', 'v',
-                      'another world'),
-    'joint to what is not read': ('p.sdf', world(A.replace(
-        '</model>', '<joint name="j"><parent>x</parent><child>l</child></joint></model>')), 'shape',
-        'a::l', 'joined to a::x'),
-    # MJCF, URDF, scene
-    'geom': ('p.xml', mjcf(body('a', .5), body('b', 5, kind='sphere')), 'shape', 'b', '1 sphere'),
-    'on a geom': ('p.xml', mjcf(body('a', 1.5), body('b', .5, kind='sphere')), 'shape', 'a',
-                  'not judged'),
-    'mesh file': ('p.xml', mjcf(body('a', .5), '<geom name="m" type="mesh" mesh="m"/>',
-                                more='<asset><mesh name="m" file="m.obj"/></asset>'), 'shape', 'm',
-                  '1 mesh'),
-    'flex': ('p.xml', mjcf(body('a', .5), '<flexcomp name="cloth" type="grid" count="4 4 1" '
-                           'spacing=".5 .5 .1" pos="0 0 1" dim="2" mass="1"/>'), 'shape', 'cloth',
-             '1 mesh, height field, flex'),
-    'robot': ('p.urdf', '<robot name="r"><link name="l"><collision><geometry><sphere radius="1"/>'
-              '</geometry></collision></link></robot>', 'shape', 'geom 0', '1 sphere'),
-    'scene': ('p.yaml', 'boxes: {a: {size: [1, 1, 1]}, b: {size: [1, 1, 1], pose: [0, 0, 0, 0, 0, '
-              '0, 1]}}\npairs: all\n', 'pose', 'a', 'no pose in the file'),
 }
 
 
@@ -246,25 +163,23 @@ def written(folder: Path, name: str, text: str) -> Path:
 
 @pytest.mark.parametrize('case', FAULTS)
 def test_a_fault_is_a_row(case: str, tmp_path: Path) -> None:
-    """And the only one of its kind, but for shapes that others stand on; the rest is read."""
+    """And the only one of its kind; the rest is read."""
     name, text, kind, names, words = FAULTS[case]
-    if Path(name).suffix in ('.xml', '.urdf'):
-        pytest.importorskip('mujoco')
     plan = read_plan(written(tmp_path, name, text))
     rows = [fault for fault in plan.faults if words in fault.text]
     assert [(fault.kind, '  '.join(fault.names)) for fault in rows] == [(kind, names)], plan.faults
-    assert {fault.kind for fault in plan.faults} == {kind}
+    assert {fault.kind for fault in plan.faults} - {'slot'} == {kind} - {'slot'}
 
 
 REFUSED = {
     'nothing': ('p.edi', baplie(), 'it has no container'),
-    'other message': ('p.edi', baplie(PLACED, message='MOVINS:D:95B'), 'its message is MOVINS'),
+    'other message': ('p.edi', baplie(PLACED, message='COPRAR:D:95B'), 'its message is COPRAR; a '
+                      'stowage plan is BAPLIE or MOVINS'),
     'no slot is known': ('p.edi', baplie('00010082 22G1'), 'no container can be placed; slot 0001'
                          '0082'),
     'no size is known': ('p.edi', baplie('0010082 5EGB'), 'size type 0010082: of the type 5EGB'),
     'empty': ('p.csv', '\n', 'it is empty'),
-    'column': ('p.csv', sheet().replace('height', 'hight'),
-               r'line 1: the column height is missing \(did you mean hight\?\)'),
+    'column': ('p.csv', sheet(FLAT).replace('height', 'hight'), 'which columns are the size'),
     'no rows': ('p.csv', sheet(), 'it has no box'),
     'no good row': ('p.csv', sheet('a,1,1,0,0,0,0'), r'no box can be placed: row 1: \(1, 1, 0\)'),
     'open quote': ('p.csv', sheet(f'{FLAT},"19 inch', 'b,1,1,1,0,0,9,', more=',note'),
@@ -274,22 +189,16 @@ REFUSED = {
     'column twice': ('p.csv', sheet(f'{FLAT},7', more=',Z'), 'line 1: the column z comes twice'),
     'key twice': ('p.json', document().replace('"z": 1.5', '"z": 7, "z": 1.5'),
                   "the key 'z' comes twice"),
-    'other columns': ('p.csv', 'a,b\n', 'the column name is missing; the columns are name, len'),
+    'other columns': ('p.csv', 'a,b\n', 'which columns are the size .*; which columns are the '
+                      'least corner'),
     'prose': ('p.txt', 'Dear all,\n', "line 1: 'dear all,' begins no format"),
     'JSON': ('p.json', '{"boxes": [\n{]', 'line 2: it is not JSON'),
-    'other JSON': ('p.json', '{"a": 1}', 'neither a packing plan'),
+    'other JSON': ('p.json', '{"a": 1}', 'it is JSON, but has no list of boxes'),
+    'a world': ('p.sdf', '<sdf version="1.9"/>', 'a world or a model of a simulator'),
+    'a model': ('p.xml', '<mujoco/>', 'a world or a model of a simulator'),
+    'a scene': ('p.yaml', 'boxes: 7\n', "'boxes: 7' begins no format"),
     'deep JSON': ('p.json', '[' * 10**5, 'nested too deeply'),
-    'order': ('p.json', '{"1": [{"item": {}, "flb_coordinates": [0, 0, 0]}]}', "'length/mm'"),
-    'container': ('p.json', '{"containers": [{"stack": {"placements": [{"x": 0}]}}]}', 'stackable'),
-    'XML': ('p.sdf', '<sdf>\n<world>\n</sdf>', 'line 3: it is not XML'),
-    'other XML': ('p.xml', '<html/>', '<html> begins no format'),
-    'entities': ('p.sdf', '<!DOCTYPE a [<!ENTITY b "c">]><sdf>&b;</sdf>', 'EntitiesForbidden'),
-    'no world': ('p.sdf', '<sdf/>', 'neither a <world> nor a <model>'),
-    'no box is left': ('p.sdf', world(model('b', collision(BOX.replace('1 1 1', '')))),
-                       "no box can be read; b::l::c: its <size> is ''"),
-    'MuJoCo': ('p.xml', '<mujoco><worldbody><geom size="x"/></worldbody></mujoco>',
-               'MuJoCo does not read it'),
-    'no scene': ('p.yaml', 'boxes: 7\n', "'pairs' is a required"),
+    'order': ('p.json', '{"1": [{"item": {}, "flb_coordinates": [0, 0, 0]}]}', 'the size'),
 }
 
 
@@ -297,8 +206,6 @@ REFUSED = {
 def test_a_file_that_is_no_plan_is_refused(case: str, tmp_path: Path) -> None:
     """By one line, which names the file."""
     name, text, words = REFUSED[case]
-    if 'MuJoCo' in words:
-        pytest.importorskip('mujoco')
     path = written(tmp_path, name, text)
     with pytest.raises(ValueError, match=words) as caught:
         read_plan(path)
@@ -345,6 +252,24 @@ def test_the_weighed_mass_counts(tmp_path: Path) -> None:
     assert read_plan(written(tmp_path, 'a', text)).masses[:2].tolist() == [2.0, 0.45359237]
 
 
+@pytest.mark.parametrize(('weights', 'mass'), [
+    ('MEA+VGM++KGM MEA+WT++KGM:20000', 2e4), ('MEA+WT++KGM:20000 MEA+VGM++KGM', 2e4),
+    ('MEA+VGM++KGM:0 MEA+WT++KGM:20000', 2e4), ('MEA+WT++KGM:20000 MEA+VGM++KGM:0.0', 2e4),
+    ('MEA+VGM++KGM: MEA+VGM++KGM:9000', 9e3), ('MEA+WT++KGM:20000 MEA+VGM++KGM:9000', 9e3),
+    ('MEA+VGM++KGM:9000 MEA+WT++KGM:20000', 9e3), ('MEA+VGM++KGM', 0), ('MEA+WT++KGM:x', 0)])
+def test_an_empty_weight_hides_no_other(weights: str, mass: float, tmp_path: Path) -> None:
+    """A ship lost 1,382 of 12,449 t by VGM without a number; the text KGM was a mass."""
+    plan = read_plan(written(tmp_path, 'a', baplie(f'0010082 22G1 {weights}')))
+    assert plan.masses[0] == mass
+    assert [fault.kind for fault in plan.faults] == (['mass'] if not mass else [])
+
+
+def test_stowage_instructions_have_the_same_segments(tmp_path: Path) -> None:
+    text = baplie(PLACED, message='MOVINS:D:95B:UN:SMDG20')
+    plan = read_plan(written(tmp_path, 'b', baplie(PLACED)))
+    assert same(read_plan(written(tmp_path, 'a', text)), plan)
+
+
 @pytest.mark.parametrize(('kind', 'size'), [
     ('22G1', (6.058, 2.438, 2.591)), ('45R1', (12.192, 2.438, 2.896)),
     ('44G1', (12.192, 2.438, 2.743)), ('4432', (12.192, 2.438, 2.896)),
@@ -385,13 +310,13 @@ def test_a_stack_on_deck_may_begin_a_tier_higher_than_another(tmp_path: Path) ->
     """Ships have steps there; it is told."""
     boxes = ['0010182 22G1', '0010384 22G1', '0010586 22G1']
     faults = read_plan(written(tmp_path, 'a', baplie(*boxes))).faults
-    assert [(fault.kind, *fault.names) for fault in faults] == [('slot', '0010384'),
-                                                                ('slot', '0010586')]
+    assert [(fault.kind, *fault.names) for fault in faults] == [('base', '0010384'),
+                                                                ('base', '0010586')]
     assert not read_plan(written(tmp_path, 'a', baplie('0010184 22G1', '0010384 22G1'))).faults
 
 
 def test_containers_bear_at_their_corners() -> None:
-    assert [read_any(FILES / name).bears for name in ('ship.edi', 'yard.sdf')] == [
+    assert [read_any(FILES / name).bears for name in ('ship.edi', 'pallet.csv')] == [
         'corners', 'faces']
 
 
@@ -426,9 +351,9 @@ def test_loads_of_a_container(tmp_path: Path) -> None:
     goods = [{'x': 100, 'y': 0, 'z': z, 'stackable': {'name': 'g', 'dx': 500, 'dy': 200, 'dz': 100}}
              for z in (0, 100)]
     text = json.dumps({'containers': [{'name': '1', 'stack': {'placements': goods}}]})
-    plan = read_plan(written(tmp_path, 'a.json', text))
+    plan = read_plan(written(tmp_path, 'a.json', text), unit='mm', origin='corner')
     assert plan.poses[:2, :3] == pytest.approx(np.array([[.35, .1, .05], [.35, .1, .15]]))
-    assert plan.names[:2] == ('1/g/1', '1/g/2')
+    assert plan.names[:2] == ('g/1', 'g/2')
 
 
 def test_an_order_is_that_of_all_boxes_or_not_read(tmp_path: Path) -> None:
@@ -457,7 +382,7 @@ def test_the_schema(tmp_path: Path) -> None:
         text = json.dumps({'boxes': [{**box, **way}], 'container': [1, 1, 1]})
         assert jsonschema.Draft202012Validator(schema).is_valid(json.loads(text)) == good
         if not good:
-            with pytest.raises(ValueError, match='both tell a'):
+            with pytest.raises(ValueError, match='which is the '):
                 read_plan(written(tmp_path, 'a.json', text))
     for changed, good in (({}, True), ({'mass': 3.5, 'limit': 0, 'fixed': True}, True),
                           ({'qx': 0, 'qy': 0, 'qz': 1, 'qw': 0}, True), ({'length': 0}, False),
@@ -467,37 +392,6 @@ def test_the_schema(tmp_path: Path) -> None:
         faults = read_plan(written(tmp_path, 'a.json', text)).faults
         assert jsonschema.Draft202012Validator(schema).is_valid(json.loads(text)) == good
         assert good or faults or changed == {'z': '1'}
-
-
-@pytest.mark.parametrize(('key', 'means'), [
-    *((key, True) for key in (
-        'weight', 'gross_weight', 'kg', 'max_load', 'max_weight', 'load_limit', 'stack_limit',
-        'payload', 'Mass (kg)', 'maxLoad', 'netWeight', 'VGM', 'Gewicht', 'load_capacity')),
-    *((key, False) for key in ('colour', 'note', 'load_id', 'unload', 'carton', 'id', 'sku'))])
-def test_names_that_mean_a_mass_or_a_limit(key: str, means: bool) -> None:
-    assert means_amount(key) == means
-
-
-HIDE = '<x><![CDATA[<!--]]></x>', '<x><![CDATA[-->]]></x>'
-
-
-@pytest.mark.parametrize(('content', 'names'), [
-    (f'<!-- {A} -->', []), (f'<!-- a -- b {A} -->', []), (f'<!-- -- -->{A}<!---->', ['a']),
-    (A.join(HIDE), ['a']), (f'<!-- -- -->{A.join(HIDE)}', ['a']),
-    (f'<!-- -- --><?a <!--?>{A}<?b -->?>', ['a']), (f'<x><![CDATA[{A}]]></x>', [])])
-def test_comments(content: str, names: list[str], tmp_path: Path) -> None:
-    """Those with -- within are none for XML, but for Gazebo; what is in CDATA is no comment."""
-    plan = read_plan(written(tmp_path, 'a.sdf', world(model('z', collision()), content)))
-    assert [name[0] for name in plan.names[2:]] == names
-
-
-def test_comments_without_an_end_take_no_time(tmp_path: Path) -> None:
-    """They took 6.4 s: each was searched for its end to the end of the file."""
-    start = time.process_time()
-    for some in '<!--' * 100_000, '<![CDATA[' * 50_000, '<!-- -- -->' * 50_000:
-        with pytest.raises(ValueError, match='it is not XML'):
-            read_plan(written(tmp_path, 'a.sdf', f'<sdf><!-- -- -->{some}'))
-    assert time.process_time() - start < 1.0
 
 
 def test_slots_of_six_digits(tmp_path: Path) -> None:
@@ -530,66 +424,3 @@ def test_what_stands_on_what_is_left_out_is_not_judged(boxes, left_out, names, t
         assert [fault.names for fault in plan.faults if 'stands on' in fault.text] == (
             [tuple(names)] if names else [])
         assert inspect_plan(plan, bears=bears).verdict == 'not all judged'
-
-
-# --- gravity, and what is not read ----------------------------------------------------------------
-
-LINK = '<model name="b"><pose>0 0 5 0 0 0</pose><link name="l">{}' + collision().partition(
-    '<link name="l">')[2] + '</model>'
-
-
-@pytest.mark.parametrize(('name', 'text', 'fixed'), [
-    ('p.sdf', world(model('b', collision(), 5.0)), False),
-    ('p.sdf', world('<gravity>0 0 0</gravity>', model('b', collision(), 5.0)), True),
-    ('p.sdf', world('<gravity>0 0 -1.6</gravity>', model('b', collision(), 5.0)), False),
-    ('p.sdf', world(LINK.format('<gravity>false</gravity>')), True),
-    ('p.xml', mjcf(body('b', 5.0)), False),
-    ('p.xml', mjcf(body('b', 5.0), more='<option gravity="0 0 0"/>'), True),
-    ('p.xml', mjcf(body('b', 5.0), more='<option><flag gravity="disable"/></option>'), True),
-    ('p.xml', mjcf(body('b', 5.0).replace('<body', '<body gravcomp="1"')), True)])
-def test_what_feels_no_gravity_does_not_hang(name, text, fixed, tmp_path):
-    """It hung, and the plan was certainly wrong."""
-    if name == 'p.xml':
-        pytest.importorskip('mujoco')
-    plan = read_plan(written(tmp_path, name, text))
-    told = [fault for fault in plan.faults if 'feels no gravity' in fault.text]
-    assert len(told) == fixed and inspect_plan(plan).verdict == (
-        'not all judged' if fixed else 'not sound')
-
-
-@pytest.mark.parametrize(('x', 'rows', 'status'), [
-    (0.5, ['overlap               a  b  500.0 mm deep'], 1), (3.0, [], 3)])
-def test_what_is_taken_as_fixed_may_not_overlap(x, rows, status, tmp_path, capsys):
-    """It is not fixed in the file: 'both are fixed' was false, and the plan not certainly wrong."""
-    pytest.importorskip('mujoco')
-    text = mjcf(body('a', 5.0), body('b', 5.0, x=x), more='<option gravity="0 0 0"/>')
-    assert inspect_files.main([str(written(tmp_path, 'p.xml', text))]) == status
-    lines = capsys.readouterr().out.splitlines()
-    assert [line for line in lines if line.startswith('overlap')] == rows
-
-
-@pytest.mark.parametrize(('name', 'text'), [
-    ('p.sdf', world('<gravity>0 -9.81 0</gravity>', A)),
-    ('p.xml', mjcf(body('a', 0.5), more='<option gravity="0 -9.81 0"/>'))])
-def test_another_gravity_is_told(name, text, tmp_path, capsys):
-    if name == 'p.xml':
-        pytest.importorskip('mujoco')
-    path = str(written(tmp_path, name, text))
-    assert inspect_files.main([path]) == 3
-    line = 'it is 0 -9.81 0 in the file: judge by it with --acceleration'
-    assert line in capsys.readouterr().out
-    inspect_files.main([path, '--acceleration', '0', '0', '-9.81'])
-    assert 'in the file' not in capsys.readouterr().out
-
-
-def test_what_may_be_carried_by_what_was_not_read_does_not_touch_it(tmp_path):
-    """The sun of Gazebo carries nothing, so that what hangs below it hangs."""
-    include = '<include><uri>model://{}</uri></include>'
-    plan = read_plan(written(tmp_path, 'p.sdf', world(
-        include.format('sun'), model('b', collision(), 5.0))))
-    assert not plan.faults and inspect_plan(plan).verdict == 'not sound'
-    plan = read_plan(written(tmp_path, 'p.sdf', world(
-        include.format('crane'), model('b', collision(), 5.0))))
-    assert [fault.text for fault in plan.faults if fault.names == ('b::l::c',)] == [
-        'touches nothing, but a mesh or a file that was not read may carry it: taken as fixed, and '
-        'not judged']

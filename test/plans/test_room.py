@@ -67,5 +67,5 @@ def test_walls_are_not_drawn() -> None:
     """They would hide what is in the container."""
     pytest.importorskip('matplotlib')
     plan = read_plan(SOLUTION, unit='mm')
-    (drawn,) = inspect_plan(plan).plot().axes[0].collections
+    drawn, _ = inspect_plan(plan).plot().axes[0].collections
     assert len(plan) == 12 and len(drawn.get_facecolor()) == 3 * 8  # of each its seen faces

@@ -231,6 +231,23 @@ def test_pressures_on_any_polygon_balance_the_load():
         assert found == pytest.approx((field[0] + (polygon - at) @ field[1:]).max(), rel=0.02)
 
 
+@pytest.mark.parametrize('seed', range(20))
+def test_the_corners_of_a_hull(seed):
+    """Counter-clockwise, each once; a point is a corner unless it is between or among others."""
+    rng = np.random.default_rng(seed)
+    points = rng.integers(0, 5, (rng.integers(1, 12), 2)).astype(float)
+    corners = native.hull(points)
+    edges = np.roll(corners, -1, axis=0) - corners
+    to = points[:, None] - corners
+    assert (edges[:, 0] * to[..., 1] - edges[:, 1] * to[..., 0] >= 0).all()
+    assert {*map(tuple, corners)} <= {*map(tuple, points)}
+    assert len({*map(tuple, corners)}) == len(corners) >= 1
+    if len(corners) > 2:
+        after = np.roll(edges, -1, axis=0)
+        assert (edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0] > 0).all()
+    assert native.hull(points[:0]).shape == (0, 2)
+
+
 @pytest.mark.parametrize('at, depth', [((0.3, 0.4), 0.3), ((1, 1), 0.0), ((2, 0.5), -1.0),
                                        ((2, 2), -np.sqrt(2))])
 def test_depths_inside_a_hull(at, depth):

@@ -81,6 +81,21 @@ inline PyObject* bed_pressures(PyObject*, PyObject* const* args, Py_ssize_t coun
 }
 
 // How deep points are inside the hulls of others, which come in order: those of row k begin at first[k].
+inline PyObject* hull(PyObject*, PyObject* const* args, Py_ssize_t count) {
+  if (count != 1) fail(PyExc_TypeError, "hull(points)");
+  auto points = read<double>(args[0], "points", {any_length, 2});
+  std::vector<faces::Point> own, corners;
+  for (npy_intp p = 0; p < points.length(0); ++p)
+    own.push_back({points.numbers[2 * p], points.numbers[2 * p + 1]});
+  faces::make_hull(own, corners);
+  auto found = make<double>({static_cast<npy_intp>(corners.size()), 2});
+  for (size_t k = 0; k < corners.size(); ++k) {
+    found.numbers[2 * k] = corners[k].x;
+    found.numbers[2 * k + 1] = corners[k].y;
+  }
+  return found.object.release();
+}
+
 inline PyObject* hull_depths(PyObject*, PyObject* const* args, Py_ssize_t count) {
   if (count != 3) fail(PyExc_TypeError, "hull_depths(points, first, at)");
   auto points = read<double>(args[0], "points", {any_length, 2});

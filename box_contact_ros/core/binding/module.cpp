@@ -78,6 +78,9 @@ PyMethodDef module_methods[] = {
     {"bed_pressures", method<bed_pressures>(), METH_FASTCALL,
      "bed_pressures(polygon, corner_count, at)\n--\n\n"
      "Return the greatest pressures (k,) of unit loads at points (k, 2) on polygons (k, 9, 2)."},
+    {"hull", method<hull>(), METH_FASTCALL,
+     "hull(points)\n--\n\n"
+     "Return the corners (h, 2) of the hull of points (p, 2), counter-clockwise."},
     {"hull_depths", method<hull_depths>(), METH_FASTCALL,
      "hull_depths(points, first, at)\n--\n\n"
      "Return how far points (n, 2) are inside hulls of points (p, 2), row k from first[k] on."},
