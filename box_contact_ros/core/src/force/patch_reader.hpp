@@ -34,6 +34,11 @@ struct Answered {
   int32_t body_of(int64_t box) const {
     return int32_t(boxes.empty() ? box : boxes[size_t(box)].body);
   }
+  Placed place_box(int32_t box) const {
+    if (boxes.empty()) return box_at(poses[box]);
+    const bc_body_box& of = boxes[size_t(box)];
+    return box_at(in_common_frame(poses[of.body], of.box.pose));
+  }
 };
 
 // Read row k.
@@ -51,12 +56,7 @@ inline void read(const Answered& all, int64_t k, Patch& patch) {
   auto place = [&](int32_t body) {
     return placed_at(all.poses[body], all.bodies[size_t(body)].centre);
   };
-  auto place_box = [&](int32_t box) {
-    if (all.boxes.empty()) return box_at(all.poses[box]);
-    const bc_body_box& of = all.boxes[size_t(box)];
-    return box_at(in_common_frame(all.poses[of.body], of.box.pose));
-  };
-  const Placed box_at_a = place_box(patch.box_a), box_at_b = place_box(patch.box_b);
+  const Placed box_at_a = all.place_box(patch.box_a), box_at_b = all.place_box(patch.box_b);
   patch.place(place(patch.a), place(patch.b), sign * vector_at(answer.normal + 3 * k),
               answer.point + 3 * k, answer.covariance + 9 * k, answer.volume[k],
               answer.separation[k], (is_lighter_b(all.bodies, patch) ? box_at_b : box_at_a).axes);
