@@ -239,7 +239,8 @@ class PatchForces:
         boxes (m, 7) in the frames of their bodies; None: those frames. Patches of boxes that stay
         with their body stay; pairs without contacts are forgotten. find_pairs: each `advance` finds
         the pairs that touch, and solves them by `exact`; `hold` is refused. Boxes of one body are
-        never a pair.
+        never a pair. Boxes that overlap across the normal by no more than 0.1 mm, and what they
+        have sunk, only pass each other: they have no patch.
         ValueError: names the field and its value.
         """
         self._native.set_boxes(_as_rows(sizes, 'sizes', 3),

@@ -29,6 +29,21 @@ inline double extent_along(const Placed& box, const bc_size& size, const Vec<dou
   return sum;
 }
 
+// How far two boxes overlap along a direction [m]; below 0: they are apart.
+inline double overlap_along(const Placed& a, const bc_size& size_a, const Placed& b, const bc_size& size_b,
+                            const Vec<double>& direction) {
+  return 0.5 * (extent_along(a, size_a, direction) + extent_along(b, size_b, direction)) -
+         std::fabs(dot(b.position - a.position, direction));
+}
+
+// Visit the normals of the faces that are across one: of each box the two least along it.
+template <class Visit>
+void each_face_across(const Placed& a, const Placed& b, const Vec<double>& normal, const Visit& visit) {
+  for (const Placed* box : {&a, &b})
+    for (int k = 1, along = axis_along(box->axes, normal); k < 3; ++k)
+      visit(column(box->axes, (along + k) % 3));
+}
+
 inline Span span_along(const Face& face, const Vec<double>& axis) {
   double middle = dot(face.centre, axis);
   double half = std::fabs(dot(face.half_1, axis)) + std::fabs(dot(face.half_2, axis));
@@ -81,6 +96,7 @@ struct Patch {
   Vec<double> normal, point;
   Rectangle shape;
   FacePair faces;       // without sizes: none
+  double overlap, beside;  // of the boxes along the normal, and least along faces across it; without sizes: none [m]
   double most_depth;    // by the thinner box; without sizes: any [m]
   double depth;         // the lesser of volume / area and −separation; below 0: apart [m]
   double friction;      // μ [1]
@@ -129,6 +145,11 @@ struct Patch {
                   const bc_size& size_b) {
     most_depth = deepest_part * std::min(extent_along(box_at_a, size_a, normal),
                                          extent_along(box_at_b, size_b, normal));
+    overlap = overlap_along(box_at_a, size_a, box_at_b, size_b, normal);
+    beside = place_max;
+    each_face_across(box_at_a, box_at_b, normal, [&](const Vec<double>& face) {
+      beside = std::min(beside, overlap_along(box_at_a, size_a, box_at_b, size_b, face));
+    });
     Face a = face_along(box_at_a, size_a, point, normal),
          b = face_along(box_at_b, size_b, point, -normal);
     faces = {span_along(a, shape.axis_1).within(span_along(b, shape.axis_1)),

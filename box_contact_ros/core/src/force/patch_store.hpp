@@ -14,6 +14,7 @@
 #include "island_step.hpp"
 #include "own_contacts.hpp"
 #include "patch_reader.hpp"
+#include "rims.hpp"
 #include "sleep.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
@@ -42,6 +43,7 @@ class PatchStore {
         starts_(bodies_.size()),
         islands_(side) {
     sleep_.set_bodies(bodies_);
+    rims_.set_bodies(bodies_.size());
     make_room(0);
   }
 
@@ -65,6 +67,7 @@ class PatchStore {
     carriers_.resize(bodies.size());
     starts_.resize(bodies.size());
     surfaces_.reserve(bodies.size());
+    rims_.set_bodies(bodies.size());
     sleep_.change_bodies(bodies, is_changed);
     bodies_ = std::move(bodies);  // last: there may be no memory for the others
     auto count = int32_t(bodies_.size());
@@ -237,12 +240,14 @@ class PatchStore {
   HoldResult read(const bc_patches& answer, const bc_pose* poses, bool is_own,
                   InThreads& in_threads) {
     std::vector<Patch>& found = next_.patches;
+    const Answered all{answer, poses, bodies_, boxes(), surfaces_, options_.friction};
     reader_.read_rows(
-        {answer, poses, bodies_, boxes(), surfaces_, options_.friction},
+        all,
         [&](size_t place) { return is_own ? own_.row(place) : place; }, found,
         [&](long count, const auto& work) { in_threads(options_.threads, count, work); });
     for (const Patch& patch : found)
       if (patch.age >= 0.0 && !patch.has_area()) return HoldResult::no_patch;
+    if (!boxes().empty()) rims_.drop(all, found);
     auto same = [](const Patch& p, const Patch& q) { return p.pair() == q.pair(); };
     if (!std::is_sorted(found.begin(), found.end(), ByPair{}))
       std::sort(found.begin(), found.end(), ByPair{});
@@ -263,6 +268,7 @@ class PatchStore {
   Sleep sleep_;                 // patches and loads of what is asleep are there
   // Memory that calls use again.
   PatchReader reader_;
+  Rims rims_;
   Islands islands_;
   size_t room_ = 0;          // for patches
   bool is_grouped_ = false;  // whether islands are those of the patches
