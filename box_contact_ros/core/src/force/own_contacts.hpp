@@ -127,16 +127,15 @@ class OwnContacts {
   // Find the pairs that are solved: see NearPairs. `pose_of(body)` also knows where the others are.
   // Returns how many there are.
   template <class EachActive, class PoseOf>
-  size_t find(double dt, int64_t revision, const bc_wrench* outside,
-              const std::vector<Body>& bodies, const EachActive& each_active,
-              const PoseOf& pose_of) {
+  size_t find(double dt, int64_t revision, const Gaps& gaps, const std::vector<Body>& bodies,
+              const EachActive& each_active, const PoseOf& pose_of) {
     auto place = [&](int32_t box, double longest) {
       const auto& [body, own] = boxes_[size_t(box)];
       const bc_pose& pose = poses_[size_t(box)] = in_common_frame(pose_of(size_t(body)), own.pose);
-      double falls = Gaps(bodies, boxes_, longest, outside).around(box);
+      double goes = gaps.within(longest).around(box);
       const double(&q)[4] = pose.quaternion;
       return detail::bounds_of({vector(pose.position), {q[0], q[1], q[2], q[3]}},
-                               0.5 * vector(own.size.extent) + Vec<double>{falls, falls, falls});
+                               0.5 * vector(own.size.extent) + Vec<double>{goes, goes, goes});
     };
     is_all_ = false;
     if (near_.find(dt, revision, boxes_, bodies, each_active, place)) {
@@ -246,12 +245,12 @@ class OwnContacts {
       is_placed_[box] = 1;
     }
   }
-  // No pair that is solved, and farther apart, is a constraint [m].
+  // No pair that is solved, and farther apart, is a constraint [m]: both boxes may go toward each other.
   double farthest(const Gaps& gaps) const {
     double most = 0.0;
     for (size_t k = 0, n = is_all_ ? boxes_.size() : placed_.size(); k < n; ++k)
       most = std::max(most, gaps.around(int32_t(is_all_ ? k : placed_[k])));
-    return std::min(most, length_max);
+    return std::min(2.0 * most, length_max);
   }
   // Note which of the next keys are not among the last ones, or are new there.
   template <class IsKnown>
@@ -266,7 +265,7 @@ class OwnContacts {
       is_any_new_ = is_any_new_ || key.is_new;
     }
   }
-  // Give pairs that are apart, but near, the patches that they have once moved together along the normal.
+  // Give pairs that are apart, but near, the patches that they have once they touch.
   long solve_near(const Gaps& gaps, SolvePair solve) {
     const AskedPairs& live = chosen();
     for (size_t k = 0; k < live.count(); ++k) {
@@ -274,9 +273,10 @@ class OwnContacts {
       Vec<double> normal = vector_at(&found_.normal[3 * k]);
       if (!(apart > 0.0) || normal[0] != normal[0]) continue;  // in contact, or beyond the farthest
       auto a = size_t(live.pairs[2 * k]), b = size_t(live.pairs[2 * k + 1]);
-      if (!gaps.is_near(int32_t(a), int32_t(b), normal, apart)) continue;
+      Vec<double> way;
+      if (!gaps.is_near(int32_t(a), int32_t(b), normal, apart, way)) continue;
       bc_pose moved = poses_[b];
-      for (int i = 0; i < 3; ++i) moved.position[i] -= apart * normal[i];
+      for (int i = 0; i < 3; ++i) moved.position[i] += way[i];
       bc_contact found;
       detail::PairNumbers pair{poses_[a].position, moved.position, sizes_[a].extent,
                                sizes_[b].extent};

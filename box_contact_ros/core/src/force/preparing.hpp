@@ -159,6 +159,10 @@ constexpr double still = 0x1p-30, alike = 0x1p-10;
 template <class T, class Body>
 BC_INLINE void follow(const Body& a, const Body& b, const Where<T>& at_a, const Where<T>& at_b,
                       double h, Rows<T>& block) {
+  // What pressed across a gap has closed it, and touches: the rest of its closing speed goes, too. A late answer
+  // does not know of it.
+  Mask<T> has_met = (block.depth < 0.0) & (block.normal_impulses[0] > 0.0) & (block.late <= 0.0);
+  block.relaxed.bias[0] = select<T>(has_met, block.closing[0], block.relaxed.bias[0]);
   T turned = max(length(b.angular), length(a.angular));
   T way = length(b.linear - a.linear);
   T moved = h * max(way / block.shape.half_1, turned);
