@@ -211,7 +211,7 @@ class PatchForces:
                  threads: int = 1, most_depth: float = 1e-3, rest: bool = True) -> None:
         """Begin without patches.
 
-        friction: Coulomb's μ of pairs without one of their own.
+        friction: Coulomb's μ of boxes without their own.
         substeps: equal parts of the longest step lately, more if 5 ms are exceeded; up to 1,000.
         threads: at most. They change no bit.
         most_depth: how deep what rests may be [m], where a load is large for the lighter body.
@@ -248,14 +248,20 @@ class PatchForces:
                                None if poses is None else _as_rows(poses, 'poses', 7),
                                bool(find_pairs))
 
-    def set_surface(self, box: int, velocity: ArrayLike) -> None:
-        """Set the velocity (3,) of a box's surface beside that of its body, as of a belt [m/s].
+    def set_surface(self, box: int, velocity: ArrayLike | None = None,
+                    friction: float | None = None) -> None:
+        """Set how the surface of a box moves and rubs, until it is set again; None: as before.
 
-        It is in the common frame, and lasts until it is set again, also under late answers.
-        `surface_velocity` of `hold` is added. ValueError: names the field and its value.
+        velocity: (3,) beside that of its body, as of a belt, in the common frame [m/s]. It lasts
+        under late answers, too. `surface_velocity` of `hold` is added.
+        friction: Coulomb's μ. A pair has the lesser of both boxes, unless `hold` has one for it. A
+        box without its own, or with NaN, has that of the forces.
+        ValueError: names the field and its value.
         """
-        self._native.set_surface(int(as_wholes([box], 'box')[0]),
-                                 as_floats(velocity, 'velocity', 'three numbers', (3,)))
+        self._native.set_surface(
+            int(as_wholes([box], 'box')[0]), None if velocity is None else as_floats(
+                velocity, 'velocity', 'three numbers', (3,)),
+            None if friction is None else as_number(friction, 'friction'))
 
     def hold(self, pairs: ArrayLike, contacts: Contacts | None = None,
              poses: ArrayLike | None = None, *,
@@ -269,7 +275,7 @@ class PatchForces:
         each step wakes nobody.
         A contact whose separation is NaN is stale: the patch of its pair stays. Contacts of boxes
         that are of one body by now are passed over.
-        friction: μ (k,).
+        friction: μ (k,); None: the lesser of both boxes.
         surface_velocity: (k, 3) of B's surface relative to A's [m/s], as of a belt. That of the
         bodies is added.
         stiffness: (k,) of springs [N/m]: a weight rests weight / stiffness deep. Steps and late

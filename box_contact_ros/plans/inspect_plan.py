@@ -30,14 +30,14 @@ MANY = 10_000
 """With more boxes progress is shown: they take a second or more."""
 
 
-def inspect_plan(plan: Plan, *, tolerance: float | None = None, friction: float = 0.5,
+def inspect_plan(plan: Plan, *, tolerance: float | None = None, friction: ArrayLike = 0.5,
                  acceleration: ArrayLike = (0.0, 0.0, -9.81), bears: str = 'faces',
                  sides: bool = False, loaded_from: str | None = None) -> Inspection:
     """Return what is wrong with a plan, and what each of its boxes carries.
 
     tolerance: the gap up to which faces touch, and the depth up to which boxes do not overlap [m];
     None: of each pair 1e-4, or a quarter of its thinner box, if that is less.
-    friction: Coulomb's μ of all pairs.
+    friction: Coulomb's μ, or that of each box (n,): a pair has the lesser of both.
     acceleration: (3,) that the boxes feel, gravity included [m/s²]: (3.92, 0, −9.81) on a lorry
     that brakes along +x by 0.4 g.
     bears: 'faces', or 'corners': a box stands on its corners alone, as a container does. They bear
@@ -65,9 +65,7 @@ def inspect_plan(plan: Plan, *, tolerance: float | None = None, friction: float 
     if loaded_from is not None and plan.order is None:
         raise ValueError(f'loaded_from is {loaded_from!r}, but the plan has no order')
     tolerances = _tolerances(plan, tolerance)
-    friction = as_number(friction, 'friction')
-    if not 0.0 <= friction < np.inf:
-        raise ValueError(f'friction must be 0 or more, and finite, not {friction:g}')
+    frictions = _frictions(plan, friction)
     felt = as_floats(acceleration, 'acceleration', 'a vector (3,)', (3,))
     if not 0.0 < np.abs(felt).max() < np.inf:
         raise ValueError(f'acceleration must have a length, not {short_repr(acceleration)}')
@@ -77,12 +75,12 @@ def inspect_plan(plan: Plan, *, tolerance: float | None = None, friction: float 
         plan = replace(plan, faults=(*plan.faults, *faults))
     bodies = bodies_of(plan, meet)
     found = _judged(plan, meet, bodies, None if plan.masses is None else
-                    _loads(plan, meet, bodies, friction), tolerances)
-    return _as_loaded(found, may_meet, bodies, None if plan.masses is None else friction,
+                    _loads(plan, meet, bodies, frictions), tolerances)
+    return _as_loaded(found, may_meet, bodies, None if plan.masses is None else frictions,
                       tolerances, loaded_from)
 
 
-def _as_loaded(found: Inspection, meet: Meetings, bodies: Bodies, friction: float | None,
+def _as_loaded(found: Inspection, meet: Meetings, bodies: Bodies, friction: np.ndarray | None,
                tolerances: np.ndarray, loaded_from: str | None) -> Inspection:
     """Return what was found, with the steps and the ways of a plan that has an order."""
     plan, faults, ways = found.plan, [], found.ways
@@ -113,6 +111,17 @@ def _tolerances(plan: Plan, value: float | None) -> np.ndarray:
     return np.full(len(plan), tolerance)
 
 
+def _frictions(plan: Plan, value: ArrayLike) -> np.ndarray:
+    """Return the friction of each box (n,)."""
+    if np.isscalar(value) or isinstance(value, np.ndarray) and not value.shape:
+        value = np.full(len(plan), as_number(value, 'friction'))
+    friction = as_floats(value, 'friction', 'a number, or one for each box', (len(plan),))
+    is_bad = ~((friction >= 0.0) & (friction < np.inf))
+    if is_bad.any():
+        raise ValueError(f'friction must be 0 or more, and finite, not {friction[is_bad][0]:g}')
+    return friction
+
+
 @dataclass(frozen=True, eq=False)
 class _Loads:
     """What the patches carry."""
@@ -122,7 +131,7 @@ class _Loads:
     pressure: np.ndarray  # (k,) the greatest [Pa]; none where corners bear
 
 
-def _loads(plan: Plan, meet: Meetings, bodies: Bodies, friction: float) -> _Loads:
+def _loads(plan: Plan, meet: Meetings, bodies: Bodies, friction: np.ndarray) -> _Loads:
     require('plans')
     from tqdm import tqdm
 
@@ -130,7 +139,7 @@ def _loads(plan: Plan, meet: Meetings, bodies: Bodies, friction: float) -> _Load
     sides = patches.rectangle[:, (1, 3)] - patches.rectangle[:, :1]
     with tqdm(total=int((~meet.fixed).sum()), unit='box', desc='loads', leave=False,
               disable=len(plan) <= MANY) as bar:
-        rest = settle(bodies, beds_of(plan, meet), friction, bar.update)
+        rest = settle(bodies, beds_of(plan, meet, friction), bar.update)
     centre = rest.centre @ frame
     if meet.by_corners:
         return _Loads(rest, centre, np.zeros(0))

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .meetings import Meetings
+from .meetings import Meetings, friction_of
 from .statics import LEVEL, SEEN, Bodies, hull_edges, pulled_in
 
 SURELY = 2.0
@@ -55,14 +55,15 @@ class KeptLoads:
     """What patches carry, in the frame of what bodies feel."""
 
     def __init__(self, meet: Meetings, pairs: np.ndarray, below: Sequence[list[int]],
-                 bodies: Bodies, friction: float | None) -> None:
-        """Keep no loads yet; friction: None looks at where centres are alone.
+                 bodies: Bodies, friction: np.ndarray | None) -> None:
+        """Keep no loads yet; friction: of each box (n,); None looks at where centres are alone.
 
         pairs: of bodies, of all patches that may bear. below: rows of what carries each body.
         """
         slope = np.minimum(meet.normal @ meet.frame[2], 1.0)
         self._slides = (slope <= 1.0 - LEVEL) & (
-            np.sqrt(1.0 - slope**2) > (np.inf if friction is None else friction) * slope)
+            np.sqrt(1.0 - slope**2) > (
+                np.inf if friction is None else friction_of(meet.pairs, friction)) * slope)
         self._hull = meet.bearings.hull @ meet.frame[:2].T
         self._needs, self._overlaps = meet.needs, meet.overlaps[meet.of_met]
         self._lower, self._below, self._bodies = pairs[:, 0].tolist(), below, bodies

@@ -140,15 +140,23 @@ def bodies_of(plan: Plan, meet: Meetings) -> Bodies:
                   meet.need(plan.body))
 
 
-def beds_of(plan: Plan, meet: Meetings) -> Beds:
-    """Return the patches as beds between bodies, in the frame of what they feel."""
+def beds_of(plan: Plan, meet: Meetings, friction: np.ndarray) -> Beds:
+    """Return the patches as beds between bodies, in the frame of what they feel.
+
+    friction: of each box (n,).
+    """
     patches, frame = meet.patches, meet.frame
     sides = patches.rectangle[:, (1, 3)] - patches.rectangle[:, :1]
     return Beds(
         pairs=plan.body[meet.pairs], carries=meet.carries, normal=meet.normal @ frame.T,
         centre=patches.centre @ frame.T, area=patches.area,
         radius=np.sqrt((sides**2).sum(axis=(1, 2)) / 12.0),
-        bearings=meet.bearings.in_frame(frame))
+        friction=friction_of(meet.pairs, friction), bearings=meet.bearings.in_frame(frame))
+
+
+def friction_of(pairs: np.ndarray, friction: np.ndarray) -> np.ndarray:
+    """Return the friction of pairs (k,): the lesser of both boxes."""
+    return friction[pairs].min(axis=1)
 
 
 def mass_centres(plan: Plan) -> np.ndarray:

@@ -104,6 +104,8 @@ class Beds:
     """(k,) of gyration about the normal [m]."""
     area: np.ndarray
     """(k,) [m²]."""
+    friction: np.ndarray
+    """(k,) Coulomb's μ."""
     bearings: Bearings
     """(k,) where they press; between the points of the hull is all that they can."""
 
@@ -128,8 +130,8 @@ class Rest:
         return np.abs(self.missing).max(axis=1, initial=0.0) > FALLS
 
 
-def settle(bodies: Bodies, beds: Beds, friction: float,
-           report: Callable[[int], None] = lambda count: None, work: Work | None = None) -> Rest:
+def settle(bodies: Bodies, beds: Beds, report: Callable[[int], None] = lambda count: None,
+           work: Work | None = None) -> Rest:
     """Return what the patches carry.
 
     Small groups come first. Those that would take more than what is left of the work are not
@@ -139,7 +141,7 @@ def settle(bodies: Bodies, beds: Beds, friction: float,
     work = work or Work(MOST_WORK)
     load, centre = np.zeros(len(beds.pairs)), beds.centre.copy()
     own = bodies.centre
-    bodies, added = add_up(bodies, beds, friction, load, centre)
+    bodies, added = add_up(bodies, beds, load, centre)
     report(len(added))
     missing = np.zeros((len(bodies.weight), 6))
     left = np.flatnonzero(~np.isin(beds.pairs[:, 1], added))
@@ -165,7 +167,7 @@ def settle(bodies: Bodies, beds: Beds, friction: float,
                 try:
                     part = _Programme(bodies, beds, members, rows, flat and way != GRIPPING,
                                       is_tight | (way == GRIPPING), work)
-                    load[rows], centre[rows], missing[members] = part.settle(friction, way)
+                    load[rows], centre[rows], missing[members] = part.settle(way)
                 except _TooMuch:
                     load[rows] = missing[members] = np.nan
 
@@ -190,7 +192,7 @@ def settle(bodies: Bodies, beds: Beds, friction: float,
     has_others = np.bincount(lower, minlength=len(group)) > 0
     is_first = np.bincount(upper[falls[lower]], minlength=len(group)) == 0
     may_turn = falls & is_first & (has_others | (inside > bodies.need))
-    if friction:
+    if beds.friction.any():
         solve(rests & any_of(may_turn[free], group[free]) & is_level & (size <= MOST_GRIPPING)
               & _have_rings(bodies, beds, left, of_patch, size), GRIPPING)
     return Rest(load, centre, missing, pressed_margins(beds, load, centre, len(own)))
@@ -252,7 +254,7 @@ def _batches(groups: np.ndarray, size: np.ndarray, most: int) -> Iterator[np.nda
         yield from np.split(groups, np.flatnonzero(np.diff(number)) + 1)
 
 
-def add_up(bodies: Bodies, beds: Beds, friction: float, load: np.ndarray, centre: np.ndarray,
+def add_up(bodies: Bodies, beds: Beds, load: np.ndarray, centre: np.ndarray,
            ) -> tuple[Bodies, np.ndarray]:
     """Write the loads of bodies that have one carrier, from above, as far as they hold.
 
@@ -279,7 +281,8 @@ def add_up(bodies: Bodies, beds: Beds, friction: float, load: np.ndarray, centre
                                     np.arange(len(row) + 1) * hull.shape[1],
                                     np.ascontiguousarray(at[:, :2]))
         cosine = np.minimum(normal[:, 2], 1.0)
-        slides = (cosine <= 1.0 - LEVEL) & (np.sqrt(1.0 - cosine**2) > friction * cosine)
+        slides = (cosine <= 1.0 - LEVEL) & (
+            np.sqrt(1.0 - cosine**2) > beds.friction[row] * cosine)
         holds = (inside > bodies.need[box]) & ~slides
         box, row = box[holds], row[holds]
         added.append(box)
@@ -364,12 +367,12 @@ class _Programme:
                                                     np.concatenate(columns))),
                           (len(self.keep) * len(self.members), len(force)))
 
-    def settle(self, friction: float, way: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def settle(self, way: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return loads (k,), centres of pressure (k, 3), and what is missing (n, 6)."""
         bound = np.zeros(len(self.rows))
-        at = self.beds.centre[self.rows]
+        at, friction = self.beds.centre[self.rows], self.beds.friction[self.rows]
         for _ in range(1 if self.flat or way == GRIPPING else PASSES_MAX):
-            rubs = self._gripping(friction) if way == GRIPPING else self._rubbing(bound, at)
+            rubs = self._gripping() if way == GRIPPING else self._rubbing(bound, at)
             force, missing = self._solve(rubs, way == SURE)
             load = np.bincount(self.patch, force, minlength=len(self.rows))
             moment = np.stack([np.bincount(self.patch, force * self.point[:, axis],
@@ -466,15 +469,15 @@ class _Programme:
             self._wrenches(rubs, None, radius[:, None] * normal)), format='csc'),
             np.tile(self.beds.area[self.rows].mean() / self.beds.area[rows], 3), bound[rubs], share)
 
-    def _gripping(self, friction: float) -> _Friction:
+    def _gripping(self) -> _Friction:
         """Return friction at all points of level patches, up to its share of what presses there."""
-        from scipy.sparse import hstack, identity
+        from scipy.sparse import diags, hstack
 
         count = len(self.point)
         return _Friction(hstack([self._wrenches(self.patch, self.point, np.tile(along, (count, 1)))
                                  for along in np.eye(3)[:2]], format='csc'),
                          np.tile(1.0 / self.stiffness, 2), np.zeros(count),
-                         friction * identity(count, format='csc'))
+                         diags(self.beds.friction[self.rows[self.patch]], format='csc'))
 
 
 @dataclass(frozen=True, eq=False)

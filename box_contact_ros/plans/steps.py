@@ -24,11 +24,11 @@ from .statics import Bodies, Work, settle
 from .verdict import verdict_of
 
 
-def falls_of(plan: Plan, meet: Meetings, bodies: Bodies, friction: float | None,
+def falls_of(plan: Plan, meet: Meetings, bodies: Bodies, friction: np.ndarray | None,
              ) -> tuple[tuple[Fall, ...], list[int]]:
     """Return what falls at which step, and the boxes of which this is not always known.
 
-    meet: all patches that may bear. friction: None judges geometry alone.
+    meet: all patches that may bear. friction: of each box (n,); None judges geometry alone.
     """
     if plan.order is None or not meet.fixed.any():
         return (), []
@@ -48,7 +48,8 @@ def falls_of(plan: Plan, meet: Meetings, bodies: Bodies, friction: float | None,
 class _Loading:
     """The bodies that have come, and which of them stand."""
 
-    def __init__(self, plan: Plan, meet: Meetings, bodies: Bodies, friction: float | None) -> None:
+    def __init__(self, plan: Plan, meet: Meetings, bodies: Bodies,
+                 friction: np.ndarray | None) -> None:
         self._plan, self._meet, self._bodies, self._friction = plan, meet, bodies, friction
         self._work = Work(statics.MOST_WORK)
         self._here, self._stands = meet.fixed.tolist(), meet.fixed.tolist()
@@ -126,7 +127,7 @@ class _Loading:
         bodies = replace(self._bodies, fixed=~is_member, need=part.need(plan.body))
         rest = None
         if self._friction is not None:
-            rest = settle(bodies, beds_of(plan, part), self._friction, work=self._work)
+            rest = settle(bodies, beds_of(plan, part, self._friction), work=self._work)
         verdict = verdict_of(plan, part, bodies, rest)
         if rest is not None:
             rows = part.carries

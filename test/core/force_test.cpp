@@ -241,6 +241,7 @@ int main() {
   }
   copy.hold(Patches(pair));
   copy.set_surface(1, {0.0, 0.0, 0.0});
+  copy.set_surface(1, {0.0, 0.0, 0.0}, 0.5);
   const long before = allocations;
   for (int step = 0; step < 10; ++step) copy.advance(0.001, poses, velocities, outside);
   Pose ahead[2];

@@ -141,6 +141,8 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: FINDING.set_surface(0.5, (1, 0, 0)), 'box', '0.5'),
     (lambda: FINDING.set_surface(0, (1, 0)), 'velocity', '(2,)'),
     (lambda: FINDING.set_surface(0, (1, NAN, 0)), 'velocity', 'nan'),
+    (lambda: FINDING.set_surface(0, friction=-1.0), 'friction', '-1'),
+    (lambda: FINDING.set_surface(0, friction=(0.5,)), 'friction', '(0.5,)'),
     (lambda: hold(poses=POSES[:1]), 'poses', '(1, 7)'),
     (lambda: hold(poses=POSES * [1, 1, 1, 0, 0, 0, 0]), 'poses[0]', '(0, 0, 0, 0)'),
     (lambda: hold(field='normal', value=(0, 0, 2)), 'normal[0]', '(0, 0, 2)'),

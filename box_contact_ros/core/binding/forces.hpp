@@ -137,11 +137,14 @@ inline PyObject* forces_set_boxes(PyObject* self, PyObject* const* args, Py_ssiz
 }
 
 inline PyObject* forces_set_surface(PyObject* self, PyObject* const* args, Py_ssize_t count) {
-  if (count != 2) fail(PyExc_TypeError, "set_surface(box, velocity)");
+  if (count != 3) fail(PyExc_TypeError, "set_surface(box, velocity, friction)");
   long long box = PyLong_AsLongLong(args[0]);
   if (box == -1 && PyErr_Occurred()) return nullptr;
-  auto velocity = read<double>(args[1], "velocity", {3});
-  check(bc_patch_forces_set_surface(forces_of(self), box, velocity.numbers));
+  auto velocity = read_given<double>(args[1], "velocity", {3});
+  double friction = args[2] == Py_None ? 0.0 : PyFloat_AsDouble(args[2]);
+  if (PyErr_Occurred()) return nullptr;
+  check(bc_patch_forces_set_surface(forces_of(self), box, velocity.numbers,
+                                    args[2] == Py_None ? nullptr : &friction));
   Py_RETURN_NONE;
 }
 
@@ -256,7 +259,8 @@ inline PyMethodDef forces_methods[] = {
      "set_boxes(sizes, body, poses, find_pairs)\n--\n\nChange the boxes: (m, 3), (m,), (m, 7), bool; None "
      "for body and poses."},
     {"set_surface", method<forces_set_surface>(), METH_FASTCALL,
-     "set_surface(box, velocity)\n--\n\nSet the velocity of a box's surface (3,)."},
+     "set_surface(box, velocity, friction)\n--\n\nSet the surface of a box: (3,), and a number; None: as "
+     "before."},
     {"wrenches", method<forces_advance<true>>(), METH_FASTCALL,
      "wrenches(dt, poses, velocities, outside, changed)\n--\n\nReturn wrenches (n, 6), which move the bodies "
      "until the next call.\n\nReturn None, and change nothing, where one is no plain array."},

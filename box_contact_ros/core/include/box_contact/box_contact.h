@@ -35,7 +35,7 @@ extern "C" {
 #endif
 
 /* Raised by a change that a compiled program cannot follow. `bc_abi` is that of the library. */
-#define BC_ABI 5
+#define BC_ABI 6
 
 typedef enum bc_status {
   BC_OK = 0,

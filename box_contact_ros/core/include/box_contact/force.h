@@ -66,7 +66,7 @@ typedef struct bc_patches {
   const double* point;      /* (count, 3) [m] */
   const double* volume;     /* [m³] */
   const double* covariance; /* (count, 3, 3) [m²]; eigenvalues ≥ −1e-9 of the trace */
-  const double* friction;   /* Coulomb's μ [1]; NULL: that of the options; it, stiffness, age and
+  const double* friction;   /* Coulomb's μ [1]; NULL: the lesser of both boxes; it, stiffness, age and
                                period are 0 to 1e50 */
   const double* surface;    /* (count, 3): velocity of B's surface relative to A's, beside that of the
                                bodies, as of a belt [m/s]; NULL: none */
@@ -82,7 +82,7 @@ typedef struct bc_force_options {
   int substeps;    /* equal parts of the longest step lately, more if 5 ms are exceeded; 1 to
                       1,000 */
   int threads;     /* 1 to 1,024, and no more than cores; boxes that touch are moved by one */
-  double friction; /* Coulomb's μ [1] */
+  double friction; /* Coulomb's μ of boxes without their own [1] */
   double most_depth; /* how deep what rests may be at most [m], where a load is large for the lighter
                         body: with contacts of one's own, its island makes up to 64 times as many
                         sub-steps. bc_load tells where that is not enough */
@@ -146,10 +146,12 @@ BC_API bc_status bc_patch_forces_set_bodies(bc_patch_forces* forces, const bc_bo
 BC_API bc_status bc_patch_forces_set_boxes(bc_patch_forces* forces, const bc_body_box* boxes,
                                            int64_t count, int find_pairs);
 
-/* Set the velocity of a box's surface beside that of its body, as of a belt, in the common frame [m/s]. It
- * lasts until it is set again, also under answers that are late; `surface` of an answer is added. */
+/* Set the surface of a box: its velocity (3) beside that of its body, as of a belt, in the common frame [m/s],
+ * and its friction, Coulomb's μ; NULL: as before. Both last until they are set again, also under answers that are
+ * late. `surface` of an answer is added. A pair has the lesser friction of its boxes, unless an answer or held
+ * pairs have one. A box without its own, or with NaN, has that of the options. */
 BC_API bc_status bc_patch_forces_set_surface(bc_patch_forces* forces, int64_t box,
-                                             const double velocity[3]);
+                                             const double* velocity, const double* friction);
 
 /* Forget the patches of bodies, which were put elsewhere, or all patches. */
 BC_API bc_status bc_patch_forces_forget(bc_patch_forces* forces, const int64_t* bodies,

@@ -32,7 +32,7 @@ using BodyBox = bc_body_box;   // a body, and a box in its frame
 struct Patches {
   Span<const std::int64_t> pairs;  // two boxes a row
   Results results;                 // separation, normal, point, volume and covariance
-  Span<const double> friction{};   // Coulomb's μ of each pair
+  Span<const double> friction{};   // Coulomb's μ of each pair; none: the lesser of both boxes
   Span<const double> surface{};    // velocity of B's surface relative to A's, three numbers a row [m/s]
   Span<const double> stiffness{};  // of each pair [N/m]; 0: as stiff as steps and late answers allow
   double age = 0.0;                // since the answer was asked for [s]
@@ -67,7 +67,7 @@ class PatchForces {
   struct Options {
     int substeps = 4;       // equal parts of the longest step lately, more if 5 ms are exceeded
     int threads = 1;        // at most
-    double friction = 0.5;  // Coulomb's μ
+    double friction = 0.5;  // Coulomb's μ of boxes without their own
     double most_depth = 1e-3;  // of what rests [m], where a load is large for the lighter body
     bool rest = true;          // whether what rests is laid down
   };
@@ -109,10 +109,13 @@ class PatchForces {
                                             find_pairs));
   }
 
-  // Set the velocity of a box's surface beside that of its body, as of a belt, in the common frame [m/s].
-  // It lasts until it is set again.
+  // Set the velocity of a box's surface beside that of its body, as of a belt, in the common frame [m/s], and
+  // perhaps its friction: a pair has the lesser of both boxes. They last until they are set again.
   void set_surface(std::int64_t box, const double (&velocity)[3]) {
-    detail::check(bc_patch_forces_set_surface(forces_.get(), box, velocity));
+    detail::check(bc_patch_forces_set_surface(forces_.get(), box, velocity, nullptr));
+  }
+  void set_surface(std::int64_t box, const double (&velocity)[3], double friction) {
+    detail::check(bc_patch_forces_set_surface(forces_.get(), box, velocity, &friction));
   }
 
   // Take an answer, asked for at `poses`; pairs that are left out are forgotten. Contacts of one's own

@@ -55,21 +55,21 @@ class OwnContacts {
   }
 
   // Whether these pairs are those of the last question, with the same columns.
-  bool is_asked(const bc_patches& pairs, double friction) const {
+  bool is_asked(const bc_patches& pairs) const {
     auto is_same = [](const double* column, const std::vector<double>& last, double otherwise) {
       return column ? std::equal(last.begin(), last.end(), column)
                     : std::count(last.begin(), last.end(), otherwise) == long(last.size());
     };
     return pairs.count > 0 && size_t(pairs.count) == count() && pairs.pairs &&
            std::equal(asked_.pairs.begin(), asked_.pairs.end(), pairs.pairs) &&
-           is_same(pairs.friction, asked_.friction, friction) &&
+           is_same(pairs.friction, asked_.friction, no_friction) &&
            is_same(pairs.surface, asked_.surface, 0.0) &&
            is_same(pairs.stiffness, asked_.stiffness, 0.0);
   }
   // Take the pairs of a question. Where bodies sleep, a pair is new until it was solved once, unless
   // `is_known(pair)` says that its patch sleeps. Returns false, and takes none, if a pair comes twice.
   template <class IsKnown>
-  bool ask(const bc_patches& asked, double friction, bool is_any_asleep, const IsKnown& is_known) {
+  bool ask(const bc_patches& asked, bool is_any_asleep, const IsKnown& is_known) {
     auto n = size_t(asked.count);
     next_keys_.clear();
     for (size_t k = 0; k < n; ++k) {
@@ -91,19 +91,19 @@ class OwnContacts {
       else
         std::fill(to.begin(), to.end(), otherwise);
     };
-    copy(asked.friction, asked_.friction, friction);
+    copy(asked.friction, asked_.friction, no_friction);
     copy(asked.surface, asked_.surface, 0.0);
     copy(asked.stiffness, asked_.stiffness, 0.0);
     return true;
   }
-  // Whether the pair of a patch is asked for, with the numbers of the patch.
-  bool is_asked(const Patch& patch) const {
+  // Whether the pair of a patch is asked for, with the numbers of the patch. friction: where none is told.
+  bool is_asked(const Patch& patch, const Surfaces& surfaces, double friction) const {
     auto key = std::lower_bound(keys_.begin(), keys_.end(), Key{patch.pair(), 0, false});
     if (key == keys_.end() || key->pair != patch.pair()) return false;
     size_t k = key->row;
     double sign = asked_.pairs[2 * k] < asked_.pairs[2 * k + 1] ? 1.0 : -1.0;
     Vec<double> other = patch.surface - sign * vector_at(&asked_.surface[3 * k]);
-    return patch.friction == asked_.friction[k] && patch.stiffness == asked_.stiffness[k] &&
+    return patch.friction == friction_of(surfaces, patch.pair(), asked_.friction[k], friction) && patch.stiffness == asked_.stiffness[k] &&
            dot(other, other) == 0.0;
   }
 

@@ -78,14 +78,31 @@ struct Kept {
   Vec<T> pressure_arm;                       // from A's centre of mass to its centre [m]
 };
 
-// Velocities of the boxes' surfaces beside those of their bodies, as of belts [m/s]; none: all are 0.
-using Surfaces = std::vector<Vec<double>>;
+// Friction that is not told [1].
+constexpr double no_friction = -1.0;
 
-// Of the higher box of a pair relative to the lower one, with what an answer tells of it.
+// How the surface of a box moves beside its body, as of a belt [m/s], and its own friction [1].
+struct Surface {
+  Vec<double> velocity{0.0, 0.0, 0.0};
+  double friction = no_friction;
+};
+using Surfaces = std::vector<Surface>;  // of all boxes; none: nothing was told of any
+
+// The velocity of the higher box of a pair relative to the lower one, with what an answer tells of it.
 inline Vec<double> surface_of(const Surfaces& surfaces, const BoxPair& pair,
                               const Vec<double>& told) {
   if (surfaces.empty()) return told;
-  return told + (surfaces[size_t(pair.second)] - surfaces[size_t(pair.first)]);
+  return told + (surfaces[size_t(pair.second)].velocity - surfaces[size_t(pair.first)].velocity);
+}
+// The friction of a pair: what is told of it, or else the lesser of both boxes.
+inline double friction_of(const Surfaces& surfaces, const BoxPair& pair, double told,
+                          double otherwise) {
+  if (told != no_friction) return told;
+  auto own = [&](int32_t box) {
+    double friction = surfaces.empty() ? no_friction : surfaces[size_t(box)].friction;
+    return friction == no_friction ? otherwise : friction;
+  };
+  return std::min(own(pair.first), own(pair.second));
 }
 
 // The patch of a pair, where it was asked for, and what it gave.

@@ -20,7 +20,7 @@ struct Answered {
   const std::vector<Body>& bodies;
   const std::vector<bc_body_box>& boxes;  // none: box k is body k, and nobody knows its size
   const Surfaces& surfaces;
-  double friction;  // where the answer has none
+  double friction;  // where neither the answer nor a box has one
 
   bool is_stale(int64_t k) const { return answer.separation[k] != answer.separation[k]; }
   // Whether something moves of the pair of row k, which touches, or has a stale contact. Boxes may have
@@ -63,7 +63,8 @@ inline void read(const Answered& all, int64_t k, Patch& patch) {
   if (!all.boxes.empty())
     patch.end_at_rim(box_at_a, all.boxes[size_t(patch.box_a)].box.size, box_at_b,
                      all.boxes[size_t(patch.box_b)].box.size);
-  patch.friction = answer.friction ? answer.friction[k] : all.friction;
+  patch.friction = friction_of(all.surfaces, patch.pair(),
+                               answer.friction ? answer.friction[k] : no_friction, all.friction);
   patch.stiffness = answer.stiffness ? answer.stiffness[k] : 0.0;
   patch.surface = surface_of(
       all.surfaces, patch.pair(),
