@@ -122,10 +122,11 @@ class PatchForces:
     def set_surface(self, box: int, velocity: np.ndarray | None, friction: float | None,
                     /) -> None: ...
     def advance(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
-                outside: ArrayLike | None, changed: np.ndarray | None, /,
+                outside: ArrayLike | None, changed: np.ndarray | None,
+                out: tuple[np.ndarray | None, ...] | None, /,
                 ) -> Any: ...  # a tuple of arrays, or None
     def wrenches(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
-                 outside: ArrayLike | None, changed: np.ndarray | None, /,
+                 outside: ArrayLike | None, changed: None, out: None, /,
                  ) -> Any: ...  # an array, or None
     def ahead(self, dt: float, poses: np.ndarray, velocities: np.ndarray, /) -> np.ndarray: ...
     def loads(self) -> tuple[np.ndarray, ...]: ...

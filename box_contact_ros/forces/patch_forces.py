@@ -158,6 +158,10 @@ class Motion(NamedTuple):
     the one that was given, its velocity 0."""
 
 
+_NOT_WANTED = np.zeros((0, 6)), np.zeros(0, bool)
+"""Wrenches and awake of a motion that has none."""
+
+
 class Loads(NamedTuple):
     """What each contact carried, the mean over the last step: a row for each pair of boxes.
 
@@ -310,19 +314,31 @@ class PatchForces:
             *_columns_of_pairs(friction, surface_velocity, stiffness), *times)
 
     def advance(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
-                wrenches: ArrayLike | None = None, *, changed: ArrayLike | None = None) -> Motion:
+                wrenches: ArrayLike | None = None, *, changed: ArrayLike | None = None,
+                out: Sequence[np.ndarray | None] | None = None) -> Motion:
         """Return where the bodies are after a step of `dt` [s], and what contacts did.
 
         poses, velocities: at its start. wrenches: all but those of contacts, gravity among them.
         changed: (k,) places of those bodies at rest that may be given otherwise than at the end of
         the last step. The others are not read: they stay where they were. None: all may be.
+        out: arrays for poses and velocities, and perhaps for wrenches and awake, that are written
+        and returned; without one, or with None, there are no rows. Where those of poses and
+        velocities are the arguments, and there is none for wrenches, rows at rest are not written:
+        with `changed` they take no time.
         A body of mass 0 without a velocity goes from where it ended to the pose that is given:
         that of the step's end. `forget` what is put elsewhere.
         Call `advance` once a step. Steps of less than 1 s may differ in length.
         ValueError: names field and value; nothing changes then.
         """
         named = None if changed is None else as_wholes(changed, 'changed')
-        return Motion._make(_step(self._native.advance, dt, poses, velocities, wrenches, named))
+        if out is None:
+            return Motion._make(_step(self._native.advance, dt, poses, velocities, wrenches, named))
+        if not 2 <= len(out) <= 4 or out[0] is None or out[1] is None:
+            raise ValueError(f'out must be (poses, velocities, …), not {short_repr(out)}')
+        rows = (*out, None, None)[:4]
+        _step(self._native.advance, dt, poses, velocities, wrenches, named, rows)
+        return Motion(out[0], out[1], *(none if row is None else row
+                                        for row, none in zip(rows[2:], _NOT_WANTED)))
 
     def ahead(self, dt: float, poses: ArrayLike, velocities: ArrayLike) -> np.ndarray:
         """Return the poses (n, 7) at which to take the wrenches of ropes and springs.
@@ -376,14 +392,15 @@ class PatchForces:
 
 
 def _step(step: Callable[..., Any], dt: float, poses: ArrayLike, velocities: ArrayLike,
-          wrenches: ArrayLike | None, changed: np.ndarray | None = None) -> Any:
+          wrenches: ArrayLike | None, changed: np.ndarray | None = None,
+          out: tuple[np.ndarray | None, ...] | None = None) -> Any:
     """Return what a step of C++ gives; it converts nothing, and gives None for other arrays."""
     dt = as_number(dt, 'dt')
-    found = step(dt, poses, velocities, wrenches, changed)
+    found = step(dt, poses, velocities, wrenches, changed, out)
     if found is not None:
         return found
     return step(dt, _as_rows(poses, 'poses', 7), _as_rows(velocities, 'velocities', 6),
-                None if wrenches is None else _as_rows(wrenches, 'wrenches', 6), changed)
+                None if wrenches is None else _as_rows(wrenches, 'wrenches', 6), changed, out)
 
 
 def _principal_axes(inertia: np.ndarray) -> np.ndarray:

@@ -257,6 +257,10 @@ int main() {
   for (int step = 0; step < 10; ++step) twin.advance(0.001, poses, velocities, outside);
   failures += allocations != copied;
   failures += !(copy.loads()[0].pressing > 1e5);
+  Load loads[1] = {};
+  const long before_loads = allocations;
+  failures += copy.loads(loads) != 1 || !(loads[0].pressing > 1e5);
+  failures += copy.loads({loads, 0}) != 1 || allocations != before_loads;
   try {
     const Patches unnamed(Rows{}, Results{});
     ++failures;

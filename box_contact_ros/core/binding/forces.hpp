@@ -4,6 +4,7 @@
 // The forces of patches, as a Python type.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "../include/box_contact/force.h"
@@ -154,10 +155,23 @@ Struct* rows_of(const Array<double>& array) {
   return reinterpret_cast<Struct*>(array.numbers);
 }
 
+// An array that is written, or None.
+template <class Number>
+Array<Number> read_written(PyObject* given, const char* name, Shape shape) {
+  Array<Number> array;
+  bool is_plain = read_plain(given, array);
+  if (!is_plain || (array.object && !PyArray_ISWRITEABLE(reinterpret_cast<PyArrayObject*>(given)))) {
+    std::string text = std::string(name) + " must be a plain array that can be written";
+    fail(PyExc_ValueError, text.c_str());
+  }
+  check_rows(array, name, shape);
+  return array;
+}
+
 // `advance` and, for callers who move the bodies by themselves, `wrenches`.
 template <bool by_wrenches>
 inline PyObject* forces_advance(PyObject* self, PyObject* const* args, Py_ssize_t count) {
-  if (count != 5) fail(PyExc_TypeError, "(dt, poses, velocities, outside, changed)");
+  if (count != 6) fail(PyExc_TypeError, "(dt, poses, velocities, outside, changed, out)");
   double dt = PyFloat_AsDouble(args[0]);
   if (PyErr_Occurred()) return nullptr;
   Array<double> poses, velocities, outside;
@@ -169,11 +183,22 @@ inline PyObject* forces_advance(PyObject* self, PyObject* const* args, Py_ssize_
   check_rows(poses, "poses", {bodies, 7});
   check_rows(velocities, "velocities", {bodies, 6});
   check_rows(outside, "wrenches", {bodies, 6});
-  Array<double> moved, after;
-  if (!by_wrenches) moved = make<double>({bodies, 7}), after = make<double>({bodies, 6});
-  auto wrenches = make<double>({bodies, 6});
+  Array<double> moved, after, wrenches;
   Array<bool> awake;
-  if (!by_wrenches) awake = make<bool>({bodies});
+  bool is_given = args[5] != Py_None;
+  if (is_given) {
+    if (!PyTuple_Check(args[5]) || PyTuple_GET_SIZE(args[5]) != 4)
+      fail(PyExc_TypeError, "out: four arrays");
+    auto given = [&](Py_ssize_t place) { return PyTuple_GET_ITEM(args[5], place); };
+    moved = read_written<double>(given(0), "out[0]", {bodies, 7});
+    after = read_written<double>(given(1), "out[1]", {bodies, 6});
+    wrenches = read_written<double>(given(2), "out[2]", {bodies, 6});
+    awake = read_written<bool>(given(3), "out[3]", {bodies});
+  } else {
+    wrenches = make<double>({bodies, 6});
+    if (!by_wrenches)
+      moved = make<double>({bodies, 7}), after = make<double>({bodies, 6}), awake = make<bool>({bodies});
+  }
   bc_motion motion{sizeof(bc_motion), rows_of<bc_pose>(moved), rows_of<bc_velocity>(after),
                    rows_of<bc_wrench>(wrenches),
                    reinterpret_cast<unsigned char*>(awake.numbers)};
@@ -186,6 +211,7 @@ inline PyObject* forces_advance(PyObject* self, PyObject* const* args, Py_ssize_
   else
     advance(bc_patch_forces_advance);
   if (by_wrenches) return wrenches.object.release();
+  if (is_given) return Py_NewRef(args[5]);
   return pack(&PyTuple_Type, moved, after, wrenches, awake);
 }
 
@@ -262,11 +288,11 @@ inline PyMethodDef forces_methods[] = {
      "set_surface(box, velocity, friction)\n--\n\nSet the surface of a box: (3,), and a number; None: as "
      "before."},
     {"wrenches", method<forces_advance<true>>(), METH_FASTCALL,
-     "wrenches(dt, poses, velocities, outside, changed)\n--\n\nReturn wrenches (n, 6), which move the bodies "
+     "wrenches(dt, poses, velocities, outside, changed, out)\n--\n\nReturn wrenches (n, 6), which move the bodies "
      "until the next call.\n\nReturn None, and change nothing, where one is no plain array."},
     {"advance", method<forces_advance<false>>(), METH_FASTCALL,
-     "advance(dt, poses, velocities, outside, changed)\n--\n\nReturn poses (n, 7), velocities and wrenches "
-     "(n, 6), and who is awake (n,).\n\nReturn None, and change nothing, where one is no plain array."},
+     "advance(dt, poses, velocities, outside, changed, out)\n--\n\nReturn poses (n, 7), velocities and "
+     "wrenches (n, 6), and who is awake (n,): those of a tuple, if one is given.\n\nReturn None, and change nothing, where one is no plain array."},
     {"ahead", method<forces_ahead>(), METH_FASTCALL,
      "ahead(dt, poses, velocities)\n--\n\nReturn the poses (n, 7) at which to take forces that depend on "
      "poses."},

@@ -200,7 +200,7 @@ BC_API bc_status bc_patch_forces_advance_changed(bc_patch_forces* forces, double
 
 /* Write what each pair carried in the last advance, by the lower and the higher box, and return how many
  * there are: none if bodies or boxes were changed, or patches forgotten, since. Nothing is written if
- * `capacity` is less. */
+ * `capacity` is less. It allocates no memory once as many were written. */
 BC_API int64_t bc_patch_forces_loads(const bc_patch_forces* forces, bc_load* loads, int64_t capacity);
 
 #ifdef __cplusplus

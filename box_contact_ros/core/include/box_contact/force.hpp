@@ -173,10 +173,15 @@ class PatchForces {
   // What each pair carried, by the lower and the higher box: the mean of the last advance. No row
   // if bodies or boxes were changed, or patches forgotten, since.
   std::vector<Load> loads() const {
-    std::vector<Load> found(std::size_t(bc_patch_forces_loads(forces_.get(), nullptr, 0)));
-    found.resize(std::size_t(
-        bc_patch_forces_loads(forces_.get(), found.data(), std::int64_t(found.size()))));
+    std::vector<Load> found(loads(Span<Load>()));
+    found.resize(loads(found));
     return found;
+  }
+  // Write them to rows, and return how many there are; with fewer rows, none is written. It allocates no memory
+  // once as many were written.
+  std::size_t loads(Span<Load> found) const {
+    return std::size_t(
+        bc_patch_forces_loads(forces_.get(), found.data(), std::int64_t(found.size())));
   }
 
  private:

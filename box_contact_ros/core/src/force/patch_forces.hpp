@@ -34,12 +34,13 @@ class PatchForces : public PatchStore {
   // Write what each pair carried in the last advance. With boxes, corners are those of the faces, and
   // the pads of two bodies share as rubber ones do.
   void write_loads(bc_load* loads) const {
-    std::vector<Load> all(load_count());
+    std::vector<Load>& all = loads_room_.all;
+    all.resize(load_count());
     if (all.empty()) return;
     std::merge(state_.loads.begin(), state_.loads.end(), sleep_.loads().begin(),
                sleep_.loads().end(), all.begin(), ByPair{});
     for (size_t k = 0; k < all.size(); ++k) loads[k] = all[k].mean();
-    if (!boxes().empty()) share_on_faces(all, bodies_, boxes(), poses_, loads);
+    if (!boxes().empty()) share_on_faces(loads_room_, bodies_, boxes(), poses_, loads);
   }
   // Write the poses at which the next step's forces that depend on poses are to be taken: see SubSteps::ahead.
   void write_ahead(double dt, const bc_pose* poses, const bc_velocity* velocities,
@@ -182,6 +183,8 @@ class PatchForces : public PatchStore {
     sleep_.lay_down(bodies_, state_.patches, state_.loads);
     is_grouped_ = false;
   }
+
+  mutable LoadsRoom loads_room_;
 };
 
 }  // namespace box_contact::BOX_CONTACT_SET::force
