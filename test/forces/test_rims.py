@@ -102,7 +102,7 @@ def test_a_ledge_carries_as_inspect_plan_says(ledge: float, dt: float) -> None:
 @pytest.mark.parametrize('dt', [0.001, FRAME])
 @pytest.mark.parametrize('thick', [1e-4, 3e-4])
 def test_thin_plates_beside_each_other_push_each_other(dt: float, thick: float) -> None:
-    """The lip of thin boxes is a part of them: else plates of .1 mm pass through each other."""
+    """The lip is a tenth of them at most: else plates of .1 mm pass through each other."""
     world = World(FLOOR, *(((0.2, 0.2, thick), 0.1, (0.2 * k, 0, 0.5 * thick)) for k in range(2)),
                   find_pairs=True).run(0.2, dt)
     world.outside[1, 0] = 1.5 * 0.5 * 0.2 * GRAVITY

@@ -141,8 +141,9 @@ BC_API bc_status bc_patch_forces_set_bodies(bc_patch_forces* forces, const bc_bo
  * stay with their body stay; pairs of contacts of one's own are forgotten. 0 boxes: box k is body k.
  * With `find_pairs`, each advance finds the pairs of boxes that touch, and solves them by model `exact`:
  * nothing is to be held, and bc_patch_forces_hold is refused. Boxes of one body are never a pair.
- * As sizes are known, boxes that only pass each other by a rim have no patch: those that overlap across the
- * normal by no more than 0.1 mm, or a quarter of the thinner box, and what the boxes below have sunk. */
+ * As sizes are known, boxes that only pass each other by a rim have no patch: those of parallel faces that
+ * overlap across the normal by no more than 0.1 mm and what the boxes below have sunk, or a tenth of the thinner
+ * box. */
 BC_API bc_status bc_patch_forces_set_boxes(bc_patch_forces* forces, const bc_body_box* boxes,
                                            int64_t count, int find_pairs);
 

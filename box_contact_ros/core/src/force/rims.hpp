@@ -21,8 +21,8 @@ class Rims {
     sunk_.resize(3 * count);
     tier_.resize(3 * count);
   }
-  // Drop patches of boxes that overlap along another face's normal by no more than the lip: the tolerance of faces,
-  // and how far either body has sunk along it.
+  // Drop patches of boxes that overlap along the normal of faces of both by no more than the lip: the tolerance of
+  // faces, and how far either body has sunk along it. What is deeper than a part of the thinner box is no rim.
   void drop(const Answered& all, std::vector<Patch>& patches) {
     double highest = face_tolerance;  // no lip is higher [m]
     for (const Patch& patch : patches) highest += depth_of(patch);
@@ -73,12 +73,16 @@ class Rims {
     const bc_size &size_a = all.boxes[size_t(patch.box_a)].box.size,
                   &size_b = all.boxes[size_t(patch.box_b)].box.size;
     const Placed a = all.place_box(patch.box_a), b = all.place_box(patch.box_b);
+    auto has_face = [](const Placed& box, const Vec<double>& normal) {
+      return std::fabs(dot(column(box.axes, axis_along(box.axes, normal)), normal)) >= along_a_face;
+    };
     bool passes = false;
     each_face_across(a, b, patch.normal, [&](const Vec<double>& face) {
+      if (!has_face(a, face) || !has_face(b, face)) return;  // an edge on a face: they are not flush
       double thinner = std::min(extent_along(a, size_a, face), extent_along(b, size_b, face));
       double sunk = std::max(sunk_[place(patch.a, patch.asked_a, face)],
                              sunk_[place(patch.b, patch.asked_b, face)]);
-      double lip = std::min(face_tolerance, lip_part * thinner) + sunk;
+      double lip = std::min(face_tolerance + sunk, deepest_part * thinner);
       passes = passes || overlap_along(a, size_a, b, size_b, face) <= lip;
     });
     return passes;

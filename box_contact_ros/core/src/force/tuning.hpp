@@ -99,8 +99,6 @@ constexpr int sub_steps_per_contact = 4;
 // --- gaps ---
 // A pair apart is a constraint within so many times g·dt² [1]: what it falls in this step and the next.
 constexpr double gap_share = 2.0;
-// The lip of thin boxes is this part of the thinner one [1], and how far they have sunk.
-constexpr double lip_part = 0.25;
 // A patch at least so wide as a part of its faces stops a turn by itself [1].
 constexpr double wide = 0.5;
 
