@@ -270,8 +270,7 @@ class PatchForces:
     def hold(self, pairs: ArrayLike, contacts: Contacts | None = None,
              poses: ArrayLike | None = None, *,
              friction: ArrayLike | None = None, surface_velocity: ArrayLike | None = None,
-             stiffness: ArrayLike | None = None, age: float = 0.0,
-             period: float = 0.0) -> None:
+             age: float = 0.0, period: float = 0.0) -> None:
         """Take the contacts of pairs of boxes (k, 2), asked for at `poses`; forget other pairs.
 
         Without contacts, they are one's own: `exact` solves the pairs at the start of each
@@ -282,8 +281,6 @@ class PatchForces:
         friction: μ (k,); None: the lesser of both boxes.
         surface_velocity: (k, 3) of B's surface relative to A's [m/s], as of a belt. That of the
         bodies is added.
-        stiffness: (k,) of springs [N/m]: a weight rests weight / stiffness deep. Steps and late
-        answers limit it. 0: as stiff as they allow.
         age: how long ago the answer was asked for [s].
         period: from one question to the next [s]. 0 is the least of the last intervals between
         answers.
@@ -293,8 +290,8 @@ class PatchForces:
         if contacts is None:
             if poses is not None or age or period:
                 raise ValueError('contacts must be those of poses, age and period, not None')
-            self._native.hold_pairs(as_pairs(pairs, 'pairs'), *_columns_of_pairs(
-                friction, surface_velocity, stiffness))
+            self._native.hold_pairs(as_pairs(pairs, 'pairs'),
+                                    *_columns_of_pairs(friction, surface_velocity))
             return
         if not isinstance(contacts, Contacts):
             raise ValueError(f'contacts must be Contacts, not {short_repr(contacts)}')
@@ -302,7 +299,7 @@ class PatchForces:
             raise ValueError('poses must be those of the question, not None')
         times = as_number(age, 'age'), as_number(period, 'period')
         rows = (contacts.separation, contacts.normal, contacts.point, contacts.volume,
-                contacts.covariance, poses, friction, surface_velocity, stiffness, *times)
+                contacts.covariance, poses, friction, surface_velocity, *times)
         # Where all are plain arrays, no time is lost to checks; pairs alone often are not.
         if self._native.hold(pairs, *rows) or self._native.hold(as_pairs(pairs, 'pairs'), *rows):
             return
@@ -311,7 +308,7 @@ class PatchForces:
             _as_rows(contacts.normal, 'normal', 3), _as_rows(contacts.point, 'point', 3),
             _as_rows(contacts.volume, 'volume'), _as_rows(contacts.covariance, 'covariance', 3, 3),
             _as_rows(poses, 'poses', 7),
-            *_columns_of_pairs(friction, surface_velocity, stiffness), *times)
+            *_columns_of_pairs(friction, surface_velocity), *times)
 
     def advance(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
                 wrenches: ArrayLike | None = None, *, changed: ArrayLike | None = None,
@@ -440,12 +437,10 @@ def _columns(bodies: Sequence[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 def _columns_of_pairs(friction: ArrayLike | None, surface_velocity: ArrayLike | None,
-                      stiffness: ArrayLike | None,
-                      ) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
+                      ) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Return what pairs may have of their own, checked."""
     return (None if friction is None else _as_rows(friction, 'friction'),
-            None if surface_velocity is None else _as_rows(surface_velocity, 'surface_velocity', 3),
-            None if stiffness is None else _as_rows(stiffness, 'stiffness'))
+            None if surface_velocity is None else _as_rows(surface_velocity, 'surface_velocity', 3))
 
 
 def _as_rows(value: ArrayLike, name: str, *shape: int) -> np.ndarray:

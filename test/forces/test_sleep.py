@@ -123,7 +123,6 @@ EVENTS: dict[str, tuple[Callable[[World], None], list[int]]] = {
     'belt': (lambda w: hold(w, surface_velocity=(0, SLIDER, (1.0, 0, 0))), [SLIDER]),
     'ice': (lambda w: (hold(w, friction=(0, SLIDER, 0.0)),
                        give_speed(w, SLIDER, 1, 0, 0, 0, 0, 0)), [SLIDER]),
-    'spring': (lambda w: hold(w, stiffness=(1, 2, 2e3)), [ON_PLATE]),
     'pair lost': (lambda w: hold(w, pairs_of(w)[1:]), []),
     'box set anew': (smaller, [FOOT, MIDDLE, TOP]),
     'answers of others': (others, [FOOT, MIDDLE, TOP]),

@@ -156,7 +156,6 @@ TABLE: list[tuple[Callable[[], object], str, str]] = [
     (lambda: hold(field='point', value=(0, 0, NAN)), 'point[0]', 'nan'),
     (lambda: hold(friction=['1']), 'friction', "['1']"),
     (lambda: hold(friction=[-1.0]), 'friction[0]', '-1'),
-    (lambda: hold(stiffness=[INF]), 'stiffness[0]', 'inf'),
     (lambda: hold(surface_velocity=[(0, 0, NAN)]), 'surface_velocity[0]', 'nan'),
     (lambda: hold(surface_velocity=[(0, 0)]), 'surface_velocity', '(1, 2)'),
     (lambda: hold(age='1'), 'age', "'1'"),

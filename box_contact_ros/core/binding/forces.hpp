@@ -67,18 +67,18 @@ void check_rows(const Array<Number>& given, const char* name, Shape shape) {
 }
 
 inline PyObject* forces_hold(PyObject* self, PyObject* const* args, Py_ssize_t count) {
-  if (count != 12)
+  if (count != 11)
     fail(PyExc_TypeError,
-         "hold(pairs, separation, normal, point, volume, covariance, poses, friction, surface, "
-         "stiffness, age, period)");
-  double age = PyFloat_AsDouble(args[10]), period = PyFloat_AsDouble(args[11]);
+         "hold(pairs, separation, normal, point, volume, covariance, poses, friction, surface, age, "
+         "period)");
+  double age = PyFloat_AsDouble(args[9]), period = PyFloat_AsDouble(args[10]);
   if (PyErr_Occurred()) return nullptr;
   Array<int64_t> pairs;
-  Array<double> separation, normal, point, volume, covariance, poses, friction, surface, stiffness;
+  Array<double> separation, normal, point, volume, covariance, poses, friction, surface;
   if (!read_plain(args[0], pairs) || !pairs.object) Py_RETURN_FALSE;
   Array<double>* columns[] = {&separation, &normal,   &point,   &volume,   &covariance,
-                              &poses,      &friction, &surface, &stiffness};
-  for (int k = 0; k < 9; ++k)
+                              &poses,      &friction, &surface};
+  for (int k = 0; k < 8; ++k)
     if (!read_plain(args[1 + k], *columns[k]) || (k < 6 && !columns[k]->object)) Py_RETURN_FALSE;
   check_shape(pairs, "pairs", {any_length, 2});
   npy_intp n = pairs.length(0);
@@ -90,30 +90,26 @@ inline PyObject* forces_hold(PyObject* self, PyObject* const* args, Py_ssize_t c
   check_rows(poses, "poses", {body_count(self), 7});
   check_rows(friction, "friction", {n});
   check_rows(surface, "surface_velocity", {n, 3});
-  check_rows(stiffness, "stiffness", {n});
   bc_patches answer{sizeof(bc_patches), int64_t(n),       pairs.numbers,  separation.numbers,
                     normal.numbers,     point.numbers,    volume.numbers, covariance.numbers,
-                    friction.numbers,   surface.numbers,  stiffness.numbers, age,
-                    period};
+                    friction.numbers,   surface.numbers,  age,            period};
   check(bc_patch_forces_hold(forces_of(self), &answer,
                              reinterpret_cast<const bc_pose*>(poses.numbers)));
   Py_RETURN_TRUE;
 }
 
 inline PyObject* forces_hold_pairs(PyObject* self, PyObject* const* args, Py_ssize_t count) {
-  if (count != 4) fail(PyExc_TypeError, "hold_pairs(pairs, friction, surface, stiffness)");
+  if (count != 3) fail(PyExc_TypeError, "hold_pairs(pairs, friction, surface)");
   auto pairs = read<int64_t>(args[0], "pairs", {any_length, 2});
   npy_intp n = pairs.length(0);
   auto friction = read_given<double>(args[1], "friction", {n});
   auto surface = read_given<double>(args[2], "surface_velocity", {n, 3});
-  auto stiffness = read_given<double>(args[3], "stiffness", {n});
   bc_patches asked{};
   asked.size = sizeof asked;
   asked.count = int64_t(n);
   asked.pairs = pairs.numbers;
   asked.friction = friction.numbers;
   asked.surface = surface.numbers;
-  asked.stiffness = stiffness.numbers;
   check(bc_patch_forces_hold(forces_of(self), &asked, nullptr));
   Py_RETURN_NONE;
 }
@@ -274,13 +270,12 @@ inline PyMethodDef forces_methods[] = {
     {"set_bodies", method<forces_set_bodies>(), METH_FASTCALL,
      "set_bodies(mass, inertia, centre)\n--\n\nChange the bodies: (n,), (n, 3), (n, 3)."},
     {"hold", method<forces_hold>(), METH_FASTCALL,
-     "hold(pairs, separation, normal, point, volume, covariance, poses, friction, surface, "
-     "stiffness, age, period)\n--\n\nTake the arrays of an answer; None for friction, surface "
-     "and stiffness.\n\n"
+     "hold(pairs, separation, normal, point, volume, covariance, poses, friction, surface, age, "
+     "period)\n--\n\nTake the arrays of an answer; None for friction and surface.\n\n"
      "Return False, and change nothing, where one is no plain array."},
     {"hold_pairs", method<forces_hold_pairs>(), METH_FASTCALL,
-     "hold_pairs(pairs, friction, surface, stiffness)\n--\n\nTake pairs whose contacts are solved at "
-     "each advance; None for the last three."},
+     "hold_pairs(pairs, friction, surface)\n--\n\nTake pairs whose contacts are solved at each advance; "
+     "None for the last two."},
     {"set_boxes", method<forces_set_boxes>(), METH_FASTCALL,
      "set_boxes(sizes, body, poses, find_pairs)\n--\n\nChange the boxes: (m, 3), (m,), (m, 7), bool; None "
      "for body and poses."},

@@ -55,8 +55,8 @@ typedef struct bc_wrench {
 
 /* An answer: rows of pairs, as bc_collide_rows gives them. Rows without volume are passed over. A row
  * whose separation is NaN is stale: the patch that is held for its pair stays. With `separation` NULL,
- * contacts are one's own: model `exact` solves the pairs at the start of each advance. Then friction,
- * surface and stiffness are read alone. */
+ * contacts are one's own: model `exact` solves the pairs at the start of each advance. Then friction
+ * and surface are read alone. */
 typedef struct bc_patches {
   size_t size; /* sizeof(bc_patches) */
   int64_t count;
@@ -66,12 +66,10 @@ typedef struct bc_patches {
   const double* point;      /* (count, 3) [m] */
   const double* volume;     /* [m³] */
   const double* covariance; /* (count, 3, 3) [m²]; eigenvalues ≥ −1e-9 of the trace */
-  const double* friction;   /* Coulomb's μ [1]; NULL: the lesser of both boxes; it, stiffness, age and
-                               period are 0 to 1e50 */
+  const double* friction;   /* Coulomb's μ [1]; NULL: the lesser of both boxes; it, age and period are 0
+                               to 1e50 */
   const double* surface;    /* (count, 3): velocity of B's surface relative to A's, beside that of the
                                bodies, as of a belt [m/s]; NULL: none */
-  const double* stiffness;  /* of a spring [N/m]: a weight rests weight / stiffness deep. Steps and late
-                               answers limit it; 0, or NULL: as stiff as they allow */
   double age;               /* since the answer was asked for [s] */
   double period;            /* from one question to the next [s]; 0: the least of the last
                                intervals between answers */

@@ -34,7 +34,6 @@ struct Patches {
   Results results;                 // separation, normal, point, volume and covariance
   Span<const double> friction{};   // Coulomb's μ of each pair; none: the lesser of both boxes
   Span<const double> surface{};    // velocity of B's surface relative to A's, three numbers a row [m/s]
-  Span<const double> stiffness{};  // of each pair [N/m]; 0: as stiff as steps and late answers allow
   double age = 0.0;                // since the answer was asked for [s]
   double period = 0.0;             // from one question to the next [s]; 0: by the last answers
 
@@ -127,12 +126,10 @@ class PatchForces {
     const std::size_t count = answer.pairs.size() / 2;
     check_column(answer.friction, count);
     check_column(answer.surface, 3 * count);
-    check_column(answer.stiffness, count);
     const bc_patches plain{sizeof(bc_patches),      std::int64_t(count), answer.pairs.data(),
                            found.separation,        found.normal,        found.point,
                            found.volume,            found.covariance,    answer.friction.data(),
-                           answer.surface.data(),   answer.stiffness.data(), answer.age,
-                           answer.period};
+                           answer.surface.data(),   answer.age,          answer.period};
     detail::check(bc_patch_forces_hold(forces_.get(), &plain, poses.data()));
   }
 

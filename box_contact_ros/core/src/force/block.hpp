@@ -96,7 +96,7 @@ template <class T>
 struct Asked {
   Vec<T> normal, point, surface;
   RectangleOf<T> shape;
-  T friction, asked_depth, stiffness, late, age;
+  T friction, asked_depth, late, age;
   Vec<T> local_a, local_b;  // its point in the frames of its bodies
   Vec<T> closing;           // velocities along N, τ1 and τ2 that close the faces: see closing.hpp
   T over_relaxation;        // of pressing and rocking: see iterations.hpp [1]
@@ -154,10 +154,10 @@ inline void read_patch(const Patch& patch, double over_relaxation, double over_r
   };
   // The zeros are written out: `{}` would clear the whole of it first.
   static_cast<Asked<double>&>(block) = {
-      patch.normal,   patch.point,          patch.surface,        patch.shape,
-      patch.friction, patch.depth,          patch.stiffness,      patch.late,
-      patch.age,      local(patch.asked_a), local(patch.asked_b), Vec<double>{0.0, 0.0, 0.0},
-      over_relaxation, over_relaxed};
+      patch.normal,         patch.point,          patch.surface,              patch.shape,
+      patch.friction,       patch.depth,          patch.late,                 patch.age,
+      local(patch.asked_a), local(patch.asked_b), Vec<double>{0.0, 0.0, 0.0}, over_relaxation,
+      over_relaxed};
   static_cast<Kept<double>&>(block) = patch.kept;
 }
 

@@ -63,8 +63,7 @@ class OwnContacts {
     return pairs.count > 0 && size_t(pairs.count) == count() && pairs.pairs &&
            std::equal(asked_.pairs.begin(), asked_.pairs.end(), pairs.pairs) &&
            is_same(pairs.friction, asked_.friction, no_friction) &&
-           is_same(pairs.surface, asked_.surface, 0.0) &&
-           is_same(pairs.stiffness, asked_.stiffness, 0.0);
+           is_same(pairs.surface, asked_.surface, 0.0);
   }
   // Take the pairs of a question. Where bodies sleep, a pair is new until it was solved once, unless
   // `is_known(pair)` says that its patch sleeps. Returns false, and takes none, if a pair comes twice.
@@ -93,7 +92,6 @@ class OwnContacts {
     };
     copy(asked.friction, asked_.friction, no_friction);
     copy(asked.surface, asked_.surface, 0.0);
-    copy(asked.stiffness, asked_.stiffness, 0.0);
     return true;
   }
   // Whether the pair of a patch is asked for, with the numbers of the patch. friction: where none is told.
@@ -103,7 +101,7 @@ class OwnContacts {
     size_t k = key->row;
     double sign = asked_.pairs[2 * k] < asked_.pairs[2 * k + 1] ? 1.0 : -1.0;
     Vec<double> other = patch.surface - sign * vector_at(&asked_.surface[3 * k]);
-    return patch.friction == friction_of(surfaces, patch.pair(), asked_.friction[k], friction) && patch.stiffness == asked_.stiffness[k] &&
+    return patch.friction == friction_of(surfaces, patch.pair(), asked_.friction[k], friction) &&
            dot(other, other) == 0.0;
   }
 
@@ -213,7 +211,6 @@ class OwnContacts {
             found_.covariance.data(),
             finds_pairs_ ? nullptr : live.friction.data(),
             finds_pairs_ ? nullptr : live.surface.data(),
-            finds_pairs_ ? nullptr : live.stiffness.data(),
             0.0,
             0.0};
   }

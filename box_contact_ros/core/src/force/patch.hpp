@@ -117,7 +117,6 @@ struct Patch {
   double most_depth;    // by the thinner box; without sizes: any [m]
   double depth;         // the lesser of volume / area and −separation; below 0: apart [m]
   double friction;      // μ [1]
-  double stiffness;     // [N/m]; 0: as stiff as steps and late answers allow
   Vec<double> surface;  // velocity of B's surface relative to A's, beside the bodies' own [m/s]
   double late;          // from the question to the answer [s]
   double age;           // since the answer came [s]

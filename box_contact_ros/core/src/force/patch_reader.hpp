@@ -65,7 +65,6 @@ inline void read(const Answered& all, int64_t k, Patch& patch) {
                      all.boxes[size_t(patch.box_b)].box.size);
   patch.friction = friction_of(all.surfaces, patch.pair(),
                                answer.friction ? answer.friction[k] : no_friction, all.friction);
-  patch.stiffness = answer.stiffness ? answer.stiffness[k] : 0.0;
   patch.surface = surface_of(
       all.surfaces, patch.pair(),
       answer.surface ? sign * vector_at(answer.surface + 3 * k) : Vec<double>{0.0, 0.0, 0.0});

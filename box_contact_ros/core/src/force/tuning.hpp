@@ -27,7 +27,7 @@ constexpr double most_again = 2.0;
 constexpr double soft_frequency = 1.57;
 // Its damping ratio [1]: an overlap shrinks by an eighth a sub-step.
 constexpr double soft_damping_ratio = 5.0;
-// The same where answers are late, or a patch has a stiffness of its own.
+// The same where answers are late.
 constexpr double slow_damping_ratio = 2.0;
 // Fastest pushing out [m/s]: speeds add up in a stack, and relaxation leaves some.
 constexpr double push_out_limit = 0.1;
