@@ -343,7 +343,7 @@ BC_INLINE T solve_normal(Rows<T>& block, const NormalRows<T>& rows, Mask<T> due,
   Mask<T> within = is_within(next);
   T reach = max<T>(block.shape.half_1, block.shape.half_2);
   T fastest = max<T>(abs(v[0]), reach * max<T>(abs(v[1]), abs(v[2])));
-  Mask<T> sways = within & (fastest > least_sway) & (fastest < block.over_relaxed);
+  Mask<T> sways = within & (fastest > least_over_relaxed) & (fastest < block.over_relaxed);
   if (any(sways)) {
     Vec<T> beyond = before - block.over_relaxation * change;
     next = select(sways & is_within(beyond), beyond, next);

@@ -47,9 +47,10 @@ constexpr int intervals_kept = 8;
 constexpr int iterations = 4, relaxations = 2;
 // A smaller change of a patch's speeds does not make its neighbours be solved again [m/s].
 constexpr double least_change = 1e-8;
-// Pressing and rocking change by more than what solves a block, by up to this factor (Young, 1954) [1]. But not
-// where no rim is as fast as what sways: what rests stays solved.
+// Pressing and rocking change by more than what solves a block, by up to this factor (Young, 1954) [1].
 constexpr double most_over_relaxation = 1.3;
+// But not where no rim is faster than this [m/s]: what rests stays solved.
+constexpr double least_over_relaxed = 1e-6;
 
 // Friction acts at the mean centre of what pressed in this time [s]: in piles that of one sub-step shakes.
 constexpr double pressure_time = 0.05;
