@@ -158,6 +158,10 @@ class Motion(NamedTuple):
     the one that was given, its velocity 0."""
 
 
+_NOT_WANTED = np.zeros((0, 6)), np.zeros(0, bool)
+"""Wrenches and awake of a motion that has none."""
+
+
 class Loads(NamedTuple):
     """What each contact carried, the mean over the last step: a row for each pair of boxes.
 
@@ -211,7 +215,7 @@ class PatchForces:
                  threads: int = 1, most_depth: float = 1e-3, rest: bool = True) -> None:
         """Begin without patches.
 
-        friction: Coulomb's μ of pairs without one of their own.
+        friction: Coulomb's μ of boxes without their own.
         substeps: equal parts of the longest step lately, more if 5 ms are exceeded; up to 1,000.
         threads: at most. They change no bit.
         most_depth: how deep what rests may be [m], where a load is large for the lighter body.
@@ -239,7 +243,8 @@ class PatchForces:
         boxes (m, 7) in the frames of their bodies; None: those frames. Patches of boxes that stay
         with their body stay; pairs without contacts are forgotten. find_pairs: each `advance` finds
         the pairs that touch, and solves them by `exact`; `hold` is refused. Boxes of one body are
-        never a pair.
+        never a pair. Boxes that overlap across the normal by no more than 0.1 mm, and what they
+        have sunk, only pass each other: they have no patch.
         ValueError: names the field and its value.
         """
         self._native.set_boxes(_as_rows(sizes, 'sizes', 3),
@@ -247,20 +252,25 @@ class PatchForces:
                                None if poses is None else _as_rows(poses, 'poses', 7),
                                bool(find_pairs))
 
-    def set_surface(self, box: int, velocity: ArrayLike) -> None:
-        """Set the velocity (3,) of a box's surface beside that of its body, as of a belt [m/s].
+    def set_surface(self, box: int, velocity: ArrayLike | None = None,
+                    friction: float | None = None) -> None:
+        """Set how the surface of a box moves and rubs, until it is set again; None: as before.
 
-        It is in the common frame, and lasts until it is set again, also under late answers.
-        `surface_velocity` of `hold` is added. ValueError: names the field and its value.
+        velocity: (3,) beside that of its body, as of a belt, in the common frame [m/s]. It lasts
+        under late answers, too. `surface_velocity` of `hold` is added.
+        friction: Coulomb's μ. A pair has the lesser of both boxes, unless `hold` has one for it. A
+        box without its own, or with NaN, has that of the forces.
+        ValueError: names the field and its value.
         """
-        self._native.set_surface(int(as_wholes([box], 'box')[0]),
-                                 as_floats(velocity, 'velocity', 'three numbers', (3,)))
+        self._native.set_surface(
+            int(as_wholes([box], 'box')[0]), None if velocity is None else as_floats(
+                velocity, 'velocity', 'three numbers', (3,)),
+            None if friction is None else as_number(friction, 'friction'))
 
     def hold(self, pairs: ArrayLike, contacts: Contacts | None = None,
              poses: ArrayLike | None = None, *,
              friction: ArrayLike | None = None, surface_velocity: ArrayLike | None = None,
-             stiffness: ArrayLike | None = None, age: float = 0.0,
-             period: float = 0.0) -> None:
+             age: float = 0.0, period: float = 0.0) -> None:
         """Take the contacts of pairs of boxes (k, 2), asked for at `poses`; forget other pairs.
 
         Without contacts, they are one's own: `exact` solves the pairs at the start of each
@@ -268,11 +278,9 @@ class PatchForces:
         each step wakes nobody.
         A contact whose separation is NaN is stale: the patch of its pair stays. Contacts of boxes
         that are of one body by now are passed over.
-        friction: μ (k,).
+        friction: μ (k,); None: the lesser of both boxes.
         surface_velocity: (k, 3) of B's surface relative to A's [m/s], as of a belt. That of the
         bodies is added.
-        stiffness: (k,) of springs [N/m]: a weight rests weight / stiffness deep. Steps and late
-        answers limit it. 0: as stiff as they allow.
         age: how long ago the answer was asked for [s].
         period: from one question to the next [s]. 0 is the least of the last intervals between
         answers.
@@ -282,8 +290,8 @@ class PatchForces:
         if contacts is None:
             if poses is not None or age or period:
                 raise ValueError('contacts must be those of poses, age and period, not None')
-            self._native.hold_pairs(as_pairs(pairs, 'pairs'), *_columns_of_pairs(
-                friction, surface_velocity, stiffness))
+            self._native.hold_pairs(as_pairs(pairs, 'pairs'),
+                                    *_columns_of_pairs(friction, surface_velocity))
             return
         if not isinstance(contacts, Contacts):
             raise ValueError(f'contacts must be Contacts, not {short_repr(contacts)}')
@@ -291,7 +299,7 @@ class PatchForces:
             raise ValueError('poses must be those of the question, not None')
         times = as_number(age, 'age'), as_number(period, 'period')
         rows = (contacts.separation, contacts.normal, contacts.point, contacts.volume,
-                contacts.covariance, poses, friction, surface_velocity, stiffness, *times)
+                contacts.covariance, poses, friction, surface_velocity, *times)
         # Where all are plain arrays, no time is lost to checks; pairs alone often are not.
         if self._native.hold(pairs, *rows) or self._native.hold(as_pairs(pairs, 'pairs'), *rows):
             return
@@ -300,22 +308,34 @@ class PatchForces:
             _as_rows(contacts.normal, 'normal', 3), _as_rows(contacts.point, 'point', 3),
             _as_rows(contacts.volume, 'volume'), _as_rows(contacts.covariance, 'covariance', 3, 3),
             _as_rows(poses, 'poses', 7),
-            *_columns_of_pairs(friction, surface_velocity, stiffness), *times)
+            *_columns_of_pairs(friction, surface_velocity), *times)
 
     def advance(self, dt: float, poses: ArrayLike, velocities: ArrayLike,
-                wrenches: ArrayLike | None = None, *, changed: ArrayLike | None = None) -> Motion:
+                wrenches: ArrayLike | None = None, *, changed: ArrayLike | None = None,
+                out: Sequence[np.ndarray | None] | None = None) -> Motion:
         """Return where the bodies are after a step of `dt` [s], and what contacts did.
 
         poses, velocities: at its start. wrenches: all but those of contacts, gravity among them.
         changed: (k,) places of those bodies at rest that may be given otherwise than at the end of
         the last step. The others are not read: they stay where they were. None: all may be.
+        out: arrays for poses and velocities, and perhaps for wrenches and awake, that are written
+        and returned; without one, or with None, there are no rows. Where those of poses and
+        velocities are the arguments, and there is none for wrenches, rows at rest are not written:
+        with `changed` they take no time.
         A body of mass 0 without a velocity goes from where it ended to the pose that is given:
         that of the step's end. `forget` what is put elsewhere.
         Call `advance` once a step. Steps of less than 1 s may differ in length.
         ValueError: names field and value; nothing changes then.
         """
         named = None if changed is None else as_wholes(changed, 'changed')
-        return Motion._make(_step(self._native.advance, dt, poses, velocities, wrenches, named))
+        if out is None:
+            return Motion._make(_step(self._native.advance, dt, poses, velocities, wrenches, named))
+        if not 2 <= len(out) <= 4 or out[0] is None or out[1] is None:
+            raise ValueError(f'out must be (poses, velocities, …), not {short_repr(out)}')
+        rows = (*out, None, None)[:4]
+        _step(self._native.advance, dt, poses, velocities, wrenches, named, rows)
+        return Motion(out[0], out[1], *(none if row is None else row
+                                        for row, none in zip(rows[2:], _NOT_WANTED)))
 
     def ahead(self, dt: float, poses: ArrayLike, velocities: ArrayLike) -> np.ndarray:
         """Return the poses (n, 7) at which to take the wrenches of ropes and springs.
@@ -369,14 +389,15 @@ class PatchForces:
 
 
 def _step(step: Callable[..., Any], dt: float, poses: ArrayLike, velocities: ArrayLike,
-          wrenches: ArrayLike | None, changed: np.ndarray | None = None) -> Any:
+          wrenches: ArrayLike | None, changed: np.ndarray | None = None,
+          out: tuple[np.ndarray | None, ...] | None = None) -> Any:
     """Return what a step of C++ gives; it converts nothing, and gives None for other arrays."""
     dt = as_number(dt, 'dt')
-    found = step(dt, poses, velocities, wrenches, changed)
+    found = step(dt, poses, velocities, wrenches, changed, out)
     if found is not None:
         return found
     return step(dt, _as_rows(poses, 'poses', 7), _as_rows(velocities, 'velocities', 6),
-                None if wrenches is None else _as_rows(wrenches, 'wrenches', 6), changed)
+                None if wrenches is None else _as_rows(wrenches, 'wrenches', 6), changed, out)
 
 
 def _principal_axes(inertia: np.ndarray) -> np.ndarray:
@@ -416,12 +437,10 @@ def _columns(bodies: Sequence[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 def _columns_of_pairs(friction: ArrayLike | None, surface_velocity: ArrayLike | None,
-                      stiffness: ArrayLike | None,
-                      ) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
+                      ) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Return what pairs may have of their own, checked."""
     return (None if friction is None else _as_rows(friction, 'friction'),
-            None if surface_velocity is None else _as_rows(surface_velocity, 'surface_velocity', 3),
-            None if stiffness is None else _as_rows(stiffness, 'stiffness'))
+            None if surface_velocity is None else _as_rows(surface_velocity, 'surface_velocity', 3))
 
 
 def _as_rows(value: ArrayLike, name: str, *shape: int) -> np.ndarray:

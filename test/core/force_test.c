@@ -116,9 +116,11 @@ static void check_rest(void) {
     check(bc_patch_forces_forget(forces, places, 1) == BC_OK, "forget");
     check(bc_patch_forces_loads(forces, &load, 1) == 0, "no loads");
     const double belt[3] = {1, 0, 0};
-    check(bc_patch_forces_set_surface(forces, 2, belt) == BC_BAD_ARGUMENT, "no box");
-    check(bc_patch_forces_set_surface(forces, 0, NULL) == BC_BAD_ARGUMENT, "no velocity");
-    check(bc_patch_forces_set_surface(forces, 0, belt) == BC_OK, "a belt");
+    double rough = 0.9, bad = -1.0;
+    check(bc_patch_forces_set_surface(forces, 2, belt, NULL) == BC_BAD_ARGUMENT, "no box");
+    check(bc_patch_forces_set_surface(forces, 0, NULL, &bad) == BC_BAD_ARGUMENT, "no friction");
+    check(bc_patch_forces_set_surface(forces, 0, belt, NULL) == BC_OK, "a belt");
+    check(bc_patch_forces_set_surface(forces, 0, NULL, &rough) == BC_OK, "its friction");
     check(bc_patch_forces_set_boxes(forces, boxes, 2, 1) == BC_OK, "find pairs");
     check(bc_patch_forces_hold(forces, &asked, NULL) == BC_BAD_ARGUMENT, "pairs are found");
     check(!bc_patch_forces_advance(forces, 1 / 240.0, poses, velocities, outside, &motion) &&

@@ -241,6 +241,7 @@ int main() {
   }
   copy.hold(Patches(pair));
   copy.set_surface(1, {0.0, 0.0, 0.0});
+  copy.set_surface(1, {0.0, 0.0, 0.0}, 0.5);
   const long before = allocations;
   for (int step = 0; step < 10; ++step) copy.advance(0.001, poses, velocities, outside);
   Pose ahead[2];
@@ -256,6 +257,10 @@ int main() {
   for (int step = 0; step < 10; ++step) twin.advance(0.001, poses, velocities, outside);
   failures += allocations != copied;
   failures += !(copy.loads()[0].pressing > 1e5);
+  Load loads[1] = {};
+  const long before_loads = allocations;
+  failures += copy.loads(loads) != 1 || !(loads[0].pressing > 1e5);
+  failures += copy.loads({loads, 0}) != 1 || allocations != before_loads;
   try {
     const Patches unnamed(Rows{}, Results{});
     ++failures;

@@ -170,12 +170,21 @@ static void check_motion(void) {
   int64_t pairs[4] = {0, 1, 1, 2}, refused = 7;
   bc_sweep_rows rows = {sizeof rows,
                         {sizeof(bc_rows), 2, 3, starts, starts, &a.size, &a.size, 1, 1, pairs},
-                        ends, ends, NULL, NULL};
+                        ends, ends, NULL, NULL, NULL};
   double time[2], distance[2];
   bc_approach_results results = {
       sizeof results, time, NULL, {sizeof(bc_nearest_results), NULL, distance, NULL, NULL, NULL}};
   check(bc_time_of_impact_rows(&rows, 0.0, 1e-9, &results, 2, &refused) == BC_OK, "rows");
   check(refused == -1 && time[0] > 0.8 - 1e-9 && isnan(time[1]), "by place");
+  double clearances[2] = {0.5, 1.0};
+  rows.clearances = clearances;
+  check(bc_time_of_impact_rows(&rows, 0.0, 1e-9, &results, 1, &refused) == BC_OK, "clearances");
+  check(fabs(time[0] - 0.7) < 1e-9 && time[1] == 0.0, "each its own");
+  clearances[1] = -1.0;
+  check(bc_time_of_impact_rows(&rows, 0.0, 1e-9, &results, 1, NULL) == BC_BAD_ARGUMENT, "below 0");
+  check(strstr(bc_error_text(), "clearances[1] must be within 0 and 1e50 m, not -1") != NULL,
+        "its words");
+  rows.clearances = NULL;
   check(bc_least_distance_rows(&rows, 1e-9, &results, 1, NULL) == BC_OK, "without `refused`");
   check(time[1] == 0.0 || time[1] == 1.0, "when");
   check(distance[1] == 1.0, "the least distances");

@@ -208,7 +208,7 @@ void find_and_move_stacks(Calls& calls) {
   stacks.advance(calls, 40);
   stacks.boxes[6].box.size.extent[0] = 0.9;
   const double belt[] = {0.5, 0.0, 0.0};
-  calls([&] { return bc_patch_forces_set_surface(stacks.forces, 0, belt); });
+  calls([&] { return bc_patch_forces_set_surface(stacks.forces, 0, belt, nullptr); });
   calls(set_boxes);
   stacks.advance(calls, 2);
   stacks.poses[8] = pose_at(1.5, 0.5, 3.0);

@@ -83,30 +83,6 @@ def test_the_lowest_of_a_tower_carries_all() -> None:
     assert world.next_wrenches()[1:, 2] == pytest.approx(np.full(5, WEIGHT), rel=1e-4)
 
 
-def test_the_depth_at_rest_is_that_of_the_spring() -> None:
-    """With a stiffness of its own a patch is a spring: depth = m·g / k."""
-    stiffness = 2e5  # [N/m]
-    world = World(pose(z=0.5)).run(2000, stiffness=np.array([stiffness]))
-    assert 0.5 - world.poses[1, 2] == pytest.approx(WEIGHT / stiffness, rel=1e-3)
-
-
-@pytest.mark.parametrize('masses, late', [((10.0, 30_000.0), 0.0), ((10.0,), 0.02)])
-def test_no_patch_is_stiffer_than_steps_and_answers_bear(masses: tuple[float, ...],
-                                                         late: float) -> None:
-    """With 1e8 N/m, which threw 30 t on 10 kg by a metre, the bits are those without."""
-    ends = []
-    for stiffness in (0.0, 1e8):
-        world = World(*(pose(z=k + 0.5) for k in range(len(masses))))
-        world.bodies = [FIXED, *(Body.of_box(CUBE, mass) for mass in masses)]
-        world.forces = PatchForces(world.bodies)
-        world.outside[1:, 2] = -GRAVITY * np.array(masses)
-        for _ in range(400):
-            world.hold(stiffness=np.full(len(world.pairs), stiffness), age=late)
-            world.step(0.005)
-        ends.append(world.poses)
-    assert np.array_equal(*ends) and ends[0][-1, 2] > len(masses) - 0.6
-
-
 @pytest.mark.parametrize('ratio', [100, 1000])
 def test_a_heavy_body_rests_on_a_light_one(ratio: int) -> None:
     """As deep as the spring says, although pushing out has a limit of speed, which 1,000 exceed."""

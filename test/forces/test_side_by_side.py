@@ -18,7 +18,7 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.core import instruction_sets
 
 TOWERS, HEIGHT = 11, 3
-KINDS = ('steady', 'uneven', 'impacts', 'springs', 'belts', 'turntable', 'spins', 'late', 'finer')
+KINDS = ('steady', 'uneven', 'impacts', 'belts', 'turntable', 'spins', 'late', 'finer')
 SPINS = np.array([300.0, 1e-10, 30.0])  # of a tower's boxes by their sizes beyond 0.4 m [rad/s/m]
 
 
@@ -48,11 +48,10 @@ def motion(kind: str, chosen: list[list[tuple]]) -> np.ndarray:
     rows = [FLOOR, *(row for tower in chosen for row in tower)]
     pairs = np.array([(k if level else 0, k + 1) for k, level in
                       enumerate(level for _ in chosen for level in range(HEIGHT))])
-    options = {'springs': {'stiffness': np.full(len(pairs), 2e4)},
-               'belts': {'surface_velocity': np.tile((0.3, 0.1, 0.0), (len(pairs), 1))}}
+    belts = np.tile((0.3, 0.1, 0.0), (len(pairs), 1)) if kind == 'belts' else None
     world = World(*rows, pairs=[] if kind == 'late' else pairs.tolist())
     if kind != 'late':
-        world.forces.hold(pairs, **options.get(kind, {}))
+        world.forces.hold(pairs, surface_velocity=belts)
     random, found = np.random.default_rng(4), []
     for k in range(80):
         if kind == 'late':

@@ -4,6 +4,7 @@
 // The forces of patches, as a Python type.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "../include/box_contact/force.h"
@@ -66,18 +67,18 @@ void check_rows(const Array<Number>& given, const char* name, Shape shape) {
 }
 
 inline PyObject* forces_hold(PyObject* self, PyObject* const* args, Py_ssize_t count) {
-  if (count != 12)
+  if (count != 11)
     fail(PyExc_TypeError,
-         "hold(pairs, separation, normal, point, volume, covariance, poses, friction, surface, "
-         "stiffness, age, period)");
-  double age = PyFloat_AsDouble(args[10]), period = PyFloat_AsDouble(args[11]);
+         "hold(pairs, separation, normal, point, volume, covariance, poses, friction, surface, age, "
+         "period)");
+  double age = PyFloat_AsDouble(args[9]), period = PyFloat_AsDouble(args[10]);
   if (PyErr_Occurred()) return nullptr;
   Array<int64_t> pairs;
-  Array<double> separation, normal, point, volume, covariance, poses, friction, surface, stiffness;
+  Array<double> separation, normal, point, volume, covariance, poses, friction, surface;
   if (!read_plain(args[0], pairs) || !pairs.object) Py_RETURN_FALSE;
   Array<double>* columns[] = {&separation, &normal,   &point,   &volume,   &covariance,
-                              &poses,      &friction, &surface, &stiffness};
-  for (int k = 0; k < 9; ++k)
+                              &poses,      &friction, &surface};
+  for (int k = 0; k < 8; ++k)
     if (!read_plain(args[1 + k], *columns[k]) || (k < 6 && !columns[k]->object)) Py_RETURN_FALSE;
   check_shape(pairs, "pairs", {any_length, 2});
   npy_intp n = pairs.length(0);
@@ -89,30 +90,26 @@ inline PyObject* forces_hold(PyObject* self, PyObject* const* args, Py_ssize_t c
   check_rows(poses, "poses", {body_count(self), 7});
   check_rows(friction, "friction", {n});
   check_rows(surface, "surface_velocity", {n, 3});
-  check_rows(stiffness, "stiffness", {n});
   bc_patches answer{sizeof(bc_patches), int64_t(n),       pairs.numbers,  separation.numbers,
                     normal.numbers,     point.numbers,    volume.numbers, covariance.numbers,
-                    friction.numbers,   surface.numbers,  stiffness.numbers, age,
-                    period};
+                    friction.numbers,   surface.numbers,  age,            period};
   check(bc_patch_forces_hold(forces_of(self), &answer,
                              reinterpret_cast<const bc_pose*>(poses.numbers)));
   Py_RETURN_TRUE;
 }
 
 inline PyObject* forces_hold_pairs(PyObject* self, PyObject* const* args, Py_ssize_t count) {
-  if (count != 4) fail(PyExc_TypeError, "hold_pairs(pairs, friction, surface, stiffness)");
+  if (count != 3) fail(PyExc_TypeError, "hold_pairs(pairs, friction, surface)");
   auto pairs = read<int64_t>(args[0], "pairs", {any_length, 2});
   npy_intp n = pairs.length(0);
   auto friction = read_given<double>(args[1], "friction", {n});
   auto surface = read_given<double>(args[2], "surface_velocity", {n, 3});
-  auto stiffness = read_given<double>(args[3], "stiffness", {n});
   bc_patches asked{};
   asked.size = sizeof asked;
   asked.count = int64_t(n);
   asked.pairs = pairs.numbers;
   asked.friction = friction.numbers;
   asked.surface = surface.numbers;
-  asked.stiffness = stiffness.numbers;
   check(bc_patch_forces_hold(forces_of(self), &asked, nullptr));
   Py_RETURN_NONE;
 }
@@ -137,11 +134,14 @@ inline PyObject* forces_set_boxes(PyObject* self, PyObject* const* args, Py_ssiz
 }
 
 inline PyObject* forces_set_surface(PyObject* self, PyObject* const* args, Py_ssize_t count) {
-  if (count != 2) fail(PyExc_TypeError, "set_surface(box, velocity)");
+  if (count != 3) fail(PyExc_TypeError, "set_surface(box, velocity, friction)");
   long long box = PyLong_AsLongLong(args[0]);
   if (box == -1 && PyErr_Occurred()) return nullptr;
-  auto velocity = read<double>(args[1], "velocity", {3});
-  check(bc_patch_forces_set_surface(forces_of(self), box, velocity.numbers));
+  auto velocity = read_given<double>(args[1], "velocity", {3});
+  double friction = args[2] == Py_None ? 0.0 : PyFloat_AsDouble(args[2]);
+  if (PyErr_Occurred()) return nullptr;
+  check(bc_patch_forces_set_surface(forces_of(self), box, velocity.numbers,
+                                    args[2] == Py_None ? nullptr : &friction));
   Py_RETURN_NONE;
 }
 
@@ -151,10 +151,23 @@ Struct* rows_of(const Array<double>& array) {
   return reinterpret_cast<Struct*>(array.numbers);
 }
 
+// An array that is written, or None.
+template <class Number>
+Array<Number> read_written(PyObject* given, const char* name, Shape shape) {
+  Array<Number> array;
+  bool is_plain = read_plain(given, array);
+  if (!is_plain || (array.object && !PyArray_ISWRITEABLE(reinterpret_cast<PyArrayObject*>(given)))) {
+    std::string text = std::string(name) + " must be a plain array that can be written";
+    fail(PyExc_ValueError, text.c_str());
+  }
+  check_rows(array, name, shape);
+  return array;
+}
+
 // `advance` and, for callers who move the bodies by themselves, `wrenches`.
 template <bool by_wrenches>
 inline PyObject* forces_advance(PyObject* self, PyObject* const* args, Py_ssize_t count) {
-  if (count != 5) fail(PyExc_TypeError, "(dt, poses, velocities, outside, changed)");
+  if (count != 6) fail(PyExc_TypeError, "(dt, poses, velocities, outside, changed, out)");
   double dt = PyFloat_AsDouble(args[0]);
   if (PyErr_Occurred()) return nullptr;
   Array<double> poses, velocities, outside;
@@ -166,11 +179,22 @@ inline PyObject* forces_advance(PyObject* self, PyObject* const* args, Py_ssize_
   check_rows(poses, "poses", {bodies, 7});
   check_rows(velocities, "velocities", {bodies, 6});
   check_rows(outside, "wrenches", {bodies, 6});
-  Array<double> moved, after;
-  if (!by_wrenches) moved = make<double>({bodies, 7}), after = make<double>({bodies, 6});
-  auto wrenches = make<double>({bodies, 6});
+  Array<double> moved, after, wrenches;
   Array<bool> awake;
-  if (!by_wrenches) awake = make<bool>({bodies});
+  bool is_given = args[5] != Py_None;
+  if (is_given) {
+    if (!PyTuple_Check(args[5]) || PyTuple_GET_SIZE(args[5]) != 4)
+      fail(PyExc_TypeError, "out: four arrays");
+    auto given = [&](Py_ssize_t place) { return PyTuple_GET_ITEM(args[5], place); };
+    moved = read_written<double>(given(0), "out[0]", {bodies, 7});
+    after = read_written<double>(given(1), "out[1]", {bodies, 6});
+    wrenches = read_written<double>(given(2), "out[2]", {bodies, 6});
+    awake = read_written<bool>(given(3), "out[3]", {bodies});
+  } else {
+    wrenches = make<double>({bodies, 6});
+    if (!by_wrenches)
+      moved = make<double>({bodies, 7}), after = make<double>({bodies, 6}), awake = make<bool>({bodies});
+  }
   bc_motion motion{sizeof(bc_motion), rows_of<bc_pose>(moved), rows_of<bc_velocity>(after),
                    rows_of<bc_wrench>(wrenches),
                    reinterpret_cast<unsigned char*>(awake.numbers)};
@@ -183,6 +207,7 @@ inline PyObject* forces_advance(PyObject* self, PyObject* const* args, Py_ssize_
   else
     advance(bc_patch_forces_advance);
   if (by_wrenches) return wrenches.object.release();
+  if (is_given) return Py_NewRef(args[5]);
   return pack(&PyTuple_Type, moved, after, wrenches, awake);
 }
 
@@ -245,24 +270,24 @@ inline PyMethodDef forces_methods[] = {
     {"set_bodies", method<forces_set_bodies>(), METH_FASTCALL,
      "set_bodies(mass, inertia, centre)\n--\n\nChange the bodies: (n,), (n, 3), (n, 3)."},
     {"hold", method<forces_hold>(), METH_FASTCALL,
-     "hold(pairs, separation, normal, point, volume, covariance, poses, friction, surface, "
-     "stiffness, age, period)\n--\n\nTake the arrays of an answer; None for friction, surface "
-     "and stiffness.\n\n"
+     "hold(pairs, separation, normal, point, volume, covariance, poses, friction, surface, age, "
+     "period)\n--\n\nTake the arrays of an answer; None for friction and surface.\n\n"
      "Return False, and change nothing, where one is no plain array."},
     {"hold_pairs", method<forces_hold_pairs>(), METH_FASTCALL,
-     "hold_pairs(pairs, friction, surface, stiffness)\n--\n\nTake pairs whose contacts are solved at "
-     "each advance; None for the last three."},
+     "hold_pairs(pairs, friction, surface)\n--\n\nTake pairs whose contacts are solved at each advance; "
+     "None for the last two."},
     {"set_boxes", method<forces_set_boxes>(), METH_FASTCALL,
      "set_boxes(sizes, body, poses, find_pairs)\n--\n\nChange the boxes: (m, 3), (m,), (m, 7), bool; None "
      "for body and poses."},
     {"set_surface", method<forces_set_surface>(), METH_FASTCALL,
-     "set_surface(box, velocity)\n--\n\nSet the velocity of a box's surface (3,)."},
+     "set_surface(box, velocity, friction)\n--\n\nSet the surface of a box: (3,), and a number; None: as "
+     "before."},
     {"wrenches", method<forces_advance<true>>(), METH_FASTCALL,
-     "wrenches(dt, poses, velocities, outside, changed)\n--\n\nReturn wrenches (n, 6), which move the bodies "
+     "wrenches(dt, poses, velocities, outside, changed, out)\n--\n\nReturn wrenches (n, 6), which move the bodies "
      "until the next call.\n\nReturn None, and change nothing, where one is no plain array."},
     {"advance", method<forces_advance<false>>(), METH_FASTCALL,
-     "advance(dt, poses, velocities, outside, changed)\n--\n\nReturn poses (n, 7), velocities and wrenches "
-     "(n, 6), and who is awake (n,).\n\nReturn None, and change nothing, where one is no plain array."},
+     "advance(dt, poses, velocities, outside, changed, out)\n--\n\nReturn poses (n, 7), velocities and "
+     "wrenches (n, 6), and who is awake (n,): those of a tuple, if one is given.\n\nReturn None, and change nothing, where one is no plain array."},
     {"ahead", method<forces_ahead>(), METH_FASTCALL,
      "ahead(dt, poses, velocities)\n--\n\nReturn the poses (n, 7) at which to take forces that depend on "
      "poses."},

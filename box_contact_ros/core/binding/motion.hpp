@@ -70,7 +70,7 @@ inline PyObject* approaches(PyObject*, PyObject* const* args, Py_ssize_t count) 
                              size(starts.rows.sizes_b), starts.sizes_a.length(0),
                              starts.sizes_b.length(0), starts.rows.pairs},
                             pose(ends_a.numbers), pose(ends_b.numbers),
-                            centres_a.numbers, centres_b.numbers};
+                            centres_a.numbers, centres_b.numbers, nullptr};
   auto time = make<double>({rows}), closing_speed = make<double>({rows});
   auto colliding = make<bool>({rows});
   auto distance = make<double>({rows}), normal = make<double>({rows, 3});

@@ -35,7 +35,7 @@ extern "C" {
 #endif
 
 /* Raised by a change that a compiled program cannot follow. `bc_abi` is that of the library. */
-#define BC_ABI 5
+#define BC_ABI 6
 
 typedef enum bc_status {
   BC_OK = 0,
@@ -223,6 +223,7 @@ typedef struct bc_sweep_rows {
   const bc_pose* ends_b;
   const double* centres_a; /* of turning, (pose_count, 3), or NULL: the boxes' centres */
   const double* centres_b;
+  const double* clearances; /* of each pair [m], or NULL: that of the call */
 } bc_sweep_rows;
 
 /* Arrays of a row for each pair, or NULL for what is not wanted. */

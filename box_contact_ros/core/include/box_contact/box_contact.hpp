@@ -256,6 +256,7 @@ struct SweepRows {
   Span<const Pose> ends_a, ends_b;
   const double* centres_a = nullptr;  // three numbers a pose [m]; nullptr: the boxes' centres
   const double* centres_b = nullptr;
+  Span<const double> clearances{};  // of each pair [m]; none: that of the call
 };
 
 // Arrays of a row for each pair; nullptr for what is not wanted.
@@ -275,8 +276,11 @@ std::int64_t ask_sweeps(const SweepRows& rows, const ApproachResults& results, C
   const bc_approach_results wanted{sizeof(bc_approach_results), results.time,
                                    results.closing_speed, plain(results.nearest)};
   return ask_rows(rows.starts, [&](const bc_rows& starts, std::int64_t& refused) {
+    if (rows.clearances.size() && std::int64_t(rows.clearances.size()) != starts.count)
+      raise(BC_BAD_ARGUMENT, "clearances must be as many as pairs");
     const bc_sweep_rows plain{sizeof(bc_sweep_rows), starts,         rows.ends_a.data(),
-                              rows.ends_b.data(),    rows.centres_a, rows.centres_b};
+                              rows.ends_b.data(),    rows.centres_a, rows.centres_b,
+                              rows.clearances.data()};
     return call(plain, wanted, refused);
   });
 }

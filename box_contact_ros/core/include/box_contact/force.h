@@ -55,8 +55,8 @@ typedef struct bc_wrench {
 
 /* An answer: rows of pairs, as bc_collide_rows gives them. Rows without volume are passed over. A row
  * whose separation is NaN is stale: the patch that is held for its pair stays. With `separation` NULL,
- * contacts are one's own: model `exact` solves the pairs at the start of each advance. Then friction,
- * surface and stiffness are read alone. */
+ * contacts are one's own: model `exact` solves the pairs at the start of each advance. Then friction
+ * and surface are read alone. */
 typedef struct bc_patches {
   size_t size; /* sizeof(bc_patches) */
   int64_t count;
@@ -66,12 +66,10 @@ typedef struct bc_patches {
   const double* point;      /* (count, 3) [m] */
   const double* volume;     /* [m³] */
   const double* covariance; /* (count, 3, 3) [m²]; eigenvalues ≥ −1e-9 of the trace */
-  const double* friction;   /* Coulomb's μ [1]; NULL: that of the options; it, stiffness, age and
-                               period are 0 to 1e50 */
+  const double* friction;   /* Coulomb's μ [1]; NULL: the lesser of both boxes; it, age and period are 0
+                               to 1e50 */
   const double* surface;    /* (count, 3): velocity of B's surface relative to A's, beside that of the
                                bodies, as of a belt [m/s]; NULL: none */
-  const double* stiffness;  /* of a spring [N/m]: a weight rests weight / stiffness deep. Steps and late
-                               answers limit it; 0, or NULL: as stiff as they allow */
   double age;               /* since the answer was asked for [s] */
   double period;            /* from one question to the next [s]; 0: the least of the last
                                intervals between answers */
@@ -82,7 +80,7 @@ typedef struct bc_force_options {
   int substeps;    /* equal parts of the longest step lately, more if 5 ms are exceeded; 1 to
                       1,000 */
   int threads;     /* 1 to 1,024, and no more than cores; boxes that touch are moved by one */
-  double friction; /* Coulomb's μ [1] */
+  double friction; /* Coulomb's μ of boxes without their own [1] */
   double most_depth; /* how deep what rests may be at most [m], where a load is large for the lighter
                         body: with contacts of one's own, its island makes up to 64 times as many
                         sub-steps. bc_load tells where that is not enough */
@@ -140,14 +138,19 @@ BC_API bc_status bc_patch_forces_set_bodies(bc_patch_forces* forces, const bc_bo
 /* Say which boxes the bodies have: pairs are then of boxes, and poses of bodies. Patches of boxes that
  * stay with their body stay; pairs of contacts of one's own are forgotten. 0 boxes: box k is body k.
  * With `find_pairs`, each advance finds the pairs of boxes that touch, and solves them by model `exact`:
- * nothing is to be held, and bc_patch_forces_hold is refused. Boxes of one body are never a pair. */
+ * nothing is to be held, and bc_patch_forces_hold is refused. Boxes of one body are never a pair.
+ * As sizes are known, boxes that only pass each other by a rim have no patch: those of parallel faces that
+ * overlap across the normal by no more than 0.1 mm and what the boxes below have sunk, or a tenth of the thinner
+ * box. */
 BC_API bc_status bc_patch_forces_set_boxes(bc_patch_forces* forces, const bc_body_box* boxes,
                                            int64_t count, int find_pairs);
 
-/* Set the velocity of a box's surface beside that of its body, as of a belt, in the common frame [m/s]. It
- * lasts until it is set again, also under answers that are late; `surface` of an answer is added. */
+/* Set the surface of a box: its velocity (3) beside that of its body, as of a belt, in the common frame [m/s],
+ * and its friction, Coulomb's μ; NULL: as before. Both last until they are set again, also under answers that are
+ * late. `surface` of an answer is added. A pair has the lesser friction of its boxes, unless an answer or held
+ * pairs have one. A box without its own, or with NaN, has that of the options. */
 BC_API bc_status bc_patch_forces_set_surface(bc_patch_forces* forces, int64_t box,
-                                             const double velocity[3]);
+                                             const double* velocity, const double* friction);
 
 /* Forget the patches of bodies, which were put elsewhere, or all patches. */
 BC_API bc_status bc_patch_forces_forget(bc_patch_forces* forces, const int64_t* bodies,
@@ -196,7 +199,7 @@ BC_API bc_status bc_patch_forces_advance_changed(bc_patch_forces* forces, double
 
 /* Write what each pair carried in the last advance, by the lower and the higher box, and return how many
  * there are: none if bodies or boxes were changed, or patches forgotten, since. Nothing is written if
- * `capacity` is less. */
+ * `capacity` is less. It allocates no memory once as many were written. */
 BC_API int64_t bc_patch_forces_loads(const bc_patch_forces* forces, bc_load* loads, int64_t capacity);
 
 #ifdef __cplusplus

@@ -32,9 +32,8 @@ using BodyBox = bc_body_box;   // a body, and a box in its frame
 struct Patches {
   Span<const std::int64_t> pairs;  // two boxes a row
   Results results;                 // separation, normal, point, volume and covariance
-  Span<const double> friction{};   // Coulomb's μ of each pair
+  Span<const double> friction{};   // Coulomb's μ of each pair; none: the lesser of both boxes
   Span<const double> surface{};    // velocity of B's surface relative to A's, three numbers a row [m/s]
-  Span<const double> stiffness{};  // of each pair [N/m]; 0: as stiff as steps and late answers allow
   double age = 0.0;                // since the answer was asked for [s]
   double period = 0.0;             // from one question to the next [s]; 0: by the last answers
 
@@ -67,7 +66,7 @@ class PatchForces {
   struct Options {
     int substeps = 4;       // equal parts of the longest step lately, more if 5 ms are exceeded
     int threads = 1;        // at most
-    double friction = 0.5;  // Coulomb's μ
+    double friction = 0.5;  // Coulomb's μ of boxes without their own
     double most_depth = 1e-3;  // of what rests [m], where a load is large for the lighter body
     bool rest = true;          // whether what rests is laid down
   };
@@ -109,10 +108,13 @@ class PatchForces {
                                             find_pairs));
   }
 
-  // Set the velocity of a box's surface beside that of its body, as of a belt, in the common frame [m/s].
-  // It lasts until it is set again.
+  // Set the velocity of a box's surface beside that of its body, as of a belt, in the common frame [m/s], and
+  // perhaps its friction: a pair has the lesser of both boxes. They last until they are set again.
   void set_surface(std::int64_t box, const double (&velocity)[3]) {
-    detail::check(bc_patch_forces_set_surface(forces_.get(), box, velocity));
+    detail::check(bc_patch_forces_set_surface(forces_.get(), box, velocity, nullptr));
+  }
+  void set_surface(std::int64_t box, const double (&velocity)[3], double friction) {
+    detail::check(bc_patch_forces_set_surface(forces_.get(), box, velocity, &friction));
   }
 
   // Take an answer, asked for at `poses`; pairs that are left out are forgotten. Contacts of one's own
@@ -124,12 +126,10 @@ class PatchForces {
     const std::size_t count = answer.pairs.size() / 2;
     check_column(answer.friction, count);
     check_column(answer.surface, 3 * count);
-    check_column(answer.stiffness, count);
     const bc_patches plain{sizeof(bc_patches),      std::int64_t(count), answer.pairs.data(),
                            found.separation,        found.normal,        found.point,
                            found.volume,            found.covariance,    answer.friction.data(),
-                           answer.surface.data(),   answer.stiffness.data(), answer.age,
-                           answer.period};
+                           answer.surface.data(),   answer.age,          answer.period};
     detail::check(bc_patch_forces_hold(forces_.get(), &plain, poses.data()));
   }
 
@@ -170,10 +170,15 @@ class PatchForces {
   // What each pair carried, by the lower and the higher box: the mean of the last advance. No row
   // if bodies or boxes were changed, or patches forgotten, since.
   std::vector<Load> loads() const {
-    std::vector<Load> found(std::size_t(bc_patch_forces_loads(forces_.get(), nullptr, 0)));
-    found.resize(std::size_t(
-        bc_patch_forces_loads(forces_.get(), found.data(), std::int64_t(found.size()))));
+    std::vector<Load> found(loads(Span<Load>()));
+    found.resize(loads(found));
     return found;
+  }
+  // Write them to rows, and return how many there are; with fewer rows, none is written. It allocates no memory
+  // once as many were written.
+  std::size_t loads(Span<Load> found) const {
+    return std::size_t(
+        bc_patch_forces_loads(forces_.get(), found.data(), std::int64_t(found.size())));
   }
 
  private:

@@ -43,16 +43,21 @@ Plane plane_of(const Face& face, const Vec<double>& normal, const Flat& flat) {
   return {(-1.0 / along) * flat(face.outward), dot(face.centre, face.outward) / along};
 }
 
-// The face of a box most along a direction.
-inline Face face_along(const Placed& box, const bc_size& size, const Vec<double>& origin,
-                       const Vec<double>& direction) {
-  const Mat<double>& axes = box.axes;
+// Which axis is most along a direction.
+inline int axis_along(const Mat<double>& axes, const Vec<double>& direction) {
   Vec<double> along = transposed_times(axes, direction);
   int k = 0;
   for (int other = 1; other < 3; ++other)
     if (std::fabs(along[other]) > std::fabs(along[k])) k = other;
-  int next = (k + 1) % 3, last = (k + 2) % 3;
-  Vec<double> outward = (along[k] < 0.0 ? -1.0 : 1.0) * column(axes, k);
+  return k;
+}
+
+// The face of a box most along a direction.
+inline Face face_along(const Placed& box, const bc_size& size, const Vec<double>& origin,
+                       const Vec<double>& direction) {
+  const Mat<double>& axes = box.axes;
+  int k = axis_along(axes, direction), next = (k + 1) % 3, last = (k + 2) % 3;
+  Vec<double> outward = (dot(column(axes, k), direction) < 0.0 ? -1.0 : 1.0) * column(axes, k);
   auto half = [&](int axis) { return 0.5 * size.extent[axis]; };
   return {(box.position - origin) + half(k) * outward, outward, half(next) * column(axes, next),
           half(last) * column(axes, last)};

@@ -9,7 +9,6 @@
 #pragma once
 
 #include <algorithm>
-#include <utility>
 #include <vector>
 
 #include "beds.hpp"
@@ -27,13 +26,19 @@ struct Pad {
   Vec<double> centre;
 };
 
+// Memory that calls use again.
+struct PadsRoom {
+  std::vector<Pad*> level;
+  std::vector<Polygon> beds;
+};
+
 // Share what presses on pads whose normals are parallel.
-inline void share(std::vector<Pad*>& pads) {
+inline void share(const std::vector<Pad*>& pads, std::vector<Polygon>& beds) {
   const FacePatch plane = pads.front()->faces;
   auto flat = [&](const Vec<double>& at) { return plane.flat(at - plane.origin); };
   double total = 0.0;
   Point moment = {0.0, 0.0};
-  std::vector<Polygon> beds;
+  beds.clear();
   for (const Pad* pad : pads) {
     total += pad->pressing;
     moment = moment + pad->pressing * flat(pad->centre);
@@ -60,16 +65,18 @@ inline void share(std::vector<Pad*>& pads) {
   }
 }
 
-// Share what presses on the pads of two bodies, those with parallel normals among themselves.
-inline void share_by_normal(std::vector<Pad*> pads) {
+// Share what presses on the pads of two bodies, those with parallel normals among themselves. Takes pads out.
+inline void share_by_normal(std::vector<Pad*>& pads, PadsRoom& room) {
   while (pads.size() > 1) {
-    Vec<double> normal = pads.front()->faces.normal;
-    auto others = std::stable_partition(pads.begin(), pads.end(), [&](const Pad* pad) {
-      return std::fabs(dot(pad->faces.normal, normal)) >= 1.0 - level_slack;
-    });
-    std::vector<Pad*> level(pads.begin(), others);
-    if (level.size() > 1) share(level);
-    pads.erase(pads.begin(), others);
+    const Vec<double> normal = pads.front()->faces.normal;
+    room.level.clear();
+    auto is_taken = [&](Pad* pad) {
+      bool is_level = std::fabs(dot(pad->faces.normal, normal)) >= 1.0 - level_slack;
+      if (is_level) room.level.push_back(pad);
+      return is_level;
+    };
+    pads.erase(std::remove_if(pads.begin(), pads.end(), is_taken), pads.end());
+    if (room.level.size() > 1) share(room.level, room.beds);
   }
 }
 

@@ -15,23 +15,22 @@ namespace box_contact::BOX_CONTACT_SET::force {
 // Pairs with what is asked of each.
 struct AskedPairs {
   std::vector<int64_t> pairs;  // (n, 2)
-  std::vector<double> friction, surface, stiffness;
+  std::vector<double> friction, surface;
 
   size_t count() const { return pairs.size() / 2; }
   void resize(size_t n) {
     pairs.resize(2 * n);
-    for (auto* column : {&friction, &stiffness}) column->resize(n);
+    friction.resize(n);
     surface.resize(3 * n);
   }
   void reserve(size_t n) {
     pairs.reserve(2 * n);
-    for (auto* column : {&friction, &stiffness}) column->reserve(n);
+    friction.reserve(n);
     surface.reserve(3 * n);
   }
   void add(const AskedPairs& other, size_t k) {
     pairs.insert(pairs.end(), &other.pairs[2 * k], &other.pairs[2 * k] + 2);
     friction.push_back(other.friction[k]);
-    stiffness.push_back(other.stiffness[k]);
     surface.insert(surface.end(), &other.surface[3 * k], &other.surface[3 * k] + 3);
   }
 };

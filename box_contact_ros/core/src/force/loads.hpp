@@ -24,14 +24,24 @@ inline void write(const Pad& pad, bc_load& load) {
   }
 }
 
+// Memory that calls use again.
+struct LoadsRoom {
+  std::vector<Load> all;
+  std::vector<Pad> pads;
+  std::vector<std::pair<BoxPair, size_t>> pressed;  // by the bodies
+  std::vector<Pad*> together;
+  PadsRoom sharing;
+};
+
 // Put corners on the faces of boxes, and share what the pads of two bodies carry as rubber ones do. All
 // bodies that no force moves are one support.
-inline void share_on_faces(const std::vector<Load>& all, const std::vector<Body>& bodies,
+inline void share_on_faces(LoadsRoom& room, const std::vector<Body>& bodies,
                            const std::vector<bc_body_box>& boxes, const std::vector<bc_pose>& poses,
                            bc_load* loads) {
+  auto& [all, pads, pressed, together, sharing] = room;
   auto support = [&](int64_t body) { return bodies[size_t(body)].is_free() ? int32_t(body) : -1; };
-  std::vector<Pad> pads(all.size());
-  std::vector<std::pair<BoxPair, size_t>> pressed;  // by the bodies
+  pads.resize(all.size());
+  pressed.clear();
   for (size_t k = 0; k < all.size(); ++k) {
     if (!(loads[k].pressing > 0.0)) continue;
     const bc_body_box &a = boxes[size_t(loads[k].box_a)], &b = boxes[size_t(loads[k].box_b)];
@@ -44,10 +54,10 @@ inline void share_on_faces(const std::vector<Load>& all, const std::vector<Body>
   }
   std::sort(pressed.begin(), pressed.end());
   for (auto first = pressed.begin(), last = first; first != pressed.end(); first = last) {
-    std::vector<Pad*> together;
+    together.clear();
     for (; last != pressed.end() && last->first == first->first; ++last)
       if (pads[last->second].faces.area > 0.0) together.push_back(&pads[last->second]);
-    if (together.size() > 1) share_by_normal(std::move(together));
+    if (together.size() > 1) share_by_normal(together, sharing);
   }
   for (const auto& [pair, k] : pressed) write(pads[k], loads[k]);
 }

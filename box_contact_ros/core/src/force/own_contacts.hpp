@@ -55,21 +55,20 @@ class OwnContacts {
   }
 
   // Whether these pairs are those of the last question, with the same columns.
-  bool is_asked(const bc_patches& pairs, double friction) const {
+  bool is_asked(const bc_patches& pairs) const {
     auto is_same = [](const double* column, const std::vector<double>& last, double otherwise) {
       return column ? std::equal(last.begin(), last.end(), column)
                     : std::count(last.begin(), last.end(), otherwise) == long(last.size());
     };
     return pairs.count > 0 && size_t(pairs.count) == count() && pairs.pairs &&
            std::equal(asked_.pairs.begin(), asked_.pairs.end(), pairs.pairs) &&
-           is_same(pairs.friction, asked_.friction, friction) &&
-           is_same(pairs.surface, asked_.surface, 0.0) &&
-           is_same(pairs.stiffness, asked_.stiffness, 0.0);
+           is_same(pairs.friction, asked_.friction, no_friction) &&
+           is_same(pairs.surface, asked_.surface, 0.0);
   }
   // Take the pairs of a question. Where bodies sleep, a pair is new until it was solved once, unless
   // `is_known(pair)` says that its patch sleeps. Returns false, and takes none, if a pair comes twice.
   template <class IsKnown>
-  bool ask(const bc_patches& asked, double friction, bool is_any_asleep, const IsKnown& is_known) {
+  bool ask(const bc_patches& asked, bool is_any_asleep, const IsKnown& is_known) {
     auto n = size_t(asked.count);
     next_keys_.clear();
     for (size_t k = 0; k < n; ++k) {
@@ -91,19 +90,18 @@ class OwnContacts {
       else
         std::fill(to.begin(), to.end(), otherwise);
     };
-    copy(asked.friction, asked_.friction, friction);
+    copy(asked.friction, asked_.friction, no_friction);
     copy(asked.surface, asked_.surface, 0.0);
-    copy(asked.stiffness, asked_.stiffness, 0.0);
     return true;
   }
-  // Whether the pair of a patch is asked for, with the numbers of the patch.
-  bool is_asked(const Patch& patch) const {
+  // Whether the pair of a patch is asked for, with the numbers of the patch. friction: where none is told.
+  bool is_asked(const Patch& patch, const Surfaces& surfaces, double friction) const {
     auto key = std::lower_bound(keys_.begin(), keys_.end(), Key{patch.pair(), 0, false});
     if (key == keys_.end() || key->pair != patch.pair()) return false;
     size_t k = key->row;
     double sign = asked_.pairs[2 * k] < asked_.pairs[2 * k + 1] ? 1.0 : -1.0;
     Vec<double> other = patch.surface - sign * vector_at(&asked_.surface[3 * k]);
-    return patch.friction == asked_.friction[k] && patch.stiffness == asked_.stiffness[k] &&
+    return patch.friction == friction_of(surfaces, patch.pair(), asked_.friction[k], friction) &&
            dot(other, other) == 0.0;
   }
 
@@ -127,16 +125,15 @@ class OwnContacts {
   // Find the pairs that are solved: see NearPairs. `pose_of(body)` also knows where the others are.
   // Returns how many there are.
   template <class EachActive, class PoseOf>
-  size_t find(double dt, int64_t revision, const bc_wrench* outside,
-              const std::vector<Body>& bodies, const EachActive& each_active,
-              const PoseOf& pose_of) {
+  size_t find(double dt, int64_t revision, const Gaps& gaps, const std::vector<Body>& bodies,
+              const EachActive& each_active, const PoseOf& pose_of) {
     auto place = [&](int32_t box, double longest) {
       const auto& [body, own] = boxes_[size_t(box)];
       const bc_pose& pose = poses_[size_t(box)] = in_common_frame(pose_of(size_t(body)), own.pose);
-      double falls = Gaps(bodies, boxes_, longest, outside).around(box);
+      double goes = gaps.within(longest).around(box);
       const double(&q)[4] = pose.quaternion;
       return detail::bounds_of({vector(pose.position), {q[0], q[1], q[2], q[3]}},
-                               0.5 * vector(own.size.extent) + Vec<double>{falls, falls, falls});
+                               0.5 * vector(own.size.extent) + Vec<double>{goes, goes, goes});
     };
     is_all_ = false;
     if (near_.find(dt, revision, boxes_, bodies, each_active, place)) {
@@ -214,7 +211,6 @@ class OwnContacts {
             found_.covariance.data(),
             finds_pairs_ ? nullptr : live.friction.data(),
             finds_pairs_ ? nullptr : live.surface.data(),
-            finds_pairs_ ? nullptr : live.stiffness.data(),
             0.0,
             0.0};
   }
@@ -246,12 +242,12 @@ class OwnContacts {
       is_placed_[box] = 1;
     }
   }
-  // No pair that is solved, and farther apart, is a constraint [m].
+  // No pair that is solved, and farther apart, is a constraint [m]: both boxes may go toward each other.
   double farthest(const Gaps& gaps) const {
     double most = 0.0;
     for (size_t k = 0, n = is_all_ ? boxes_.size() : placed_.size(); k < n; ++k)
       most = std::max(most, gaps.around(int32_t(is_all_ ? k : placed_[k])));
-    return std::min(most, length_max);
+    return std::min(2.0 * most, length_max);
   }
   // Note which of the next keys are not among the last ones, or are new there.
   template <class IsKnown>
@@ -266,7 +262,7 @@ class OwnContacts {
       is_any_new_ = is_any_new_ || key.is_new;
     }
   }
-  // Give pairs that are apart, but near, the patches that they have once moved together along the normal.
+  // Give pairs that are apart, but near, the patches that they have once they touch.
   long solve_near(const Gaps& gaps, SolvePair solve) {
     const AskedPairs& live = chosen();
     for (size_t k = 0; k < live.count(); ++k) {
@@ -274,9 +270,10 @@ class OwnContacts {
       Vec<double> normal = vector_at(&found_.normal[3 * k]);
       if (!(apart > 0.0) || normal[0] != normal[0]) continue;  // in contact, or beyond the farthest
       auto a = size_t(live.pairs[2 * k]), b = size_t(live.pairs[2 * k + 1]);
-      if (!gaps.is_near(int32_t(a), int32_t(b), normal, apart)) continue;
+      Vec<double> way;
+      if (!gaps.is_near(int32_t(a), int32_t(b), normal, apart, way)) continue;
       bc_pose moved = poses_[b];
-      for (int i = 0; i < 3; ++i) moved.position[i] -= apart * normal[i];
+      for (int i = 0; i < 3; ++i) moved.position[i] += way[i];
       bc_contact found;
       detail::PairNumbers pair{poses_[a].position, moved.position, sizes_[a].extent,
                                sizes_[b].extent};

@@ -29,6 +29,21 @@ inline double extent_along(const Placed& box, const bc_size& size, const Vec<dou
   return sum;
 }
 
+// How far two boxes overlap along a direction [m]; below 0: they are apart.
+inline double overlap_along(const Placed& a, const bc_size& size_a, const Placed& b, const bc_size& size_b,
+                            const Vec<double>& direction) {
+  return 0.5 * (extent_along(a, size_a, direction) + extent_along(b, size_b, direction)) -
+         std::fabs(dot(b.position - a.position, direction));
+}
+
+// Visit the normals of the faces that are across one: of each box the two least along it.
+template <class Visit>
+void each_face_across(const Placed& a, const Placed& b, const Vec<double>& normal, const Visit& visit) {
+  for (const Placed* box : {&a, &b})
+    for (int k = 1, along = axis_along(box->axes, normal); k < 3; ++k)
+      visit(column(box->axes, (along + k) % 3));
+}
+
 inline Span span_along(const Face& face, const Vec<double>& axis) {
   double middle = dot(face.centre, axis);
   double half = std::fabs(dot(face.half_1, axis)) + std::fabs(dot(face.half_2, axis));
@@ -63,14 +78,31 @@ struct Kept {
   Vec<T> pressure_arm;                       // from A's centre of mass to its centre [m]
 };
 
-// Velocities of the boxes' surfaces beside those of their bodies, as of belts [m/s]; none: all are 0.
-using Surfaces = std::vector<Vec<double>>;
+// Friction that is not told [1].
+constexpr double no_friction = -1.0;
 
-// Of the higher box of a pair relative to the lower one, with what an answer tells of it.
+// How the surface of a box moves beside its body, as of a belt [m/s], and its own friction [1].
+struct Surface {
+  Vec<double> velocity{0.0, 0.0, 0.0};
+  double friction = no_friction;
+};
+using Surfaces = std::vector<Surface>;  // of all boxes; none: nothing was told of any
+
+// The velocity of the higher box of a pair relative to the lower one, with what an answer tells of it.
 inline Vec<double> surface_of(const Surfaces& surfaces, const BoxPair& pair,
                               const Vec<double>& told) {
   if (surfaces.empty()) return told;
-  return told + (surfaces[size_t(pair.second)] - surfaces[size_t(pair.first)]);
+  return told + (surfaces[size_t(pair.second)].velocity - surfaces[size_t(pair.first)].velocity);
+}
+// The friction of a pair: what is told of it, or else the lesser of both boxes.
+inline double friction_of(const Surfaces& surfaces, const BoxPair& pair, double told,
+                          double otherwise) {
+  if (told != no_friction) return told;
+  auto own = [&](int32_t box) {
+    double friction = surfaces.empty() ? no_friction : surfaces[size_t(box)].friction;
+    return friction == no_friction ? otherwise : friction;
+  };
+  return std::min(own(pair.first), own(pair.second));
 }
 
 // The patch of a pair, where it was asked for, and what it gave.
@@ -81,10 +113,10 @@ struct Patch {
   Vec<double> normal, point;
   Rectangle shape;
   FacePair faces;       // without sizes: none
+  double overlap, beside;  // of the boxes along the normal, and least along faces across it; without sizes: none [m]
   double most_depth;    // by the thinner box; without sizes: any [m]
   double depth;         // the lesser of volume / area and −separation; below 0: apart [m]
   double friction;      // μ [1]
-  double stiffness;     // [N/m]; 0: as stiff as steps and late answers allow
   Vec<double> surface;  // velocity of B's surface relative to A's, beside the bodies' own [m/s]
   double late;          // from the question to the answer [s]
   double age;           // since the answer came [s]
@@ -129,6 +161,11 @@ struct Patch {
                   const bc_size& size_b) {
     most_depth = deepest_part * std::min(extent_along(box_at_a, size_a, normal),
                                          extent_along(box_at_b, size_b, normal));
+    overlap = overlap_along(box_at_a, size_a, box_at_b, size_b, normal);
+    beside = place_max;
+    each_face_across(box_at_a, box_at_b, normal, [&](const Vec<double>& face) {
+      beside = std::min(beside, overlap_along(box_at_a, size_a, box_at_b, size_b, face));
+    });
     Face a = face_along(box_at_a, size_a, point, normal),
          b = face_along(box_at_b, size_b, point, -normal);
     faces = {span_along(a, shape.axis_1).within(span_along(b, shape.axis_1)),

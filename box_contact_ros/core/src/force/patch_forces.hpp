@@ -34,12 +34,13 @@ class PatchForces : public PatchStore {
   // Write what each pair carried in the last advance. With boxes, corners are those of the faces, and
   // the pads of two bodies share as rubber ones do.
   void write_loads(bc_load* loads) const {
-    std::vector<Load> all(load_count());
+    std::vector<Load>& all = loads_room_.all;
+    all.resize(load_count());
     if (all.empty()) return;
     std::merge(state_.loads.begin(), state_.loads.end(), sleep_.loads().begin(),
                sleep_.loads().end(), all.begin(), ByPair{});
     for (size_t k = 0; k < all.size(); ++k) loads[k] = all[k].mean();
-    if (!boxes().empty()) share_on_faces(all, bodies_, boxes(), poses_, loads);
+    if (!boxes().empty()) share_on_faces(loads_room_, bodies_, boxes(), poses_, loads);
   }
   // Write the poses at which the next step's forces that depend on poses are to be taken: see SubSteps::ahead.
   void write_ahead(double dt, const bc_pose* poses, const bc_velocity* velocities,
@@ -92,13 +93,13 @@ class PatchForces : public PatchStore {
                  InThreads& in_threads, HoldResult& result) {
     result = HoldResult::all;
     if (!own_.is_used()) return -1;
+    const Gaps gaps(bodies_, boxes(), dt, given, carriers_);
     if (own_.finds_pairs())
-      find_pairs(dt, given);
+      find_pairs(dt, given, gaps);
     else
       own_.choose(sleep_.revision(), sleep_.is_any_asleep(),
                   [this](size_t box) { return sleep_.is_quiet(size_t(body_of(int64_t(box)))); });
-    long refused =
-        own_.solve(given.poses, Gaps(bodies_, boxes(), dt, given.outside), solve, solve_pair);
+    long refused = own_.solve(given.poses, gaps, solve, solve_pair);
     if (refused >= 0) return refused;
     result = read(own_.answer(), given.poses, true, in_threads);
     if (result != HoldResult::all) return refused;
@@ -160,15 +161,14 @@ class PatchForces : public PatchStore {
 
  private:
   // Find the pairs of a step that are of something that moves.
-  void find_pairs(double dt, const Given& given) {
+  void find_pairs(double dt, const Given& given, const Gaps& gaps) {
     auto each_active = [this](const auto& visit) {
       each_read([&](size_t body) {
         if (!sleep_.is_quiet(body)) visit(body);
       });
     };
     auto pose_of = [&](size_t body) -> const bc_pose& { return sleep_.pose_of(body, given); };
-    make_room(
-        own_.find(dt, sleep_.revision(), given.outside, bodies_, each_active, pose_of));
+    make_room(own_.find(dt, sleep_.revision(), gaps, bodies_, each_active, pose_of));
   }
   // Islands that a new patch joins to what is awake wake up. Their patches are those of their poses.
   void wake_touched() {
@@ -183,6 +183,8 @@ class PatchForces : public PatchStore {
     sleep_.lay_down(bodies_, state_.patches, state_.loads);
     is_grouped_ = false;
   }
+
+  mutable LoadsRoom loads_room_;
 };
 
 }  // namespace box_contact::BOX_CONTACT_SET::force

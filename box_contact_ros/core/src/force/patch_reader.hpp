@@ -20,7 +20,7 @@ struct Answered {
   const std::vector<Body>& bodies;
   const std::vector<bc_body_box>& boxes;  // none: box k is body k, and nobody knows its size
   const Surfaces& surfaces;
-  double friction;  // where the answer has none
+  double friction;  // where neither the answer nor a box has one
 
   bool is_stale(int64_t k) const { return answer.separation[k] != answer.separation[k]; }
   // Whether something moves of the pair of row k, which touches, or has a stale contact. Boxes may have
@@ -33,6 +33,11 @@ struct Answered {
   }
   int32_t body_of(int64_t box) const {
     return int32_t(boxes.empty() ? box : boxes[size_t(box)].body);
+  }
+  Placed place_box(int32_t box) const {
+    if (boxes.empty()) return box_at(poses[box]);
+    const bc_body_box& of = boxes[size_t(box)];
+    return box_at(in_common_frame(poses[of.body], of.box.pose));
   }
 };
 
@@ -51,20 +56,15 @@ inline void read(const Answered& all, int64_t k, Patch& patch) {
   auto place = [&](int32_t body) {
     return placed_at(all.poses[body], all.bodies[size_t(body)].centre);
   };
-  auto place_box = [&](int32_t box) {
-    if (all.boxes.empty()) return box_at(all.poses[box]);
-    const bc_body_box& of = all.boxes[size_t(box)];
-    return box_at(in_common_frame(all.poses[of.body], of.box.pose));
-  };
-  const Placed box_at_a = place_box(patch.box_a), box_at_b = place_box(patch.box_b);
+  const Placed box_at_a = all.place_box(patch.box_a), box_at_b = all.place_box(patch.box_b);
   patch.place(place(patch.a), place(patch.b), sign * vector_at(answer.normal + 3 * k),
               answer.point + 3 * k, answer.covariance + 9 * k, answer.volume[k],
               answer.separation[k], (is_lighter_b(all.bodies, patch) ? box_at_b : box_at_a).axes);
   if (!all.boxes.empty())
     patch.end_at_rim(box_at_a, all.boxes[size_t(patch.box_a)].box.size, box_at_b,
                      all.boxes[size_t(patch.box_b)].box.size);
-  patch.friction = answer.friction ? answer.friction[k] : all.friction;
-  patch.stiffness = answer.stiffness ? answer.stiffness[k] : 0.0;
+  patch.friction = friction_of(all.surfaces, patch.pair(),
+                               answer.friction ? answer.friction[k] : no_friction, all.friction);
   patch.surface = surface_of(
       all.surfaces, patch.pair(),
       answer.surface ? sign * vector_at(answer.surface + 3 * k) : Vec<double>{0.0, 0.0, 0.0});

@@ -14,6 +14,7 @@
 #include "island_step.hpp"
 #include "own_contacts.hpp"
 #include "patch_reader.hpp"
+#include "rims.hpp"
 #include "sleep.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
@@ -42,6 +43,7 @@ class PatchStore {
         starts_(bodies_.size()),
         islands_(side) {
     sleep_.set_bodies(bodies_);
+    rims_.set_bodies(bodies_.size());
     make_room(0);
   }
 
@@ -65,6 +67,7 @@ class PatchStore {
     carriers_.resize(bodies.size());
     starts_.resize(bodies.size());
     surfaces_.reserve(bodies.size());
+    rims_.set_bodies(bodies.size());
     sleep_.change_bodies(bodies, is_changed);
     bodies_ = std::move(bodies);  // last: there may be no memory for the others
     auto count = int32_t(bodies_.size());
@@ -98,17 +101,23 @@ class PatchStore {
     if (!surfaces_.empty()) surfaces_.resize(size_t(box_count()));
     drop([this](const Patch& patch) { return !is_of_boxes(patch); });
   }
-  // Set the velocity of a box's surface, which lasts. What touches it wakes, and answers to come add it.
-  void set_surface(int64_t box, const Vec<double>& velocity) {
+  // Those of all boxes.
+  const Surfaces& surfaces() {
     surfaces_.resize(size_t(box_count()));
-    Vec<double>& last = surfaces_[size_t(box)];
-    if (have_same_bits(last, velocity)) return;
+    return surfaces_;
+  }
+  // Set the surface of a box, which lasts. What touches it wakes. Answers to come add its velocity, and have its
+  // friction.
+  void set_surface(int64_t box, const Surface& surface) {
+    Surface last = surfaces()[size_t(box)];
+    if (have_same_bits(last, surface)) return;
     auto touches = [box](const Patch& patch) { return patch.box_a == box || patch.box_b == box; };
     sleep_.mark_if(touches);
     wake();
     for (Patch& patch : state_.patches)
-      if (touches(patch)) patch.surface += (patch.box_a == box ? -1.0 : 1.0) * (velocity - last);
-    last = velocity;
+      if (touches(patch))
+        patch.surface += (patch.box_a == box ? -1.0 : 1.0) * (surface.velocity - last.velocity);
+    surfaces_[size_t(box)] = surface;
   }
   // Forget the patches of bodies.
   void forget(const int64_t* bodies, int64_t count) {
@@ -152,16 +161,18 @@ class PatchStore {
   // The boxes of a pair of one's own that is solved.
   const int64_t* own_pair(long row) const { return own_.answer().pairs + 2 * row; }
   // Whether contacts of one's own are those of these pairs already.
-  bool holds(const bc_patches& pairs) const { return own_.is_asked(pairs, options_.friction); }
+  bool holds(const bc_patches& pairs) const { return own_.is_asked(pairs); }
   // Take pairs whose contacts are solved at the start of each advance. Impulses stay.
   HoldResult hold(const bc_patches& pairs) {
     bool were_told = state_.clock.is_told();
-    if (!own_.ask(pairs, options_.friction, sleep_.is_any_asleep(),
+    if (!own_.ask(pairs, sleep_.is_any_asleep(),
                   [this](const BoxPair& pair) { return sleep_.has(pair); }))
       return HoldResult::pair_twice;
     state_.clock.answer_each_step();
     make_room(own_.count());
-    sleep_.mark_if([&](const Patch& patch) { return were_told || !own_.is_asked(patch); });
+    sleep_.mark_if([&](const Patch& patch) {
+      return were_told || !own_.is_asked(patch, surfaces_, options_.friction);
+    });
     wake();
     if (own_.count() == 0) drop([](const Patch&) { return true; });
     return HoldResult::all;
@@ -237,12 +248,14 @@ class PatchStore {
   HoldResult read(const bc_patches& answer, const bc_pose* poses, bool is_own,
                   InThreads& in_threads) {
     std::vector<Patch>& found = next_.patches;
+    const Answered all{answer, poses, bodies_, boxes(), surfaces_, options_.friction};
     reader_.read_rows(
-        {answer, poses, bodies_, boxes(), surfaces_, options_.friction},
+        all,
         [&](size_t place) { return is_own ? own_.row(place) : place; }, found,
         [&](long count, const auto& work) { in_threads(options_.threads, count, work); });
     for (const Patch& patch : found)
       if (patch.age >= 0.0 && !patch.has_area()) return HoldResult::no_patch;
+    if (!boxes().empty()) rims_.drop(all, found);
     auto same = [](const Patch& p, const Patch& q) { return p.pair() == q.pair(); };
     if (!std::is_sorted(found.begin(), found.end(), ByPair{}))
       std::sort(found.begin(), found.end(), ByPair{});
@@ -263,6 +276,7 @@ class PatchStore {
   Sleep sleep_;                 // patches and loads of what is asleep are there
   // Memory that calls use again.
   PatchReader reader_;
+  Rims rims_;
   Islands islands_;
   size_t room_ = 0;          // for patches
   bool is_grouped_ = false;  // whether islands are those of the patches

@@ -36,9 +36,8 @@ BC_INLINE Mat<T> compliance(const Body& a, const Body& b, const Vec<T> (&about_a
   return m;
 }
 
-// Catto's soft step: a spring and a damper, implicit in time. Relaxation is without them, but for a
-// stiffness of the patch's own. Rocking is soft where answers are late: the wedge of the overlap,
-// which levels a body, is late then. `rotated()`: by how much B has rotated more than A since.
+// Catto's soft step: a spring and a damper, implicit in time. Relaxation is without them. Rocking is soft
+// where answers are late: the wedge of the overlap, which levels a body, is late then. `rotated()`: by how much B has rotated more than A since.
 template <class T, class Rotated>
 BC_INLINE void soften(const SubSteps& step, const Rotated& rotated, Rows<T>& block) {
   const Mat<T>& compliance = block.across;
@@ -60,11 +59,7 @@ BC_INLINE void soften(const SubSteps& step, const Rotated& rotated, Rows<T>& blo
   T bearable = frequency_of(block.late, step.period);
   Mask<T> is_late = pushes & (bearable < frequency * step.window_share);
   frequency = select<T>(is_late, bearable, frequency);
-  T own = sqrt(block.stiffness * compliance[0][0]);
-  Mask<T> is_spring = pushes & (own > 0.0) & (own < frequency);
-  frequency = select<T>(is_spring, own, frequency);
-  T damping =
-      select<T>(is_late | is_spring, splat<T>(slow_damping_ratio), splat<T>(soft_damping_ratio));
+  T damping = select<T>(is_late, splat<T>(slow_damping_ratio), splat<T>(soft_damping_ratio));
   T rate = frequency / (2.0 * damping + h * frequency);
   T softness = rate / (h * frequency * frequency);
   if (any(is_late)) {
@@ -79,11 +74,9 @@ BC_INLINE void soften(const SubSteps& step, const Rotated& rotated, Rows<T>& blo
   }
   T limit = select<T>(is_late, splat<T>(late_push_out_limit), splat<T>(push_out_limit));
   T slowed = min(limit / (rate * depth), splat<T>(1.0));
-  slowed = select<T>(is_spring, splat<T>(1.0), slowed);
   pushing.softness[0] = select<T>(pushes, slowed * softness * compliance[0][0], none);
   pushing.bias[0] = select<T>(pushes, block.closing[0] - slowed * rate * depth, pushing.bias[0]);
   pushing.mass = inverse(softened(compliance, pushing.softness));
-  if (any(is_spring)) put<T>(is_spring, pushing, relaxed);
 }
 
 template <class T>
@@ -159,6 +152,10 @@ constexpr double still = 0x1p-30, alike = 0x1p-10;
 template <class T, class Body>
 BC_INLINE void follow(const Body& a, const Body& b, const Where<T>& at_a, const Where<T>& at_b,
                       double h, Rows<T>& block) {
+  // What pressed across a gap has closed it, and touches: the rest of its closing speed goes, too. A late answer
+  // does not know of it.
+  Mask<T> has_met = (block.depth < 0.0) & (block.normal_impulses[0] > 0.0) & (block.late <= 0.0);
+  block.relaxed.bias[0] = select<T>(has_met, block.closing[0], block.relaxed.bias[0]);
   T turned = max(length(b.angular), length(a.angular));
   T way = length(b.linear - a.linear);
   T moved = h * max(way / block.shape.half_1, turned);

@@ -274,8 +274,7 @@ class Sleep {
   bool is_told_again(const Patch& patch, const Patch& next, const bc_pose* asked) const {
     if (!have_same_bits(of_[size_t(patch.a)].pose, asked[patch.a]) ||
         !have_same_bits(of_[size_t(patch.b)].pose, asked[patch.b]) ||
-        next.friction != patch.friction || next.stiffness != patch.stiffness ||
-        !have_same_bits(next.surface, patch.surface))
+        next.friction != patch.friction || !have_same_bits(next.surface, patch.surface))
       return false;
     if (have_same_bits(next.asked_a, patch.asked_a) && have_same_bits(next.asked_b, patch.asked_b))
       return have_same_bits(next.normal, patch.normal) && have_same_bits(next.point, patch.point) &&

@@ -27,7 +27,7 @@ constexpr double most_again = 2.0;
 constexpr double soft_frequency = 1.57;
 // Its damping ratio [1]: an overlap shrinks by an eighth a sub-step.
 constexpr double soft_damping_ratio = 5.0;
-// The same where answers are late, or a patch has a stiffness of its own.
+// The same where answers are late.
 constexpr double slow_damping_ratio = 2.0;
 // Fastest pushing out [m/s]: speeds add up in a stack, and relaxation leaves some.
 constexpr double push_out_limit = 0.1;
@@ -64,9 +64,6 @@ constexpr int impact_iterations = 40;
 // In an island that had patches, also by more than this acceleration times the sub-step [m/s²]: what rolls in a
 // pile is no impact.
 constexpr double impact_acceleration = 40.0;
-// After so many iterations all that presses in the island is scaled, by a factor or an inverse beyond this [1].
-constexpr int scaled_every = 8;
-constexpr double least_factor = 2.0;
 
 // --- sway ---
 // A stack sways while its bodies pass each other at a speed in this range; it begins at the middle one [m/s].

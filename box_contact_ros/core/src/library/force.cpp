@@ -39,6 +39,13 @@ bool solve_exactly(const PairNumbers& pair, bc_contact& contact) {
   return solve_pair({chosen_kernel(), Model::exact, nullptr}, pair, BC_COVARIANCE, 0.0, contact);
 }
 
+// A surface with what is told of it.
+force::Surface changed(force::Surface surface, const double* velocity, const double* friction) {
+  if (velocity) surface.velocity = vector_at(velocity);
+  if (friction) surface.friction = *friction == *friction ? *friction : force::no_friction;
+  return surface;
+}
+
 // Solve the contacts of one's own, and read them.
 bc_status solve_own(Handled& all, double dt, const Given& given) {
   const Kernel* kernel = chosen_kernel();
@@ -162,17 +169,19 @@ bc_status bc_patch_forces_set_boxes(bc_patch_forces* forces, const bc_body_box* 
   });
 }
 
-bc_status bc_patch_forces_set_surface(bc_patch_forces* forces, int64_t box,
-                                      const double* velocity) {
+bc_status bc_patch_forces_set_surface(bc_patch_forces* forces, int64_t box, const double* velocity,
+                                      const double* friction) {
   return guarded([&] {
-    if (!forces || !velocity) return refuse_null(forces ? "velocity" : "forces");
+    if (!forces) return refuse_null("forces");
     PatchForces& self = forces_of(forces);
     if (box < 0 || box >= self.box_count())
       return fail(BC_BAD_ARGUMENT, "box: there is no box %lld", (long long)box);
-    if (!are_within(velocity, 3, speed_max))
+    if (velocity && !are_within(velocity, 3, speed_max))
       return fail(BC_BAD_ARGUMENT, "velocity (%g, %g, %g) is not finite, or beyond %g",
                   velocity[0], velocity[1], velocity[2], speed_max);
-    self.set_surface(box, {velocity[0], velocity[1], velocity[2]});
+    if (friction && *friction == *friction && !is_amount(*friction))
+      return fail(BC_BAD_ARGUMENT, "friction must be within 0 and 1e50, or NaN, not %g", *friction);
+    self.set_surface(box, changed(self.surfaces()[size_t(box)], velocity, friction));
     return BC_OK;
   });
 }

@@ -21,7 +21,7 @@ constexpr double speed_max = 1e50;
 // Forces, torques and impulses accepted, at most [N], [N m], [N s]: those of the largest mass at the
 // largest speed.
 constexpr double wrench_max = 1e100;
-// Times, frictions and stiffnesses accepted, at most [s], [1], [N/m]: their squares are numbers.
+// Times and frictions accepted, at most [s], [1]: their squares are numbers.
 constexpr double amount_max = 1e50;
 // Steps accepted [s]: at least this long, so that a speed divided by one is a number; and shorter than
 // that, as nothing that touches stays within its patch for so long.

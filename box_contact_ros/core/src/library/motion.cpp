@@ -24,8 +24,10 @@ struct Question {
 
 bool is_length(double x) { return std::fabs(x) <= length_max; }
 
+bool is_clearance(double x) { return x >= 0.0 && is_length(x); }
+
 bc_status check_question(const Question& asked) {
-  if (!(asked.clearance >= 0.0 && is_length(asked.clearance)))
+  if (!is_clearance(asked.clearance))
     return fail(BC_BAD_ARGUMENT, "clearance must be within 0 and 1e50 m, not %g", asked.clearance);
   if (!(asked.tolerance > 0.0 && is_length(asked.tolerance)))
     return fail(BC_BAD_ARGUMENT, "tolerance must be above 0, and at most 1e50 m, not %g",
@@ -171,6 +173,10 @@ bc_status answer_rows_of(const bc_sweep_rows* given, const Question& asked,
     const Kernel* kernel = chosen_kernel();
     if (!kernel) return refuse_environment();
     if (bc_status bad = check_question(asked)) return bad;
+    for (int64_t row = 0; rows.clearances && row < starts.count; ++row)
+      if (!is_clearance(rows.clearances[row]))
+        return fail(BC_BAD_ARGUMENT, "clearances[%lld] must be within 0 and 1e50 m, not %g",
+                    (long long)row, rows.clearances[row]);
     auto solve = [&](const Rows& plain, long count) {
       SweepRows sweeps(rows, plain);
       return in_chunks(count, threads, [&](long begin, long end) {
@@ -180,7 +186,9 @@ bc_status answer_rows_of(const bc_sweep_rows* given, const Question& asked,
           bool is_good = sweeps.read_row(row, asked.tolerance, motion);
           bc_approach found{};
           found.time = -1.0;
-          if (is_good) found = answer(*kernel, motion, asked);
+          Question each = asked;
+          if (rows.clearances) each.clearance = rows.clearances[row];
+          if (is_good) found = answer(*kernel, motion, each);
           else if (bad < 0) bad = row;
           write(found, wanted, row);
         }
