@@ -87,9 +87,9 @@ def test_null_pointers(library: CLibrary) -> None:
     nearest, nearest_results = (c_int64 * 12)(12 * 8), (c_int64 * 6)(6 * 8)
     sweep = (c_double * 20)(*pose, *pose, 1, 1, 1)
     approach, approach_results = (c_int64 * 15)(15 * 8), (c_int64 * 9)(9 * 8, 0, 0, 6 * 8)
-    sweep_rows = (c_int64 * 15)(15 * 8, ctypes.sizeof(Rows))  # no rows
+    sweep_rows = (c_int64 * 16)(16 * 8, ctypes.sizeof(Rows))  # no rows
     no, fine = c_double(0.0), c_double(1e-6)
-    answer = (c_int64 * 13)(13 * 8)  # a bc_patches without rows
+    answer = (c_int64 * 12)(12 * 8)  # a bc_patches without rows
     body_box = (c_double * 11)(0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1)
     step, motion = c_double(0.001), (c_int64 * 4)(4 * 8)  # a bc_motion that wants nothing
     made, wrench, box = c_void_p(), (c_double * 6)(), (c_double * 10)(*[0.0] * 6, *[1.0] * 4)
