@@ -27,7 +27,7 @@ def meeting(heavier: float, speed: float, **options: int) -> World:
     return world
 
 
-@pytest.mark.parametrize('heavier', [1.0, 2.0, 10.0, 100.0])
+@pytest.mark.parametrize('heavier', [1.0, 2.0, 10.0, 100.0, 1000.0, 8000.0])
 def test_an_impact_does_not_bounce(heavier: float) -> None:
     """Also on a lighter body, which passes the impact on to the floor: up at 0.05 of the speed."""
     world = meeting(heavier, 0.5)
@@ -67,17 +67,13 @@ def test_what_is_forgotten_has_not_swayed() -> None:
     assert np.array_equal(swaying.step(FRAME).velocities, new.step(FRAME).velocities)
 
 
-@pytest.mark.parametrize('height', [1.0, 15.0])
-@pytest.mark.parametrize('dt', [STEP, FRAME])
-def test_a_weight_that_falls_on_light_cubes_does_not_jump(dt: float, height: float) -> None:
-    """Of 100 kg, on four cubes of 1 kg: at less than 5 % of its speed.
-
-    Where impacts of heavy bodies on light ones are over-relaxed, at 24 % of it.
-    """
+@pytest.mark.parametrize('substeps', [4, 16])
+def test_a_weight_that_falls_on_light_cubes_does_not_jump(substeps: int) -> None:
+    """Of 8 t, by 15 m on four cubes of 1 kg: at less than 1 % of its speed."""
     cubes = [((0.5, 0.5, 0.5), 1.0, (x, y, 0.25)) for x in (-1, 1) for y in (-1, 1)]
-    world = World(FLOOR, *cubes, ((3.0, 3.0, 1.0), 100.0, (0, 0, 1.0 + height)))
-    speeds = [world.step(dt).velocities[5, 2] for _ in range(round(2.2 / dt))]
-    assert max(speeds) < -0.05 * min(speeds)
+    world = World(FLOOR, *cubes, ((3.0, 3.0, 1.0), 8000.0, (0, 0, 16.0)), substeps=substeps)
+    speeds = [world.step().velocities[5, 2] for _ in range(2200)]
+    assert min(speeds) < -17.0 and max(speeds) < 0.17
 
 
 @pytest.mark.parametrize('substeps', [1, 4, 64])

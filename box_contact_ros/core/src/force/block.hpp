@@ -100,7 +100,6 @@ struct Asked {
   Vec<T> local_a, local_b;  // its point in the frames of its bodies
   Vec<T> closing;           // velocities along N, τ1 and τ2 that close the faces: see closing.hpp
   T over_relaxation;        // of pressing and rocking: see iterations.hpp [1]
-  T over_relaxed;           // where no rim is faster than this [m/s]
 };
 template <class T>
 struct Arms {
@@ -148,7 +147,7 @@ BC_INLINE void bound(Vec<T>& impulses, T limit) {
 }
 
 // Read what an answer, and the last window, say of a patch.
-inline void read_patch(const Patch& patch, double over_relaxation, double over_relaxed, Block& block) {
+inline void read_patch(const Patch& patch, double over_relaxation, Block& block) {
   auto local = [&](const Placed& asked) {
     return transposed_times(asked.axes, patch.point - asked.position);
   };
@@ -156,8 +155,7 @@ inline void read_patch(const Patch& patch, double over_relaxation, double over_r
   static_cast<Asked<double>&>(block) = {
       patch.normal,         patch.point,          patch.surface,              patch.shape,
       patch.friction,       patch.depth,          patch.late,                 patch.age,
-      local(patch.asked_a), local(patch.asked_b), Vec<double>{0.0, 0.0, 0.0}, over_relaxation,
-      over_relaxed};
+      local(patch.asked_a), local(patch.asked_b), Vec<double>{0.0, 0.0, 0.0}, over_relaxation};
   static_cast<Kept<double>&>(block) = patch.kept;
 }
 
@@ -343,7 +341,7 @@ BC_INLINE T solve_normal(Rows<T>& block, const NormalRows<T>& rows, Mask<T> due,
   Mask<T> within = is_within(next);
   T reach = max<T>(block.shape.half_1, block.shape.half_2);
   T fastest = max<T>(abs(v[0]), reach * max<T>(abs(v[1]), abs(v[2])));
-  Mask<T> sways = within & (fastest > least_over_relaxed) & (fastest < block.over_relaxed);
+  Mask<T> sways = within & (fastest > least_over_relaxed);
   if (any(sways)) {
     Vec<T> beyond = before - block.over_relaxation * change;
     next = select(sways & is_within(beyond), beyond, next);

@@ -15,7 +15,6 @@
 #include "islands.hpp"
 #include "iterations.hpp"
 #include "own_contacts.hpp"
-#include "falling_asleep.hpp"
 #include "stages.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
@@ -106,14 +105,8 @@ class IslandStep {
     island.fastest = 0.0;
     island.over_relaxation =
         step_.steps.is_late ? 1.0 : over_relaxation(island.block_end - island.block);
-    double lightest = 0.0, heaviest = place_max;  // inverse masses [1/kg]
-    each_free(island, islands_, [&](const Moving& moving) {
-      lightest = std::max(lightest, moving.inverse_mass);
-      heaviest = std::min(heaviest, moving.inverse_mass);
-    });
-    island.over_relaxed = lightest >= uneven_masses * heaviest ? most_sway : place_max;
     each(island, [&](Block& block, const Patch& patch, Moving& a, Moving& b) {
-      read_patch(patch, island.over_relaxation, island.over_relaxed, block);
+      read_patch(patch, island.over_relaxation, block);
       island.fastest = std::max(island.fastest, passing_speed(patch, a, b));
       block.normal_sum = block.friction_sum = {};
       island.is_new = island.is_new && patch.kept.window == 0.0;
@@ -215,7 +208,7 @@ class IslandStep {
     each(island, [&](Block& block, Patch& patch, Moving& a, Moving& b) {
       step_.own->solve_again(step_.solve_pair, body_step_.pose_of(a), body_step_.pose_of(b),
                              a.placed, b.placed, is_lighter_b(bodies_, patch), patch);
-      read_patch(patch, island.over_relaxation, island.over_relaxed, block);
+      read_patch(patch, island.over_relaxation, block);
       close(patch, a, b, time, block);
     });
   }

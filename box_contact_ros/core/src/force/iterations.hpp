@@ -1,7 +1,7 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// Iterations: the blocks of islands are solved in order.
+// Iterations: the blocks of islands are solved in order, and what presses in an impact is scaled.
 #pragma once
 
 #include <algorithm>
@@ -43,7 +43,6 @@ struct Island {
   size_t body, body_end;  // among those that move
   size_t block, block_end;
   double over_relaxation;  // see above
-  double over_relaxed;     // where no rim is faster than this: heavy bodies would bounce off light ones [m/s]
   double fastest;          // as which its bodies pass each other at the start of an advance [m/s]
   bool is_new;             // whether it had no patch before this advance
   int rounds;              // how many times as many iterations it takes
@@ -68,20 +67,54 @@ BC_INLINE NormalRows<T>& rows_of(Rows<T>& block, bool is_pushing) {
   return is_pushing ? block.pushing : block.relaxed;
 }
 
+// Scale what presses by the factor that leaves least energy, which all bounds allow. Iterations hardly
+// stop a heavy body that falls on light ones, nor take back what stopped it in the sub-step before.
+inline void scale(const Island& island, bool is_pushing, int iteration, Moving* moving,
+                  Block* blocks) {
+  auto each = [&](const auto& visit) {
+    for (size_t k = island.block; k < island.block_end; ++k)
+      visit(blocks[k], rows_of(blocks[k], is_pushing), moving[blocks[k].a], moving[blocks[k].b]);
+  };
+  using Normal = NormalRows<double>;
+  double with = 0.0, without = 0.0;  // power along all impulses [W s]
+  each([&](Block& block, Normal& rows, Moving& a, Moving& b) {
+    const Vec<double>& x = block.normal_impulses;
+    with += dot(x, pressing_speeds(block, rows, a, b) + rows.softness * x);
+  });
+  each([&](Block& block, Normal&, Moving& a, Moving& b) {
+    apply_normal(block, -block.normal_impulses, a, b);
+  });
+  each([&](Block& block, Normal& rows, Moving& a, Moving& b) {
+    without += dot(block.normal_impulses, pressing_speeds(block, rows, a, b));
+  });
+  double factor = with > without ? max(without / (without - with), 0.0) : 1.0;
+  if (factor < least_factor && factor * least_factor > 1.0) factor = 1.0;
+  each([&](Block& block, Normal&, Moving& a, Moving& b) {
+    block.normal_impulses = factor * block.normal_impulses;
+    apply_normal(block, block.normal_impulses, a, b);
+    if (factor == 1.0) return;
+    if (a.inverse_mass > 0.0) a.last_change = iteration;
+    if (b.inverse_mass > 0.0) b.last_change = iteration;
+  });
+}
+
 // Solve the blocks of islands in order, `count` times, each island as if alone. Beyond them only impacts
 // go on. Changes were forgotten. `solve(iteration, is_beyond)`: all of them; returns whether a speed
-// changed, and beyond, whether one did as in an impact.
-template <class Solve>
-void iterate(Island* first, Island* last, int count, Moving* moving, const Solve& solve) {
+// changed, and beyond, whether one did as in an impact. `scale(island, iteration)`: see above.
+template <class Solve, class Scale>
+void iterate(Island* first, Island* last, int count, Moving* moving, const Solve& solve,
+             const Scale& scale) {
   for (int iteration = 1;; ++iteration) {
     for (Island* island = first; island < last; ++island) island->is_struck = false;
     if (!solve(iteration, iteration > 1 && iteration >= count)) return;
     bool goes_on = iteration < count;
     for (Island* island = first; island < last; ++island) {
-      if (island->is_struck && iteration < impact_iterations)
-        goes_on = true;
-      else if (iteration >= count)
-        forget_changes(*island, moving);  // it is not solved again
+      if (!island->is_struck || iteration >= impact_iterations) {
+        if (iteration >= count) forget_changes(*island, moving);  // it is not solved again
+        continue;
+      }
+      if (iteration % scaled_every == 0) scale(*island, iteration);
+      goes_on = true;
     }
     if (!goes_on) return;
   }

@@ -20,6 +20,20 @@ struct alignas(64) Group : Rows<T> {
   unsigned filled;                // a bit for each lane
   unsigned is_free_a, is_free_b;  // the same, of those that forces move
   Mat<T> inverse_inertia_a, inverse_inertia_b;
+
+  // Copy what the scaling of an impact takes of a block.
+  void copy_to(int i, bool is_pushing, Rows<double>& block) {
+    auto copy = [&](const Vec<T>& from, Vec<double>& to) {
+      for (int k = 0; k < 3; ++k) to[k] = lane(from[k], i);
+    };
+    const NormalRows<T>& rows = rows_of<T>(*this, is_pushing);
+    copy(this->arm_a, block.arm_a);
+    copy(this->arm_b, block.arm_b);
+    copy(this->carried, block.carried);
+    copy(this->normal_impulses, block.normal_impulses);
+    copy(rows.softness, rows_of(block, is_pushing).softness);
+    copy(rows.bias, rows_of(block, is_pushing).bias);
+  }
 };
 
 // Rows of numbers in memory to structs of lanes, and back.

@@ -137,7 +137,29 @@ class Stages {
            [&](G& group) { is_changed |= solve(work, {is_pushing, iteration, is_beyond}, group); });
       return is_changed;
     };
-    iterate(work.first, work.last, count, work.moving, solve_all);
+    auto scale_it = [&](const Island& island, int iteration) {
+      scale_one(work, island, is_pushing, iteration);
+    };
+    iterate(work.first, work.last, count, work.moving, solve_all, scale_it);
+  }
+  // Its blocks are in all groups, so they come out for it.
+  static void scale_one(const Work& work, const Island& island, bool is_pushing, int iteration) {
+    auto scale_all = [&] { scale(island, is_pushing, iteration, work.moving, work.blocks); };
+    if constexpr (is_alone) {
+      scale_all();
+    } else {
+      auto each_lane = [&](const auto& visit) {
+        for (size_t k = island.block; k < island.block_end; ++k) {
+          Block& block = work.blocks[k];
+          visit(groups(work)[block.side / G::lanes], block.side % G::lanes, block);
+        }
+      };
+      each_lane([&](G& group, int i, Block& block) { group.copy_to(i, is_pushing, block); });
+      scale_all();
+      each_lane([](G& group, int i, const Block& block) {
+        for (int k = 0; k < 3; ++k) set_lane(group.normal_impulses[k], i, block.normal_impulses[k]);
+      });
+    }
   }
 };
 

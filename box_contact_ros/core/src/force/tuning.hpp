@@ -64,6 +64,9 @@ constexpr int impact_iterations = 40;
 // In an island that had patches, also by more than this acceleration times the sub-step [m/s²]: what rolls in a
 // pile is no impact.
 constexpr double impact_acceleration = 40.0;
+// After so many iterations all that presses in the island is scaled, by a factor or an inverse beyond this [1].
+constexpr int scaled_every = 8;
+constexpr double least_factor = 2.0;
 
 // --- sway ---
 // A stack sways while its bodies pass each other at a speed in this range; it begins at the middle one [m/s].
