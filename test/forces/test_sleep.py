@@ -265,7 +265,7 @@ def disturb(world: World, rng: np.random.Generator) -> None:
 def test_random_histories_go_on_as_without_rest() -> None:
     """To 1 µm: a heap after 4 s, and then one of many things, in uneven steps."""
     rested = 0
-    for seed in range(1, 25):
+    for seed in range(24):
         rng = np.random.default_rng(seed)
         rows, dt = heap(rng, 4), rng.choice([1 / 60, 1 / 240])
         worlds = [World(*rows, rest=rest).run(4.0, dt) for rest in (True, False)]
