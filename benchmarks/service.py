@@ -96,7 +96,7 @@ class EchoNode(GuardedNode):
         super().__init__('echo', context=context)
         answerer = CheckAnswerer(SceneSolver(yard()))
         for name, question in QUESTIONS.items():
-            answerer.answer(question, kept := Check.Response())
+            answerer.answer(question, kept := Check.Response(success=True))
             response = deserialize_message(serialize_message(kept), Check.Response)
             self.create_service(Check, service_of(name), lambda *_, response=response: response)
 

@@ -55,17 +55,17 @@ class Crane(Node):
         self.parts = [FRAME]
         self.forces = PatchForces([FIXED, FIXED])
         self.change.wait_for_service()
-        self.set_boxes(fixed=[self.box('c1'), self.box('c2')])
+        self.set_boxes(fixed=[self.box(name, *SIZES[name]) for name in ('c1', 'c2')])
 
     def receive(self, data: bytes) -> None:
         """Keep the newest answer."""
         self.answer = read_contacts(data)
 
-    def box(self, name: str) -> Box:
-        """Return a box at its place."""
+    def box(self, name: str, *size: float) -> Box:
+        """Return a box at its place; one that the node knows has no size in a request."""
         x, y, z = map(float, self.places[name])
-        size = Vector3(**dict(zip('xyz', map(float, SIZES[name]))))
-        return Box(name=name, size=size, pose=Pose(position=Point(x=x, y=y, z=z)))
+        extents = Vector3(**dict(zip('xyz', map(float, size))))
+        return Box(name=name, size=extents, pose=Pose(position=Point(x=x, y=y, z=z)))
 
     def set_boxes(self, **changes: list[Box] | list[BodyMessage]) -> None:
         """Change the boxes of the node, and those of the forces."""

@@ -12,7 +12,7 @@ It prints:
 
     0.06 s: 0.0 mm deep, 589 mm/s
     0.13 s: 0.0 mm deep, 987 mm/s
-    0.26 s: 0.0 mm deep, 78 mm/s
+    0.26 s: 0.0 mm deep, 109 mm/s
     0.51 s: 0.0 mm deep, 0 mm/s
     1.01 s: 0.0 mm deep, 0 mm/s
     at rest: force / weight 1.0000, tilt below 0.001°: True

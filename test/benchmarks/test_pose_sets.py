@@ -30,7 +30,8 @@ def test_nearly_all_draws_meet_at_the_stated_depth(name: str) -> None:
     found = pairs.contacts()
     assert 0.9 * N < len(found.colliding) <= N and found.colliding.all()
     shortest = np.minimum(pairs.size_a.min(axis=1), pairs.size_b.min(axis=1))
-    low, high = DEPTHS.get(name, (1e-3 * shortest, 0.1 * shortest))
+    shares = (0.1, 0.7) if name == 'deep' else (1e-3, 0.1)
+    low, high = DEPTHS.get(name, [share * shortest for share in shares])
     rounding = 1e-13 * pairs.size
     assert (-found.separation > low - rounding).all()
     assert (-found.separation < high + rounding).all()
