@@ -102,7 +102,7 @@ def test_searched_for_the_worst(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     errors = contact_errors(found, pairs.contacts(), pairs.edge)
     for quantity, value in worst.items():
         assert value >= 0.999 * getattr(errors, quantity).max()
-        assert value <= {'point': 20.0, 'volume': 150.0, 'covariance': 150.0}[quantity]
+        assert value <= {'point': 20.0, 'volume': 150.0, 'covariance': 175.0}[quantity]
     page = (tmp_path / 'searched.md').read_text('utf-8')
     assert '0.02 minutes on one core: 1 s on each set' in page
 
