@@ -6,10 +6,10 @@
 //   2 s: 0.000 mm/s
 //   4 s: 0.000 mm/s
 //   6 s: 0.000 mm/s
-//   at 6.10 -1.10 m: 49 kN
-//   at 6.10 1.25 m: 53 kN
+//   at 6.10 -1.13 m: 49 kN
+//   at 6.10 1.22 m: 53 kN
 //   at -5.62 1.22 m: 49 kN
-//   at -5.61 -1.13 m: 45 kN
+//   at -5.62 -1.13 m: 45 kN
 #include <cmath>
 #include <cstdio>
 #include <vector>
