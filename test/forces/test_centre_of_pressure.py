@@ -125,7 +125,7 @@ def on_forks(share: float, dt: float) -> float:
     return 1e3 * float(np.hypot(*(way - start)))
 
 
-@pytest.mark.parametrize('dt', [0.004, FRAME])
+@pytest.mark.parametrize('dt', [pytest.param(0.004, marks=pytest.mark.reports), FRAME])
 def test_a_pallet_on_forks_holds_in_a_curve(dt: float) -> None:
     assert on_forks(0.98, dt) < 4.0
     assert on_forks(1.02, dt) > 20.0

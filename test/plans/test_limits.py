@@ -107,7 +107,7 @@ def test_loads_that_take_too_much_are_not_judged(text, status, line, tmp_path):
 
 
 @pytest.mark.parametrize('order', ['at random', 'from above'])
-@pytest.mark.parametrize('weighed', [True, False])
+@pytest.mark.parametrize('weighed', [pytest.param(True, marks=pytest.mark.reports), False])
 def test_steps_are_a_part_of_the_work(order, weighed, tmp_path):
     """4,000 boxes with an order, which has 116 kB, took 131 s."""
     number = [*range(4000, 0, -1)]

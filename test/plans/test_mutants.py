@@ -27,7 +27,7 @@ pytest.importorskip('clarabel')
 
 from test_read_plan import FILES, baplie, document, sheet
 
-COUNT = int(os.environ.get('BOX_CONTACT_MUTANTS', '150'))
+COUNT = int(os.environ.get('BOX_CONTACT_MUTANTS', '100'))
 """Files in all."""
 LONGEST = 1.0  # of a file [s of the processor]
 MEMORY = 300 * 2**10  # that this process may need more [kB]

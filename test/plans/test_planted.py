@@ -22,7 +22,7 @@ from box_contact_ros.plans import inspect_files
 
 pytest.importorskip('clarabel')
 
-COUNT = int(os.environ.get('BOX_CONTACT_PLANTED', '250'))
+COUNT = int(os.environ.get('BOX_CONTACT_PLANTED', '150'))
 FOREIGN = ('foo', 'rotation', 'theta', 'heading', 'rz', 'Tragkraft', 'crush', 'ECT', 'Reibung',
            'Reihenfolge', 'placed at', 'Palette', 'destination', 'Stück', 'n', 'a.b', 'tall',
            'item.value', 'load', 'x2', 'dz2', 'ρ', 'class', 'status')
