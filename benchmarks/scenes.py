@@ -200,7 +200,7 @@ class Grown(NamedTuple):
     touching: int
     tick: float  # [ms]
     per_box: float  # [ns]
-    broad_phase: float  # its share of a tick
+    finding: float  # share of a tick that finds near pairs
     memory: float  # most of the process so far [MiB]
     reading: float  # of the scene file [s]
 
@@ -220,11 +220,11 @@ def grow(counts: Sequence[int], rounds: int) -> list[Grown]:
             solver = SceneSolver(scene, model='exact')
             rng = np.random.default_rng(1)
             places = [boxes.shaken(rng) for _ in range(PLACES)]
-            phase = solver._at.broad_phase
+            movers = solver._at.movers
             times: list[tuple[float, float]] = []
             for turn in range(PLACES + rounds):
                 took, answer = cpu_milliseconds(solver, places[turn % PLACES])
-                found, _ = cpu_milliseconds(phase.find, places[(turn + 1) % PLACES], sys.maxsize)
+                found, _ = cpu_milliseconds(movers.find, places[(turn + 1) % PLACES], sys.maxsize)
                 times.append((took, found))
         tick, found = np.median(times[PLACES:], axis=0)
         rows.append(Grown(count, answer.touching, tick, 1e6 * tick / count, found / tick,
@@ -253,10 +253,10 @@ def main(args: Sequence[str] | None = None) -> int:
               number(row.ratio), row.only_ours, row.only_mujoco]
              for row in compared], words=2),
         grown=markdown_table(
-            ['boxes', 'touching', 'tick [ms]', 'per box [ns]', 'broad phase [%]',
+            ['boxes', 'touching', 'tick [ms]', 'per box [ns]', 'finding pairs [%]',
              'memory of the process [MiB]', 'file read in [s]'],
             [[*map('{:,}'.format, row[:2]), number(row.tick), number(row.per_box),
-              number(100.0 * row.broad_phase), number(row.memory), number(row.reading)]
+              number(100.0 * row.finding), number(row.memory), number(row.reading)]
              for row in grown], words=0)))
     output.write_csv(folder / 'scenes.csv', [row._asdict() for row in (*compared, *grown)],
                      about=machine)

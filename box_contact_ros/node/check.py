@@ -4,7 +4,7 @@
 """The service ~/check: what the boxes of one request touch, without stamps and topics."""
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from box_contact_msgs.srv import Check
 
@@ -25,12 +25,12 @@ class CheckAnswerer:
     def __init__(self, solver: SceneSolver, model: str = 'exact', epoch: int = 0) -> None:
         """Take the scene and the model, by its name too, and the node's epoch."""
         self.solver, self._epoch = solver, epoch
-        self._check = SceneCheck(solver, most_near=most_near(model))
+        self.check = SceneCheck(solver, most_near=most_near(model))
         self._kept = KeptMessages(MOST_CONTACTS)
 
     def answer(self, request: Check.Request, response: Check.Response,
-               last: Mapping[str, Row] | None = None) -> None:
-        """Fill in contacts, which are overwritten by the next answer.
+               last: Mapping[str, Row] | None = None) -> Iterator[None]:
+        """Fill in contacts, in steps; they are overwritten by the next answer.
 
         last: poses of what moves, for a request that asks for them. Raises ValueError, with field
         and value, for what is refused.
@@ -38,21 +38,21 @@ class CheckAnswerer:
         check_frame(request.header.frame_id, self.solver.scene)
         boxes, last = request.boxes, last or {}
         names = [box.name for box in boxes]
-        found, areas = self._check(
+        found, areas = yield from self.check(
             names, [pose_of(box) for box in boxes], [size_of(box) for box in boxes],
             [(pair.box_a, pair.box_b) for pair in request.pairs], request.margin, last)
         count = len(found.pairs) + len(found.near_pairs)
         if count > MOST_CONTACTS:
             raise TooMuch(f'contacts: {count} pairs touch or are near, and a response has '
                           f'at most {MOST_CONTACTS}: ask for fewer boxes, or name pairs')
-        listed, names_of = response.contacts, self._check.names_of
+        listed, guests = response.contacts, self.check.guests(names)
+        touching, near = ([self.check.names_of(a, b, guests) for a, b in pairs.tolist()]
+                          for pairs in (found.pairs, found.near_pairs))
         listed.header, listed.epoch = request.header, self._epoch
         listed.revision = self.solver.revision
-        listed.contacts = self._kept.fill([names_of(a, b) for a, b in found.pairs.tolist()],
-                                          found.contacts, areas)
-        listed.near = near_messages([names_of(a, b) for a, b in found.near_pairs.tolist()],
-                                    found.near)
-        response.left_out, response.left_out_names = self._check.left_out(names, last)
+        listed.contacts = self._kept.fill(touching, found.contacts, areas)
+        listed.near = near_messages(near, found.near)
+        response.left_out, response.left_out_names = self.check.left_out(names, last)
 
 
 def kind_and_size(request: Check.Request) -> tuple[Kind, int]:

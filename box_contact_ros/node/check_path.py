@@ -15,7 +15,6 @@ from box_contact_msgs.srv import CheckPath
 from ..scene.scene_check import NO_POSE, Row, SceneCheck
 from ..solver.checks import TooMuch, short_repr
 from ..solver.motion import Approaches
-from .check import MOST_CONTACTS
 from .messages import check_frame, near_messages, size_of
 from .paced_service import Kind
 
@@ -39,12 +38,10 @@ def answer(check: SceneCheck, epoch: int, request: CheckPath.Request,
     found = yield from check.path(
         names, _path(request, names), [size_of(box) for box in request.boxes],
         [(pair.box_a, pair.box_b) for pair in request.pairs], request.clearance, last)
-    if (count := max(len(found.pairs), len(found.at_start))) > MOST_CONTACTS:
-        raise TooMuch(f'impacts: {count} pairs come within the clearance, and a response has at '
-                      f'most {MOST_CONTACTS}: ask for fewer boxes, or name pairs')
+    guests = check.guests(names)
 
     def messages(pairs: np.ndarray, approaches: Approaches) -> list[ApproachMessage]:
-        near = near_messages([check.names_of(a, b) for a, b in pairs.tolist()],
+        near = near_messages([check.names_of(a, b, guests) for a, b in pairs.tolist()],
                              approaches.nearest)
         return [ApproachMessage(time=float(time), closing_speed=float(speed), near=one)
                 for time, speed, one in zip(approaches.time, approaches.closing_speed, near)]
@@ -54,7 +51,7 @@ def answer(check: SceneCheck, epoch: int, request: CheckPath.Request,
         part = slice(first, first + MESSAGES)
         response.impacts += messages(found.pairs[part], found.impacts[part])
     for a, b in found.at_start.tolist():
-        _, box_a, box_b = check.names_of(a, b)
+        _, box_a, box_b = check.names_of(a, b, guests)
         response.at_start.append(BoxPair(box_a=box_a, box_b=box_b))
     if len(found.least):
         response.least, = messages(found.least_pair, found.least)

@@ -20,7 +20,7 @@ from __future__ import annotations
 import gc
 import sys
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from typing import Any, ClassVar
 
 from rcl_interfaces.msg import SetParametersResult
@@ -38,7 +38,7 @@ from ..arguments import parse_command_line, program_main
 from ..core import LENGTH_MAX
 from ..models.make_model import MODELS, check_model, make_model, most_near
 from ..scene.scene import CONTAINER, Scene, two_boxes
-from ..scene.scene_check import SceneCheck
+from ..scene.scene_check import Row
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import short_repr
@@ -160,7 +160,6 @@ class ContactNode(GuardedNode, LifecycleNode):
         self._topics: SceneTopics | None = None  # from configure to cleanup
         self._answerer: TickAnswerer | None = None  # likewise
         self._check_answerer: CheckAnswerer | None = None  # of the solver's scene and model
-        self._path_check: SceneCheck | None = None  # its own: checks come between its steps
         self._lister: Lister | None = None  # from configure on
         self.add_on_set_parameters_callback(self._set_live)
         self._checks = PacedService(self, self.counts, 'checks', (Check, '~/check'), self._check,
@@ -307,22 +306,28 @@ class ContactNode(GuardedNode, LifecycleNode):
 
     def _check(self, request: Check.Request, response: Check.Response) -> Iterator[None]:
         """Answer on the node's scene and model; ticks know nothing of it."""
+        checker = yield from self._checker()
+        yield from checker.answer(request, response, self._last_poses(request))
+
+    def _check_path(self, request: CheckPath.Request, response: CheckPath.Response,
+                    ) -> Iterator[None]:
+        """Answer on the node's scene; ticks know nothing of it."""
+        checker = yield from self._checker()
+        yield from check_path.answer(checker.check, self._tick.epoch, request, response,
+                                     self._last_poses(request))
+
+    def _checker(self) -> Generator[None, None, CheckAnswerer]:
+        """Return what answers questions about the scene as it is now."""
         answerer, checker = self._configured(), self._check_answerer
         if checker is None or checker.solver is not answerer.solver:
             checker = self._check_answerer = CheckAnswerer(
                 answerer.solver, self.model_of(self._values), answerer.epoch)
             yield
-        checker.answer(request, response, answerer.last_poses() if request.last_poses else None)
+        return checker
 
-    def _check_path(self, request: CheckPath.Request, response: CheckPath.Response,
-                    ) -> Iterator[None]:
-        """Answer on the node's scene; ticks know nothing of it."""
-        answerer, checker = self._configured(), self._path_check
-        if checker is None or checker.solver is not answerer.solver:
-            checker = self._path_check = SceneCheck(answerer.solver, most_near=0)
-            yield
-        last = answerer.last_poses() if request.last_poses else None
-        yield from check_path.answer(checker, answerer.epoch, request, response, last)
+    def _last_poses(self, request: Check.Request | CheckPath.Request) -> Mapping[str, Row] | None:
+        """Return the last poses of what moves, for a request that asks for them."""
+        return self._tick.last_poses() if request.last_poses else None
 
     def _get_boxes(self, request: GetBoxes.Request, response: GetBoxes.Response) -> Iterator[None]:
         """Tell some boxes of the scene."""

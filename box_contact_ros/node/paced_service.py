@@ -24,7 +24,7 @@ from .runtime import LONG, GuardedNode
 COSTLY = 5e-3
 """Processor time [s] beyond which a request is costly: half a tick at 100 Hz."""
 PAUSE = 5.0
-"""Pause after a costly request, divided by its time: ticks have five sixths of the node's time."""
+"""Pause after costly steps, divided by their time: ticks have five sixths of the node's time."""
 SLICE = 2e-3
 """Processor time [s] after which the next step waits for ticks."""
 GAP = 1e-3
@@ -68,9 +68,10 @@ def refuse(response: Any, error: ValueError) -> None:
 class PacedService:
     """Serves requests, and keeps clients that ask costly ones without pause from stopping ticks.
 
-    After a costly request that took T, costly requests wait for PAUSE · T. A client that waits asks
+    After steps that took T in all, costly requests wait for PAUSE · T. A client that waits asks
     nothing: a refusal would bring its request again, and ROS takes a millisecond to read it.
-    Whether a request is costly is judged by its kind, and by its size.
+    Whether a request is costly is judged by its kind, and by its size. Costly ones are answered in
+    turns of a SLICE each, so that a small one never waits for the end of a long one.
     """
 
     def __init__(self, node: GuardedNode, counts: Counter[str], what: str, service: tuple[Any, str],
@@ -81,8 +82,8 @@ class PacedService:
 
         It raises ValueError for what it refuses: success, code and message are written here.
         what: what `counts` calls the requests. in_turn: whether none overtakes another. is_timed:
-        whether `take_times` is called again and again. pause: that after a costly request, divided
-        by its time.
+        whether `take_times` is called again and again. pause: that after costly steps, divided by
+        their time.
         """
         self._counts, self._what, self._pause = counts, what, pause
         self._answer, self._kind_and_size, self._in_turn = answer, kind_and_size, in_turn
@@ -91,9 +92,9 @@ class PacedService:
         self._gap = GAP  # after the last steps [s]
         self._cheap: dict[Kind, int] = {}
         """Size up to which requests are not costly, of the kinds that came last."""
-        self._waiting: deque[tuple[float, Any, Any, Send]] = deque()
-        """When each came [s], and what `_begin` takes."""
-        self._running: Running | None = None
+        self._asked: deque[Asked] = deque()
+        """Requests that wait for their turn, the next one first."""
+        self._now: Asked | None = None  # whose turn it is
         # From taking to answering [s].
         self._times: deque[float] = deque(maxlen=KEPT_TIMES if is_timed else 0)
         self._next_step = node.answered(self._step, service[1])
@@ -111,21 +112,22 @@ class PacedService:
 
     def _take(self, request: Any, response: Any, send: Send) -> None:
         """Answer a request now or, if it is costly in a pause, later."""
-        now = time.monotonic()
+        asked = Asked(time.monotonic(), request, response, send)
         kind, size = self._kind_and_size(request)
-        is_costly = size > self._cheap.get(kind, 0) or (self._in_turn and self._waiting)
-        has_to_wait = self._running or (is_costly and (self._waiting or now < self._until))
-        if not has_to_wait:
-            self._begin(now, request, response, send)
-        elif len(self._waiting) < MOST_WAITING:
-            self._waiting.append((now, request, response, send))
-            self._wait()
+        is_costly = size > self._cheap.get(kind, 0) or (self._in_turn and self._asked)
+        waiting = len(self._asked)
+        if not is_costly or not (waiting or asked.came < self._until):
+            self._run(asked)
+        elif len(self._asked) < MOST_WAITING:
+            self._asked.append(asked)
         else:
             self._counts[f'{self._what} refused'] += 1
             response.code.value = Code.BUSY
             response.message = (f'busy: {MOST_WAITING} costly requests wait, as ticks come first; '
                                 'ask again later')
             send(response)
+        if len(self._asked) > waiting:
+            self._wait()
 
     def _go_on(self) -> None:
         """Do the next steps, or begin with the first request that waits, as its pause is over.
@@ -135,61 +137,55 @@ class PacedService:
         if time.monotonic() < self._due:
             return
         self._timer.cancel()
-        if self._running:
-            self._run(self._running)
-        elif self._waiting:
-            self._begin(*self._waiting.popleft())
-        if self._running or self._waiting:
-            self._wait()
+        if self._asked:
+            self._run(self._asked.popleft())
+        self._wait()
 
     def _wait(self) -> None:
         """Let the timer end after ticks that wait now; or with the pause."""
+        if not self._asked:
+            return
         now = time.monotonic()
-        self._due = now + self._gap if self._running else max(now + self._gap, self._until)
+        is_begun = self._asked[0].steps is not None
+        self._due = now + self._gap if is_begun else max(now + self._gap, self._until)
         self._timer.timer_period_ns = round(1e9 * (self._due - now))
         self._timer.reset()
 
-    def _begin(self, came: float, request: Any, response: Any, send: Send) -> None:
-        """Begin to answer a request that came at a time [s]."""
-        self._running = Running(came, request, response, send)
-        self._run(self._running)
-        if self._running:
-            self._wait()
-
-    def _run(self, running: Running) -> None:
-        """Do steps of an answer for a SLICE; send it after the last one."""
+    def _run(self, asked: Asked) -> None:
+        """Do steps of an answer for a SLICE; send it after the last one, else it waits again."""
         began, used = time.monotonic(), time.thread_time()
-        response = self._next_step(running.request, running.response)
+        self._now = asked
+        response = self._next_step(asked.request, asked.response)
         while response is None and time.thread_time() < used + SLICE:
-            response = self._next_step(running.request, running.response)
+            response = self._next_step(asked.request, asked.response)
+        self._now = None
         if response is not None:
-            self._running = None
-            running.send(response)
+            asked.send(response)
         ended = time.monotonic()
         self._gap = max(GAP, REST * (ended - began))
-        running.wall += ended - began
-        running.cost += time.thread_time() - used
+        asked.cost += time.thread_time() - used
         if response is None:
+            self._asked.insert(0 if self._in_turn else len(self._asked), asked)
             return
         self._counts[f'{self._what} {"answered" if response.success else "refused"}'] += 1
-        self._times.append(ended - running.came)
-        kind, size = self._kind_and_size(running.request)
+        self._times.append(ended - asked.came)
+        kind, size = self._kind_and_size(asked.request)
         cheap = max(self._cheap.pop(kind, 0), size)
-        if running.cost > COSTLY:
-            self._until = ended + self._pause * running.wall
-            cheap = int(size * COSTLY / running.cost)
+        if asked.cost > COSTLY:
+            self._until = ended + self._pause * (ended - began)  # after earlier steps, it rested
+            cheap = int(size * COSTLY / asked.cost)
         self._cheap[kind] = cheap  # the newest comes last
         if len(self._cheap) > KEPT_KINDS:
             del self._cheap[next(iter(self._cheap))]
 
     def _step(self, request: Any, response: Any) -> Any:
         """Return the response after the last step, else None."""
-        running = self._running
-        assert running is not None
+        asked = self._now
+        assert asked is not None
         try:
-            if running.steps is None:
-                running.steps = iter(self._answer(request, response))
-            if next(running.steps, response) is None:
+            if asked.steps is None:
+                asked.steps = iter(self._answer(request, response))
+            if next(asked.steps, response) is None:
                 return None
         except ValueError as error:
             refuse(response, error)
@@ -199,13 +195,12 @@ class PacedService:
 
 
 @dataclass(slots=True)
-class Running:
-    """A request that is being answered."""
+class Asked:
+    """A request, from its coming to its answer."""
 
     came: float  # [s]
     request: Any
     response: Any
     send: Send
     steps: Iterator[None] | None = None  # those that are left
-    wall: float = 0.0  # time of the steps so far [s]
-    cost: float = 0.0  # processor time of these [s]
+    cost: float = 0.0  # processor time of those so far [s]

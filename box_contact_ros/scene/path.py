@@ -3,38 +3,29 @@
 
 """A path through a scene: what comes too near on it, when, and how near all else comes.
 
-The time of a path goes from k to k + 1 between pose k and pose k + 1. Bounding boxes find the rides
-that matter, as rides.py has them; `time_of_impact` and `least_distance` answer these.
+The time of a path goes from k to k + 1 between pose k and pose k + 1. It is found in the core, step
+by step; see core/src/motion/path.hpp.
 """
 from __future__ import annotations
 
-import math
+import sys
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core import native
-from ..solver.checks import absent_poses, as_floats, as_margin, pose_fault
-from ..solver.contact_solver import ContactSolver
+from ..solver.checks import TooMuch, absent_poses, as_floats, as_margin, pose_fault
 from ..solver.motion import Approach, Approaches
-from ..solver.nearest import Nearests
 from ..solver.pose import rotation_matrix
-from .rides import Course, Rides, Surroundings, turns_between
 from .scene import Pair, Scene
 
 TOLERANCE = 1e-6  # of distances [m]
 LEAST_COSINE = 1e-9
 """Of half the turn on a segment: below, it has two ways. That of core/src/motion/turn.hpp."""
-PARTING_ANGLE = 0.02
-"""Turn [rad] after which boxes that begin within the clearance are looked at once more."""
-DEEPER = 1e-4
-"""How deep boxes that begin within the clearance may get into each other, or deeper [m]."""
-MOST_RIDES = 1000
-"""That a search for the least distance takes at first."""
-SOLVED = 2048
-"""Rides that one step solves: in some milliseconds."""
+WORK = 256
+"""Looks of a step: a millisecond."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,180 +90,63 @@ def as_path(value: Any, names: Sequence[str], what: str = 'poses') -> np.ndarray
     bad = native.pose_faults(np.ascontiguousarray(path.reshape(-1, 7))) != 0
     for k, row in np.argwhere(bad.reshape(absent.shape) & ~absent)[:1]:
         raise ValueError(f'{what}[{k}] of {names[row]}: {pose_fault(path[k, row])}')
-    half_turns = turns_between(path)[1] > math.pi - 2.0 * LEAST_COSINE
-    for k, row in np.argwhere(half_turns)[:1]:
+    turns = path[..., 3:] / np.linalg.norm(path[..., 3:], axis=-1, keepdims=True)
+    cosines = np.abs(np.einsum('kij,kij->ki', turns[:-1], turns[1:]))
+    for k, row in np.argwhere(cosines < LEAST_COSINE)[:1]:
         raise ValueError(f'{what}[{k}] to {what}[{k + 1}] of {names[row]}: a turn by 180 degrees '
                          'has two ways: give a pose between')
     return path
 
 
-def course_of(scene: Scene, standing: np.ndarray, path: np.ndarray, around: Surroundings,
-              ) -> Course:
-    """Return the course of a scene.
-
-    standing: poses (n, 7) of boxes, of which those of fixed boxes are read.
-    path: poses (m, k, 7) of `scene.moving`, checked.
-    around: of the fixed boxes.
-    """
-    is_here = ~absent_poses(path[0])
-    rows = np.array([scene.row_of[name] for name in scene.moving], np.int64)[is_here]
-    group, allowed = scene.groups
-    return Course(scene.sizes, np.where(scene.is_fixed[:, None], standing, np.nan),
-                  *moved_boxes(scene, rows, path[:, is_here]), scene.rigid, scene.rows, group,
-                  allowed, around, np.flatnonzero(scene.is_fixed))
-
-
-def moved_boxes(scene: Scene, rows: np.ndarray, path: np.ndarray,
-                ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the boxes (l,) that move, their poses (m, l, 7) and centres of turning (l, 3).
-
-    rows: (k,) of boxes and bodies, by `scene.row_of`. path: their poses (m, k, 7).
-    """
+def boxes_of(scene: Scene, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the boxes (n,) that boxes and bodies (k,), by `scene.row_of`, move, and by which."""
     count = len(scene.boxes)
-    column = np.full(count + len(scene.bodies), -1)
-    column[rows] = np.arange(len(rows))
-    of_box = np.where(scene.body_of < 0, np.arange(count), count + scene.body_of)
-    boxes = np.flatnonzero(column[of_box] >= 0)
-    body_rows, local = scene.placement
-    of_body = body_rows[boxes] >= 0
-    poses, centres = path[:, column[of_box[boxes]]], np.zeros((len(boxes), 3))
-    if of_body.any():
+    mover = np.full(count + len(scene.bodies), -1)
+    mover[rows] = np.arange(len(rows))
+    of = mover[np.where(scene.body_of < 0, np.arange(count), count + scene.body_of)]
+    boxes = np.flatnonzero(of >= 0)
+    return boxes, of[boxes]
+
+
+def moved_boxes(scene: Scene, numbers: np.ndarray, of: np.ndarray, path: np.ndarray,
+                ) -> tuple[np.ndarray, np.ndarray]:
+    """Return the poses (m, n, 7) of boxes, and their centres (n, 3) of turning, in their frames.
+
+    numbers (n,): indices in the scene, or guests behind. of (n,): which of the poses (m, k, 7)
+    moves each.
+    """
+    poses, centres = path[:, of], np.zeros((len(numbers), 3))
+    is_part = numbers < len(scene.boxes)
+    is_part[is_part] = scene.body_of[numbers[is_part]] >= 0
+    if is_part.any():
         # Boxes of all times behind one another, and then their bodies.
-        parts, bases = local[boxes[of_body]], poses[:, of_body].reshape(-1, 7)
-        places = np.concatenate((np.empty_like(bases), bases))
-        native.place_boxes(places, np.arange(len(bases), 2 * len(bases)),
-                           np.tile(parts, (len(path), 1)))
-        poses[:, of_body] = places[:len(bases)].reshape(len(path), -1, 7)
-        centres[of_body] = -np.einsum('nji,nj->ni', rotation_matrix(parts[:, 3:]), parts[:, :3])
-    return boxes, poses, centres
+        local = scene.box_poses[numbers[is_part]]
+        bodies = poses[:, is_part].reshape(-1, 7)
+        rows = np.concatenate((np.empty_like(bodies), bodies))
+        native.place_boxes(rows, np.arange(len(bodies), 2 * len(bodies)),
+                           np.tile(local, (len(path), 1)))
+        poses[:, is_part] = rows[:len(bodies)].reshape(len(path), -1, 7)
+        centres[is_part] = -np.einsum('nji,nj->ni', rotation_matrix(local[:, 3:]), local[:, :3])
+    return poses, centres
 
 
-def check_course(course: Course, clearance: float) -> Generator[None, None, Found]:
-    """Return what comes within a clearance [m], and how near all else comes.
+def start(sizes: np.ndarray, path: np.ndarray, centres: np.ndarray, numbers: np.ndarray,
+          around: native.Index, beside: native.Index | None, wanted: native.Filter,
+          clearance: float, *, most_pairs: int = sys.maxsize, most_looks: int = sys.maxsize,
+          ) -> Generator[None, None, Found]:
+    """Return, in steps, what boxes meet that move among those of `around` and `beside`.
 
-    A generator, so that a node can answer ticks between its steps.
+    sizes (n, 3), path (m, n, 7), centres (n, 3) of turning in the boxes' frames. numbers (n,): by
+    which `wanted` knows the boxes. clearance: the distance from which on a pair counts [m].
+    Raises TooMuch, before the work is done, for more pairs within the clearance than `most_pairs`,
+    or more looks at pairs than `most_looks`.
     """
-    rides = Rides(course)
-    radius = as_margin(clearance, 'clearance') + TOLERANCE
-    near, _ = yield from rides.within(radius)
-    pairs = near[near[:, 0] == 0, 1:]
-    held = pairs[rides.at_first(pairs).distance <= radius]
-    near = near[~rides.are_of(near, held)]
-    rides.leave_out(held)
-    impacts = yield from _solved(rides, near, clearance)
-    touches = impacts
-    if clearance and len(near):
-        touches = yield from _solved(rides, near, 0.0)
-    if (rows := _first_rows(near, touches)[:1]).size:
-        least_pair, least = near[rows, 1:], touches[rows]
-    else:
-        least_pair, least = yield from _least(rides, near, radius)
-    parts = [(near, impacts)]
-    for pair, depth in zip(held, rides.depths_at_first(held).tolist()):
-        parts += _after_parting(rides, pair, clearance), _pressed(rides, pair, depth)
-        yield
-    near = np.concatenate([part for part, _ in parts])
-    impacts = _joined([found for _, found in parts])
-    rows = _first_rows(near, impacts)
-    return Found(near[rows, 1:], impacts[rows], held, least_pair, least)
-
-
-def _solved(rides: Rides, near: np.ndarray, clearance: float,
-            ) -> Generator[None, None, Approaches]:
-    """Return the first times of rides within a clearance [m], in steps."""
-    parts = []
-    for first in range(0, max(1, len(near)), SOLVED):
-        parts.append(rides.solve(near[first:first + SOLVED], clearance))
-        yield
-    return _joined(parts)
-
-
-def _first_rows(rides: np.ndarray, found: Approaches) -> np.ndarray:
-    """Return the row of the first time of each pair that has one, in the order of time."""
-    _, a, b = rides.T
-    order = np.lexsort((b, a, found.time))
-    order = order[np.isfinite(found.time[order])]
-    _, first = np.unique(rides[order, 1:], axis=0, return_index=True)
-    return order[np.sort(first)]
-
-
-def _joined(parts: list[Approaches]) -> Approaches:
-    """Return the rows of all parts."""
-    def joined(arrays: list[Any], name: str) -> np.ndarray:
-        return np.concatenate([getattr(array, name) for array in arrays])
-
-    nearest = [part.nearest for part in parts]
-    return Approaches(joined(parts, 'time'), joined(parts, 'closing_speed'), Nearests(*(
-        joined(nearest, name) for name in Nearests.__dataclass_fields__)))
-
-
-def _after_parting(rides: Rides, pair: np.ndarray, clearance: float,
-                   ) -> tuple[np.ndarray, Approaches]:
-    """Return the ride on which a pair first meets, from where it is first apart, and when.
-
-    Apart is farther than the clearance and two tolerances: what is as near as that may be answered.
-    """
-    turns = sum(rides.turns_of(int(box)) for box in pair)
-    looks = 1 + np.ceil(turns / PARTING_ANGLE).astype(np.int64)  # of each segment
-    segments = np.repeat(np.arange(rides.segments), looks)
-    shares = (np.arange(len(segments)) - np.repeat(np.cumsum(looks) - looks, looks) + 1) / (
-        looks[segments])
-    solver = ContactSolver(*rides.course.sizes[pair])
-    seen = solver.distance_batch(*(rides.poses_at(int(box), segments, shares) for box in pair))
-    apart = np.flatnonzero(seen.distance > clearance + 2.0 * TOLERANCE)[:1]
-    begin = int(apart[0]) + 1 if apart.size else len(seen)
-    share = float(shares[begin - 1]) % 1.0 if apart.size else 0.0  # 1: the next segment begins
-    later = np.arange(segments[begin - 1] + (share == 0.0), rides.segments)[:, None]
-    near = np.hstack((later, np.broadcast_to(pair, (len(later), 2))))
-    found = rides.solve(near, clearance, first_from=share)
-    rows = _first_rows(near, found)
-    return near[rows], found[rows]
-
-
-def _pressed(rides: Rides, pair: np.ndarray, depth: float) -> tuple[np.ndarray, Approaches]:
-    """Return the ride on which a pair first gets into each other, and when.
-
-    depth: of the pair at the first pose [m]. Boxes that are smaller by so much, and by DEEPER, are
-    apart there. Where one is not as thick as that, it is not known what is deeper.
-    """
-    near = np.column_stack((np.arange(rides.segments), np.tile(pair, (rides.segments, 1))))
-    found = rides.solve(near, 0.0, smaller=depth + DEEPER)
-    rows = _first_rows(near, found)
-    rows = rows[found.time[rows] > 0.0]
-    near, found = near[rows], found[rows]
-    places = (rides.poses_at(int(box), near[:, 0], found.time - near[:, 0]) for box in pair)
-    return near, replace(found, nearest=ContactSolver(*rides.course.sizes[pair]).distance_batch(
-        *places))
-
-
-def _least(rides: Rides, near: np.ndarray, radius: float,
-           ) -> Generator[None, None, tuple[np.ndarray, Approaches]]:
-    """Return the pair (1, 2) that comes nearest, and how near, of boxes that do not touch.
-
-    near: the rides whose bounding boxes are within a radius [m]. The radius grows
-    until a ride is found, and then to its distance: nothing beyond it is nearer.
-    """
-    best = near[:0, 1:], rides.solve(near[:0], None)
-    bound, most, is_all = np.inf, MOST_RIDES, True
-    while True:
-        gaps = rides.gaps(near)
-        order = np.argsort(gaps, kind='stable')
-        first, size = 0, 8
-        while first < len(order):
-            rows = order[first:first + size]
-            asked = near[rows[gaps[rows] < bound - TOLERANCE]]
-            if np.isfinite(bound) and len(asked):  # few of them come nearer, and this takes less
-                asked = asked[np.isfinite(rides.solve(asked, bound - TOLERANCE).time)]
-            if len(asked):
-                found = rides.solve(asked, None)
-                row = int(np.argmin(found.nearest.distance))
-                if found.nearest.distance[row] < bound:
-                    bound, best = found.nearest.distance[row], (
-                        asked[row:row + 1, 1:], found[row:row + 1])
-            first, size = first + size, min(4 * size, SOLVED)
+    made = native.Path(sizes, path, centres if centres.any() else None, numbers, around, beside,
+                       wanted, as_margin(clearance, 'clearance'), TOLERANCE, most_pairs, most_looks)
+    try:
+        while not made.advance(WORK):
             yield
-        if is_all and (bound - TOLERANCE <= radius or radius > rides.farthest):
-            return best
-        most *= 1 if is_all else 4
-        radius = min(bound - TOLERANCE, max(4.0 * radius, rides.step))
-        near, is_all = yield from rides.within(radius, most)
+    except OverflowError as error:
+        raise TooMuch(f'clearance: {error}') from None
+    (pairs, *impacts), at_start, (least_pair, *least) = made.found()
+    return Found(pairs, Approaches(*impacts), at_start, least_pair, Approaches(*least))

@@ -163,35 +163,6 @@ class Pair(NamedTuple):
         return cls(f'{a}_{b}', a, b)
 
 
-class Places(NamedTuple):
-    """In which order boxes came first, also those that are gone."""
-
-    numbers: np.ndarray  # (n,) of the boxes of a scene, ascending
-    next: int
-    former: Mapping[str, int]
-    """Numbers of the last MOST_BOXES boxes that went, by name."""
-
-    def changed(self, gone: Sequence[int], gone_names: Sequence[str], added: Sequence[str],
-                ) -> tuple[np.ndarray | None, Places]:
-        """Return the order (n,) of the boxes that stay and then of those added; None: as they are.
-
-        gone: indices of boxes; gone_names: their names.
-        """
-        if not gone and self.former.keys().isdisjoint(added):
-            numbers = np.arange(self.next, self.next + len(added))
-            return None, Places(np.concatenate((self.numbers, numbers)), self.next + len(added),
-                                self.former)
-        former, following = dict(self.former), count(self.next)
-        came = [former.pop(name) if name in former else next(following) for name in added]
-        former.update(zip(gone_names, self.numbers[gone].tolist()))
-        for name in list(former)[:max(0, len(former) - MOST_BOXES)]:
-            del former[name]
-        numbers = np.concatenate((np.delete(self.numbers, gone), np.array(came, np.int64)))
-        order = np.argsort(numbers)
-        is_sorted = bool((order[1:] > order[:-1]).all())
-        return None if is_sorted else order, Places(numbers[order], next(following), former)
-
-
 Pattern = tuple[str, str]
 """Names of the boxes or bodies a and b of some pairs, with `*`, `?` and `[..]`."""
 
@@ -201,8 +172,8 @@ class Scene:
     """Boxes by name, and which pairs matter. Raises SceneError for what cannot be computed.
 
     A pattern asks for all pairs of two boxes that it matches and that move against each other. The
-    name of a body stands for all its boxes. If both sides match both boxes, a is the one that comes
-    first in the scene.
+    name of a body stands for all its boxes. If both sides match both boxes, a is the one whose name
+    comes first, by the bytes of UTF-8.
     """
 
     boxes: Mapping[str, Box]
@@ -238,13 +209,17 @@ class Scene:
         """Whether one message has the poses of all that moves; else each has a topic."""
         return self.poses != 'topics'
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Pickle all but the core's filter, which is made again."""
+        return {key: value for key, value in vars(self).items() if key != 'filter'}
+
     def changed(self, changes: Mapping[str, Box | None], frames: Mapping[str, Frame | None],
                 ) -> tuple[Scene, np.ndarray]:
         """Return the scene in which boxes are new, or replaced where they are, or gone (None).
 
         frames: the same of bodies.
-        New boxes come last, but one that comes back has its former place. Patterns may match no box
-        then. Returns also the index (n,) of each box in this scene, -1 where pose or size differ.
+        New boxes come last. Patterns may match no box then. Returns also the index (n,) of each box
+        in this scene, -1 where pose or size differ.
         Raises SceneError for a listed pair whose boxes no longer move against each other. The time
         goes into copies: only what changes is looked at.
         """
@@ -262,17 +237,10 @@ class Scene:
         source[[self.index_of[name] for name in given if name in self.boxes]] = (
             len(source) + np.flatnonzero(~is_new))
         source = np.concatenate((np.delete(source, gone), len(source) + np.flatnonzero(is_new)))
-        order, places = self._places.changed(
-            gone, [self.names[index] for index in gone],
-            [name for name in given if name not in self.boxes])
-        if order is not None:
-            names, source = list(boxes), source[order]
-            boxes = {names[index]: boxes[names[index]] for index in order.tolist()}
         scene = self._with(boxes, bodies)
-        vars(scene)['_places'] = places
         kept = self._keep_arrays(scene, part, source)
         self._keep_groups(scene, part, source)
-        if not gone and order is None:
+        if not gone:
             added = tuple(name for name in given if name not in self.boxes)
             vars(scene)['names'] = self.names + added
             index_of = vars(scene)['index_of'] = dict(self.index_of)
@@ -336,10 +304,6 @@ class Scene:
         vars(scene).update({key: getattr(self, key) for key in self.__dataclass_fields__},
                            boxes=boxes, bodies=bodies)
         return scene
-
-    @cached_property
-    def _places(self) -> Places:
-        return Places(np.arange(len(self.boxes)), len(self.boxes), {})
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -435,19 +399,26 @@ class Scene:
 
     @cached_property
     def groups(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the group of each box (n,), and which groups meet by patterns (g, g): 0, 1 or 2.
+        """Return the group of each box (n,), and by two groups which of them may be box a (g, g).
 
-        The rows of the latter are the group of the box that comes first in the scene. 1: it is
-        box a. 2: it is box b. Boxes of a group match the same sides of the same patterns.
+        Bit 0: the first, bit 1: the other, by the first pattern that asks for them. Boxes of a
+        group match the same sides of the same patterns.
         """
         kinds, group = self._kinds
         if not self.patterns:
             return group, np.zeros((0, 0), np.uint8)
         allowed = np.zeros((len(kinds), len(kinds)), np.uint8)
         for a, b in zip(kinds.T[::2], kinds.T[1::2]):
-            asked = a[:, None] & b
-            allowed = np.where(allowed, allowed, np.where(asked, 1, 2 * asked.T))
-        return group, allowed.astype(np.uint8)
+            asked = (a[:, None] & b).astype(np.uint8)
+            allowed = np.where(allowed, allowed, asked | asked.T << 1)
+        return group, allowed
+
+    @cached_property
+    def filter(self) -> native.Filter:
+        """Return which pairs the scene has, and which box is a; it takes no box for fixed."""
+        order = np.empty(len(self.boxes), np.int32)
+        order[np.argsort(np.array(self.names, object), kind='stable')] = np.arange(len(order))
+        return native.Filter(self.rows, *self.groups, self.body_of, order)
 
     @cached_property
     def sides(self) -> np.ndarray:
@@ -477,9 +448,8 @@ class Scene:
 
     def has_pair(self, a: int, b: int) -> bool:
         """Return whether boxes a and b, by index, are a pair in this order."""
-        group, allowed = self.groups
-        return (a, b) in self._listed or bool(self.patterns and self.rigid[a] != self.rigid[b] and (
-            allowed[group[min(a, b)], group[max(a, b)]] == (1 if a < b else 2)))
+        return (a, b) in self._listed or bool(
+            self.rigid[a] != self.rigid[b] and self.filter.sides(np.array([(a, b)]))[0] == 1)
 
     @property
     def is_matched(self) -> np.ndarray:

@@ -3,8 +3,8 @@
 
 """What one tick of a scene computes.
 
-A broad phase in the core finds the pairs whose bounding boxes meet. These go through the solver as
-one batch. An answer is arrays, in which a box is its index in the scene. Names are made where
+`Movers` of the core find the pairs whose bounding boxes meet. These go through the solver as one
+batch. An answer is arrays, in which a box is its index in the scene. Names are made where
 somebody asks for them.
 """
 from __future__ import annotations
@@ -17,15 +17,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import native
-from ..solver.checks import as_floats, as_margin, as_whole, short_repr
+from ..solver.checks import absent_poses, as_floats, as_margin, as_whole, short_repr
 from ..solver.contact import Contact, Contacts
 from ..solver.contact_solver import ContactSolver
 from ..solver.contacts_of import find_contacts, touching_and_near
 from ..solver.model import Model
 from ..solver.nearest import Nearest, Nearests
 from .changes import checked_changes
-from .path import PathCheck, as_path, check_course, course_of
-from .rides import Surroundings
+from .path import PathCheck, as_path, boxes_of, moved_boxes, start
 from .scene import NOWHERE, Box, Frame, Pair, Scene
 
 NO_BODIES = np.zeros(0, np.int64)
@@ -41,7 +40,7 @@ class Answer(NamedTuple):
     near_pairs: np.ndarray
     """(l, 2) pairs apart whose distance is at most the solver's margin, in the same order."""
     near: Nearests  # (l,) their nearest points
-    candidates: int  # how many pairs the broad phase left to the solver
+    candidates: int  # how many pairs bounding boxes left to the solver
     stale: np.ndarray
     """(m, 2) boxes of the listed pairs that could not be evaluated, because one has no pose that is
     recent enough. (box, ALONE): all pairs of a box that patterns ask for."""
@@ -75,14 +74,18 @@ class _Revision(NamedTuple):
     number: int
     rows: np.ndarray  # (m, 7) poses of boxes and of bodies
     moving_rows: np.ndarray  # (l,) of what moves
-    broad_phase: native.BroadPhase
+    fixed: native.Index
+    movers: native.Movers
 
     @classmethod
-    def of(cls, scene: Scene, number: int, margin: float) -> _Revision:
-        """Begin without poses."""
+    def of(cls, scene: Scene, number: int, margin: float, *, former: native.Index | None = None,
+           kept: np.ndarray | None = None) -> _Revision:
+        """Begin without poses; kept (n,): indices of boxes in the index of the former revision."""
+        rows = scene.fixed_poses()
+        index = native.Index(scene.sizes, rows[:len(scene.boxes)], former, kept)
         moving_rows = np.array([scene.row_of[name] for name in scene.moving], np.int64)
-        return cls(scene, number, scene.fixed_poses(), moving_rows, native.BroadPhase(
-            scene.sizes, scene.is_fixed, margin, scene.rows, *scene.groups, scene.body_of))
+        return cls(scene, number, rows, moving_rows, index,
+                   native.Movers(scene.sizes, margin, scene.filter, index))
 
     @property
     def poses(self) -> np.ndarray:
@@ -111,7 +114,6 @@ class SceneSolver:
         self.model = model
         self._solver = ContactSolver(model=model, margin=self.margin)
         self._at = _Revision.of(scene, 0, self.margin)
-        self._around: tuple[_Revision, Surroundings] | None = None
         self._refuse_sizes(*(np.unique(sizes, axis=0)
                              for sizes in (scene.sizes, scene.sizes[scene.rows].reshape(-1, 6))))
         self([None] * len(self.moving))
@@ -145,13 +147,12 @@ class SceneSolver:
         yield
         scene, kept = self.scene.changed(*changes)
         yield
-        later = _Revision.of(scene, self.revision + 1, self.margin)
+        later = _Revision.of(scene, self.revision + 1, self.margin, former=self._at.fixed,
+                             kept=kept)
         yield
-        later.broad_phase.take_fixed(self._at.broad_phase, kept)
         solver = object.__new__(SceneSolver)
         solver.model, solver.margin, solver._at = self.model, self.margin, later
         solver._most_near, solver._solver = self._most_near, self._solver
-        solver._around = None
         sizes = np.array([box.size for box in changes.boxes.values() if box is not None])
         listed = ([] if scene.listed_names.isdisjoint(changes.boxes) else
                   scene.sizes[scene.rows])
@@ -209,7 +210,7 @@ class SceneSolver:
         if self.scene.bodies:
             self.scene.place_boxes(self._at.rows)
         pairs, contacts, stale = find_contacts(
-            self._at.broad_phase, self._solver, self.scene.sizes, self._at.poses,
+            self._at.movers, self._solver, self.scene.sizes, self._at.poses,
             lambda box: f'pose of {self.scene.names[box]}:', most_near=self._most_near)
         found = touching_and_near(pairs, contacts, self._solver, self.scene.sizes, self._at.poses,
                                   self.margin)
@@ -227,26 +228,28 @@ class SceneSolver:
         is at most 1e-6 m more. The pairs are those of a tick. Nothing of a tick changes.
         Raises ValueError for what is not a path, and for a turn by 180 degrees, which has two ways.
         """
-        at = self._at
-        course = course_of(at.scene, at.poses, as_path(poses, self.moving), self.around)
-        return PathCheck.of(finished(check_course(course, clearance)), at.scene, at.number)
+        at, scene = self._at, self.scene
+        path = as_path(poses, self.moving)
+        is_here = ~absent_poses(path[0])
+        boxes, of = boxes_of(scene, at.moving_rows[is_here])
+        box_poses, centres = moved_boxes(scene, boxes, of, path[:, is_here])
+        steps = start(scene.sizes[boxes], box_poses, centres, boxes, at.fixed, None, scene.filter,
+                      clearance)
+        return PathCheck.of(finished(steps), scene, at.number)
 
     @property
-    def around(self) -> Surroundings:
-        """Return the fixed boxes, as paths ask for them."""
-        if self._around is None or self._around[0] is not self._at:
-            fixed = self.scene.is_fixed
-            self._around = self._at, Surroundings(self.scene.sizes[fixed], self._at.poses[fixed])
-        return self._around[1]
+    def index(self) -> native.Index:
+        """Return the index of the fixed boxes."""
+        return self._at.fixed
 
-    def _parts(self) -> tuple[native.BroadPhase, ContactSolver, float, int, np.ndarray, np.ndarray,
+    def _parts(self) -> tuple[native.Movers, ContactSolver, float, int, np.ndarray, np.ndarray,
                               np.ndarray, np.ndarray, np.ndarray]:
         """Return what native.TickWriter answers ticks of the scene by: its first nine arguments."""
         at, scene, solver, sizes = self._at, self.scene, self._solver, self.scene.sizes
         if (sizes[1:] == sizes[:-1]).all():  # model `paper` is in C++ for boxes of one size
             solver = ContactSolver(sizes[0], sizes[0], model=self.model, margin=self.margin)
         bodies = scene.placement if scene.bodies else (NO_BODIES, at.rows[:0])
-        return (at.broad_phase, solver, self.margin, self._most_near, sizes, at.rows,
+        return (at.movers, solver, self.margin, self._most_near, sizes, at.rows,
                 at.moving_rows, *bodies)
 
     def _set_poses(self, poses: Sequence[np.ndarray | None] | ArrayLike) -> None:

@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Which of many boxes touch: a broad phase in the core, then the solver.
+"""Which of many boxes touch: bounding boxes in the core, then the solver.
 
 `contacts_of` asks once, about any boxes. A `SceneSolver` asks at each tick, about the same ones.
 """
@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -79,24 +79,27 @@ def contacts_of(sizes: ArrayLike, poses: ArrayLike, pairs: ArrayLike | None = No
     if (alone := np.flatnonzero(listed[:, 0] == listed[:, 1])).size:
         raise ValueError(f'pairs[{alone[0]}] is box {listed[alone[0], 0]} with itself')
     tolerances = as_tolerances(tolerance, sizes)
-    meet = np.array([[to is None, True], [False, False]], np.uint8)  # by the sets of both boxes
-    sets = min(1 + (to is not None), count) if pairs is None else 0
-    of_set = np.minimum(np.arange(count) >= first, max(0, sets - 1)).astype(np.int32)
-    broad_phase = native.BroadPhase(
-        sizes + tolerances[:, None], _as_flags(fixed, 'fixed', count), margin, listed, of_set,
-        meet[:sets, :sets].copy(), np.full(count, -1, np.int32))
-    near, contacts = _contacts_of_near(broad_phase, sizes, poses, margin, tolerances, most_near,
-                                       threads)
+    sets = 0 if pairs is not None else 1 + (to is not None)
+    # By the sets of two boxes: of one set, the first is A; of two, that of the first set.
+    sides = np.array([[0, 1], [2, 0]] if to is not None else [[3]], np.uint8)
+    of_set = (np.arange(count) >= first).astype(np.int32)
+    wanted = native.Filter(listed, of_set, sides[:sets, :sets].copy(), np.full(count, -1, np.int32),
+                           np.arange(count, dtype=np.int32))
+    grown = sizes + tolerances[:, None] + margin
+    flags = _as_flags(fixed, 'fixed', count)
+    index = native.Index(grown, np.where(flags[:, None], poses, np.nan)) if flags.any() else None
+    near, contacts = _contacts_of_near(native.Movers(grown, 0.0, wanted, index), sizes, poses,
+                                       margin, tolerances, most_near, threads)
     return near - [0, 0 if to is None else first], contacts
 
 
-def _contacts_of_near(broad_phase: native.BroadPhase, sizes: np.ndarray, poses: np.ndarray,
+def _contacts_of_near(movers: native.Movers, sizes: np.ndarray, poses: np.ndarray,
                       margin: float, tolerances: np.ndarray, most_near: int, threads: int,
                       ) -> tuple[np.ndarray, Contacts]:
     """Return the pairs (k, 2) that touch, up to their tolerance, or are within the margin."""
     grown = sizes + tolerances[:, None]
     solver = ContactSolver(margin=margin)
-    near, contacts, _ = find_contacts(broad_phase, solver, grown, poses, 'poses[{}]'.format,
+    near, contacts, _ = find_contacts(movers, solver, grown, poses, 'poses[{}]'.format,
                                       most_near=most_near, threads=threads)
     near, contacts = in_contact(near, contacts, margin)
     if not tolerances.any():
@@ -131,7 +134,7 @@ def _as_flags(value: ArrayLike | None, name: str, count: int) -> np.ndarray:
                      f'{short_repr(value)}')
 
 
-def find_contacts(broad_phase: native.BroadPhase, solver: ContactSolver, sizes: np.ndarray,
+def find_contacts(movers: native.Movers, solver: ContactSolver, sizes: np.ndarray,
                   poses: np.ndarray, name_of: Callable[[int], str], *,
                   most_near: int = sys.maxsize, threads: int = 1,
                   ) -> tuple[np.ndarray, Contacts, np.ndarray]:
@@ -140,7 +143,7 @@ def find_contacts(broad_phase: native.BroadPhase, solver: ContactSolver, sizes: 
     name_of: what a refusal calls the pose of a box.
     Raises TooManyNear for more than `most_near` pairs, and ValueError for a bad pose.
     """
-    pairs, stale, refused = broad_phase.find(poses, most_near)
+    pairs, stale, refused = movers.find(poses, most_near)
     if refused >= 0:
         raise ValueError(f'{name_of(refused)} {pose_fault(poses[refused])}')
     if len(pairs) > most_near:
@@ -157,6 +160,17 @@ def in_contact(pairs: np.ndarray, contacts: Contacts, margin: float = 0.0,
     if margin:
         rows = rows[np.argsort(~contacts.colliding[rows], kind='stable')]
     return pairs[rows], contacts[rows]
+
+
+def joined(parts: list[Found]) -> Found:
+    """Return the rows of all parts, which are not none."""
+    def rows(values: list[Any]) -> Any:
+        if isinstance(values[0], np.ndarray):
+            return np.concatenate(values)
+        return type(values[0])(**{name: rows([getattr(value, name) for value in values])
+                                  for name in values[0].__dataclass_fields__})
+
+    return parts[0] if len(parts) == 1 else Found(*map(rows, map(list, zip(*parts))))
 
 
 def touching_and_near(pairs: np.ndarray, contacts: Contacts, solver: ContactSolver,

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "box_contact/box_contact.h"
-#include "box_contact/broad_phase.h"
+#include "box_contact/index.h"
 
 static int failures = 0;
 
@@ -245,95 +245,154 @@ static void check_refusals(void) {
   check(bc_collide(&a, &a, &query, &contact) == BC_BAD_ABI, "another query");
 }
 
-/* A tower of 100 cubes: each is near the next one, and bc_collide_rows takes the pairs. */
-static void check_broad_phase(void) {
-  enum { count = 100 };
-  static bc_size sizes[count];
-  static bc_pose poses[count];
-  static bool colliding[count];
-  for (int k = 0; k < count; ++k) {
+enum { floors = 100 };
+
+/* A tower of cubes, from the ground up. */
+static void build_tower(bc_size* sizes, bc_pose* poses) {
+  for (int k = 0; k < floors; ++k) {
     bc_box box = cube_at(1.9 * k);
     sizes[k] = box.size;
     poses[k] = box.pose;
   }
-  bc_boxes boxes = {sizeof boxes, count, sizes, NULL, 0.0, NULL, 0, NULL, 0, NULL, NULL};
-  bc_broad_phase* phase;
+}
+
+/* Each cube is near the next one, and bc_collide_rows takes the pairs. */
+static void check_movers(void) {
+  static bc_size sizes[floors];
+  static bc_pose poses[floors];
+  static bool colliding[floors];
+  build_tower(sizes, poses);
+  bc_movers* movers;
   bc_near near = {sizeof near, NULL, 0, NULL, 0, 0};
-  check(bc_broad_phase_create(&boxes, &phase) == BC_OK, "create a broad phase");
-  check(bc_broad_phase_find(phase, poses, INT64_MAX, &near) == BC_OK, "find");
-  check(near.count == count - 1 && near.refused == -1 && near.stale_count == 0, "neighbours");
+  check(bc_movers_create(sizes, floors, 0.0, NULL, NULL, &movers) == BC_OK, "create movers");
+  check(bc_movers_find(movers, poses, INT64_MAX, &near) == BC_OK, "find");
+  check(near.count == floors - 1 && near.refused == -1 && near.stale_count == 0, "neighbours");
   for (int64_t k = 0; k < near.count; ++k)
     check(near.pairs[2 * k] == k && near.pairs[2 * k + 1] == k + 1, "a neighbour");
-  bc_rows rows = {sizeof rows, near.count, count, poses, poses, sizes, sizes, count, count,
+  bc_rows rows = {sizeof rows, near.count, floors, poses, poses, sizes, sizes, floors, floors,
                   near.pairs};
   bc_results results = {sizeof results, colliding, NULL, NULL, NULL, NULL, NULL, NULL};
   check(bc_collide_rows(&rows, NULL, &results, 1, NULL) == BC_OK, "solve what is near");
   for (int64_t k = 0; k < near.count; ++k) check(colliding[k], "a contact");
 
-  bc_size slim = {{0.1, 0.1, 0.1}}, flat = {{1.0, 0.0, 1.0}};
-  check(bc_broad_phase_resize(phase, 50, &slim) == BC_OK, "another size");
-  check(bc_broad_phase_find(phase, poses, INT64_MAX, &near) == BC_OK, "find with it");
-  check(near.count == count - 3, "no neighbour of a slim cube");
-  check(bc_broad_phase_resize(phase, 50, &flat) == BC_BAD_SIZE, "a bad size");
-  check(bc_broad_phase_resize(phase, count, &slim) == BC_BAD_ROWS, "a size of no box");
-  check(bc_broad_phase_resize(phase, 0, NULL) == BC_BAD_ARGUMENT, "no size");
-
   poses[7].quaternion[3] = 0.0;
-  check(bc_broad_phase_find(phase, poses, INT64_MAX, &near) == BC_BAD_POSE, "a bad pose");
+  check(bc_movers_find(movers, poses, INT64_MAX, &near) == BC_BAD_POSE, "a bad pose");
   check(near.refused == 7 && strstr(bc_error_text(), "pose of box 7"), "which box");
   near.size = 1;
-  check(bc_broad_phase_find(phase, poses, INT64_MAX, &near) == BC_BAD_ABI, "another header");
-  check(bc_broad_phase_find(phase, NULL, 1, NULL) == BC_BAD_ARGUMENT, "no room for an answer");
-  bc_broad_phase_destroy(phase);
-
-  static int32_t bodies[count]; /* the whole tower is one body */
-  boxes.bodies = bodies;
-  near.size = sizeof near;
-  poses[7] = poses[6];
-  check(bc_broad_phase_create(&boxes, &phase) == BC_OK, "one body");
-  check(bc_broad_phase_find(phase, poses, INT64_MAX, &near) == BC_OK && near.count == 0,
-        "boxes of one body are no pair");
-  bc_broad_phase_destroy(phase);
-  boxes.bodies = NULL;
-
-  int64_t outside[2] = {0, count};
-  boxes.listed = outside;
-  boxes.listed_count = 1;
-  check(bc_broad_phase_create(&boxes, &phase) == BC_BAD_ROWS && !phase, "a box that is not there");
-  bc_broad_phase_destroy(NULL);
+  check(bc_movers_find(movers, poses, INT64_MAX, &near) == BC_BAD_ABI, "another header");
+  check(bc_movers_find(movers, NULL, 1, NULL) == BC_BAD_ARGUMENT, "no room for an answer");
+  bc_movers_destroy(movers);
+  sizes[3].extent[0] = 0.0;
+  check(bc_movers_create(sizes, floors, 0.0, NULL, NULL, &movers) == BC_BAD_SIZE, "a bad size");
+  check(!movers && strstr(bc_error_text(), "sizes[3]"), "whose size");
+  bc_movers_destroy(NULL);
 }
 
-/* A fixed tower whose lowest cube goes: a cube that moves meets the two that it met before. */
-static void check_fixed_that_stay(void) {
-  enum { count = 100 };
-  static bc_size sizes[count];
-  static bc_pose poses[count];
-  static bool fixed[count];
-  int64_t kept[count];
-  for (int k = 0; k < count; ++k) {
-    bc_box box = cube_at(1.9 * (k < count - 1 ? k : 50.5));
-    sizes[k] = box.size;
-    poses[k] = box.pose;
-    fixed[k] = k < count - 1;
-    kept[k] = k < count - 2 ? k + 1 : -1;
-  }
-  bc_boxes boxes = {sizeof boxes, count, sizes, fixed, 0.0, NULL, 0, NULL, 0, NULL, NULL};
-  bc_broad_phase *phase, *later;
+/* Boxes of one body are no pair; a listed pair has its own sides, and guests meet all. */
+static void check_filter(void) {
+  static bc_size sizes[floors];
+  static bc_pose poses[floors];
+  static int32_t bodies[floors];
+  build_tower(sizes, poses);
+  bc_filter_rows rows = {sizeof rows, floors, NULL, 0, NULL, 0, NULL, bodies, NULL};
+  bc_filter* filter;
+  bc_movers* movers;
   bc_near near = {sizeof near, NULL, 0, NULL, 0, 0};
-  check(bc_broad_phase_create(&boxes, &phase) == BC_OK, "create a fixed tower");
-  check(bc_broad_phase_find(phase, poses, INT64_MAX, &near) == BC_OK && near.count == 2, "find");
-  --boxes.count;
-  fixed[count - 2] = false;
-  poses[count - 2] = poses[count - 1];
-  check(bc_broad_phase_create(&boxes, &later) == BC_OK, "create the later one");
-  check(bc_broad_phase_take_fixed(later, phase, kept) == BC_OK, "take over");
-  check(bc_broad_phase_find(later, poses, INT64_MAX, &near) == BC_OK && near.count == 2, "again");
-  check(near.pairs[0] == 49 && near.pairs[2] == 50, "the same cubes by other numbers");
-  kept[0] = count;
-  check(bc_broad_phase_take_fixed(later, phase, kept) == BC_BAD_ROWS, "no box of the former");
-  check(bc_broad_phase_take_fixed(later, NULL, kept) == BC_BAD_ARGUMENT, "no former one");
-  bc_broad_phase_destroy(phase);
-  bc_broad_phase_destroy(later);
+  check(bc_filter_create(&rows, &filter) == BC_OK, "a tower that is one body");
+  check(bc_movers_create(sizes, floors, 0.0, filter, NULL, &movers) == BC_OK, "movers of it");
+  check(bc_movers_find(movers, poses, INT64_MAX, &near) == BC_OK && near.count == 0, "no pair");
+  bc_movers_destroy(movers);
+  bc_filter_destroy(filter);
+
+  int64_t listed[] = {8, 7}, asked[] = {7, 8, 8, 7, 5, 6, floors, 6, 6, floors + 1};
+  uint8_t sides[5], expected[] = {6, 5, 0, 1, 2};
+  rows.bodies = NULL, rows.listed = listed, rows.listed_count = 1;
+  check(bc_filter_create(&rows, &filter) == BC_OK, "a listed pair alone");
+  check(bc_filter_sides(filter, asked, 5, sides) == BC_OK, "sides");
+  check(memcmp(sides, expected, sizeof sides) == 0, "listed, unasked, guests");
+  check(bc_movers_create(sizes, floors - 1, 0.0, filter, NULL, &movers) == BC_BAD_ARGUMENT,
+        "a filter of other boxes");
+  bc_filter_destroy(filter);
+  listed[1] = floors;
+  check(bc_filter_create(&rows, &filter) == BC_BAD_ROWS && !filter, "a box that is not there");
+}
+
+/* A standing tower whose lowest cube goes: a cube beside it is near the two that it was near before. */
+static void check_index(void) {
+  static bc_size sizes[floors];
+  static bc_pose poses[floors];
+  int64_t kept[floors], pairs[8], found = 0;
+  build_tower(sizes, poses);
+  for (int k = 0; k < floors; ++k) kept[k] = k + 1;
+  bc_box cube = cube_at(1.9 * 50.5);
+  bc_index *index, *later;
+  check(bc_index_create(sizes, poses, floors, &index) == BC_OK, "an index");
+  check(bc_index_near(index, &cube.size, &cube.pose, 1, 0.0, pairs, 4, &found) == BC_OK, "near");
+  check(found == 2 && pairs[1] + pairs[3] == 101, "two cubes");
+  check(bc_index_near(index, &cube.size, &cube.pose, 1, 50.0, pairs, 4, &found) == BC_OK, "far");
+  check(found == 5, "one more than there is room for");
+  check(bc_index_change(index, kept, sizes + 1, poses + 1, floors - 1, &later) == BC_OK, "later");
+  check(bc_index_near(later, &cube.size, &cube.pose, 1, 0.0, pairs, 4, &found) == BC_OK, "again");
+  check(found == 2 && pairs[1] + pairs[3] == 99, "the same cubes by other numbers");
+  bc_index_destroy(later);
+  kept[0] = floors;
+  check(bc_index_change(index, kept, sizes, poses, floors, &later) == BC_BAD_ROWS, "no such box");
+  check(bc_index_change(NULL, kept, sizes, poses, floors, &later) == BC_BAD_ARGUMENT, "no former");
+  poses[9].position[0] = INFINITY;
+  check(bc_index_create(sizes, poses, floors, &later) == BC_BAD_POSE && !later, "a bad pose");
+  check(strstr(bc_error_text(), "poses[9]") != NULL, "whose pose");
+  bc_index_destroy(index);
+}
+
+/* A cube goes over a tower, comes down on it, and beside it: closed forms. */
+static void check_path(void) {
+  static bc_size sizes[floors];
+  static bc_pose poses[floors];
+  build_tower(sizes, poses);
+  double top = 1.9 * (floors - 1);
+  bc_box start = cube_at(top + 5.0);
+  bc_pose places[] = {start.pose, start.pose};
+  bc_index* tower;
+  bc_path* path;
+  bc_index_create(sizes, poses, floors, &tower);
+  bc_way way = bc_default_way();
+  way.times = 2, way.count = 1, way.sizes = &start.size, way.poses = places, way.around = tower;
+  bc_path_found found = {sizeof found, NULL, 0, NULL, 0, NULL};
+  bool is_done = false;
+  places[1].position[2] = top + 3.0;
+  check(bc_path_create(&way, &path) == BC_OK, "a path down");
+  if (!path) return; /* the environment names no instruction set */
+  int steps = 0;
+  while (!is_done && bc_path_advance(path, 1, &is_done) == BC_OK) ++steps;
+  check(bc_path_read(path, &found) == BC_OK && is_done && steps > 2, "what it found");
+  check(found.impact_count == 0 && found.held_count == 0, "no impact");
+  check(found.least && found.least->b == floors - 1 && found.least->a == floors, "the nearest");
+  check(fabs(found.least->approach.nearest.distance - 1.0) < 2e-6, "how near");
+  bc_path_destroy(path);
+
+  places[1].position[2] = top + 1.0; /* it touches at three quarters */
+  check(bc_path_create(&way, &path) == BC_OK, "a path farther down");
+  check(bc_path_advance(path, INT64_MAX, &is_done) == BC_OK && is_done, "at once");
+  check(bc_path_read(path, &found) == BC_OK && found.impact_count == 1, "an impact");
+  check(fabs(found.impacts[0].approach.time - 0.75) < 1e-6, "when");
+  check(fabs(found.impacts[0].approach.closing_speed - 4.0) < 1e-6, "how fast");
+  bc_path_destroy(path);
+
+  way.clearance = 40.0, way.most_pairs = 10;
+  check(bc_path_create(&way, &path) == BC_OK, "a path of many pairs");
+  check(bc_path_advance(path, INT64_MAX, &is_done) == BC_TOO_MUCH, "too many");
+  check(strstr(bc_error_text(), "more than 10 pairs") != NULL, "how many");
+  bc_path_destroy(path);
+  way.clearance = 4.0, way.most_pairs = INT64_MAX, way.most_looks = 1;
+  check(bc_path_create(&way, &path) == BC_OK, "a path of many looks");
+  check(bc_path_advance(path, INT64_MAX, &is_done) == BC_TOO_MUCH, "too many looks");
+  bc_path_destroy(path);
+
+  places[1].quaternion[0] = 1.0, places[1].quaternion[3] = 0.0;
+  check(bc_path_create(&way, &path) == BC_BAD_POSE && !path, "half a turn");
+  way.times = 1;
+  check(bc_path_create(&way, &path) == BC_BAD_ARGUMENT, "one pose");
+  bc_index_destroy(tower);
 }
 
 int main(void) {
@@ -343,8 +402,10 @@ int main(void) {
   check_distances();
   check_motion();
   check_face_patches();
-  check_broad_phase();
-  check_fixed_that_stay();
+  check_movers();
+  check_filter();
+  check_index();
+  check_path();
   check_refusals();
   printf("%s, %s: %d failures\n", bc_version(), bc_instruction_set(), failures);
   return failures != 0;

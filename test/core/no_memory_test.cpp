@@ -3,14 +3,16 @@
 
 // Where memory ends in a call, the call says so. Repeated with memory, it answers as if nothing had been.
 #include <climits>
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <vector>
 
 #include "allocations.hpp"
-#include "box_contact/broad_phase.h"
 #include "box_contact/force.h"
+#include "box_contact/index.h"
 
 namespace {
 
@@ -56,42 +58,61 @@ void keep(const bc_near& near, Calls& calls) {
   calls.keep(near.stale, 2 * near.stale_count);
 }
 
-// A yard of which a third moves; then fixed boxes come, others go, and one gets another size.
+// A yard of which a third moves; then fixed boxes come, and others go; then some go on a path.
 void find_pairs(Calls& calls) {
   std::vector<bc_size> sizes(count, {{1.0, 1.0, 1.0}});
-  std::vector<bc_pose> poses;
-  bool fixed[count];
-  int64_t kept[count], changed[] = {2, 5};
+  std::vector<bc_pose> poses, standing;
+  int64_t kept[count];
   for (int k = 0; k < count; ++k) {
     poses.push_back(pose_at(0.9 * (k % 8), 0.9 * (k / 8), 0.0));
-    fixed[k] = k % 3 > 0;
+    standing.push_back(poses.back());
+    if (k % 3 == 0) std::fill_n(standing.back().position, 7, std::nan(""));
     kept[k] = k % 7 ? k : -1;
   }
-  bc_boxes boxes{};
-  boxes.size = sizeof boxes, boxes.count = count, boxes.sizes = sizes.data(), boxes.fixed = fixed;
-  bc_broad_phase *first = nullptr, *second = nullptr;
+  bc_filter_rows rows{};
+  rows.size = sizeof rows, rows.count = count;
+  bc_filter* filter = nullptr;
+  bc_index *first = nullptr, *second = nullptr;
+  bc_movers *before = nullptr, *after = nullptr;
   bc_near near{};
   near.size = sizeof near;
-  calls([&] { return bc_broad_phase_create(&boxes, &first); });
-  calls([&] { return bc_broad_phase_find(first, poses.data(), INT64_MAX, &near); });
+  calls([&] { return bc_filter_create(&rows, &filter); });
+  calls([&] { return bc_index_create(sizes.data(), standing.data(), count, &first); });
+  calls([&] { return bc_movers_create(sizes.data(), count, 0.0, filter, first, &before); });
+  calls([&] { return bc_movers_find(before, poses.data(), INT64_MAX, &near); });
   keep(near, calls);
   for (int k = 0; k < count; k += 3) poses[size_t(k)].position[0] += 3.0;
-  calls([&] { return bc_broad_phase_find(first, poses.data(), INT64_MAX, &near); });
+  calls([&] { return bc_movers_find(before, poses.data(), INT64_MAX, &near); });
   keep(near, calls);
-  calls([&] { return bc_broad_phase_create(&boxes, &second); });
-  calls([&] { return bc_broad_phase_take_fixed(second, first, kept); });
-  for (int k = 0; k < count; k += 7) poses[size_t(k)].position[1] += 0.5;
-  calls([&] { return bc_broad_phase_find(second, poses.data(), INT64_MAX, &near); });
+  for (int k = 0; k < count; k += 7) standing[size_t(k)].position[1] += 0.5;
+  calls([&] { return bc_index_change(first, kept, sizes.data(), standing.data(), count, &second); });
+  calls([&] { return bc_movers_create(sizes.data(), count, 0.0, filter, second, &after); });
+  calls([&] { return bc_movers_find(after, poses.data(), INT64_MAX, &near); });
   keep(near, calls);
-  calls([&] { return bc_broad_phase_resize(second, 3, &sizes[0]); });
-  calls([&] { return bc_broad_phase_find(second, poses.data(), INT64_MAX, &near); });
-  for (int64_t box : changed) poses[size_t(box)].position[0] -= 0.4;
-  calls([&] {
-    return bc_broad_phase_find_changed(second, poses.data(), changed, 2, INT64_MAX, &near);
-  });
-  keep(near, calls);
-  bc_broad_phase_destroy(first);
-  bc_broad_phase_destroy(second);
+
+  bc_way way = bc_default_way();
+  std::vector<bc_pose> places{poses[0], poses[3], poses[30], poses[59], poses[9], poses[0]};
+  way.times = 3, way.count = 2, way.sizes = sizes.data(), way.poses = places.data();
+  way.around = second, way.clearance = 0.5;
+  bc_path* path = nullptr;
+  bc_path_found found{};
+  found.size = sizeof found;
+  calls([&] { return bc_path_create(&way, &path); });
+  bool is_done = false;
+  for (int k = 0; k < 1000 && !is_done; ++k)
+    calls([&] { return bc_path_advance(path, 20, &is_done); });
+  calls([&] { return bc_path_read(path, &found); });
+  for (int64_t k = 0; k < found.impact_count; ++k) {
+    calls.keep(&found.impacts[k].a, 2);
+    calls.keep(&found.impacts[k].approach.time, 1);
+  }
+  calls.keep(found.held, 2 * found.held_count);
+  bc_path_destroy(path);
+  bc_movers_destroy(before);
+  bc_movers_destroy(after);
+  bc_index_destroy(first);
+  bc_index_destroy(second);
+  bc_filter_destroy(filter);
 }
 
 // Boxes on a floor, in two stacks, and how they move.

@@ -55,7 +55,7 @@ def test_with_sanitizers(tmp_path: Path) -> None:
     run(*compiler, '-fno-sanitize=alignment,vptr', '-c', CORE / 'src/kernel.cpp', '-o', kernel)
     run(*compiler, '-shared', f'-I{sysconfig.get_path("include")}', f'-I{np.get_include()}', kernel,
         CORE / 'binding/module.cpp', *(CORE / 'src/library' / f'{name}.cpp' for name in (
-            'library', 'broad_phase', 'force', 'motion')), '-o', extension)
+            'library', 'force', 'index', 'motion')), '-o', extension)
     libraries = [run('g++', f'-print-file-name=lib{name}.so').strip() for name in ('asan', 'ubsan')]
     assert min(attack(37, 5000, EXTENSION=str(extension), LD_PRELOAD=' '.join(libraries),
                       ASAN_OPTIONS='detect_leaks=0:allocator_may_return_null=1')) > 200

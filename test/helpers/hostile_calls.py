@@ -65,16 +65,29 @@ def held(pairs: int = 1) -> list[Any]:
             rows(2), 0.5 * each, None, None, 0.0, 0.0]
 
 
-def phase_arguments(n: int = 4) -> list[Any]:
-    """Return what BroadPhase takes: n boxes, a listed pair, two groups that meet, no body."""
-    return [np.ones((n, 3)), np.zeros(n, bool), 0.0, np.array([[1, 0]]),
-            np.arange(n, dtype=np.int32) % 2, np.array([[0, 1], [2, 0]], np.uint8),
-            np.full(n, -1, np.int32)]
+def filter_arguments(n: int = 4) -> list[Any]:
+    """Return what Filter takes: a listed pair, two groups that meet, no body, an order."""
+    return [np.array([[1, 0]]), np.arange(n, dtype=np.int32) % 2,
+            np.array([[0, 1], [2, 0]], np.uint8), np.full(n, -1, np.int32),
+            np.arange(n, dtype=np.int32)]
+
+
+def movers_arguments(n: int = 4) -> list[Any]:
+    """Return what Movers takes: n boxes, which all move."""
+    return [np.ones((n, 3)), 0.0, native.Filter(*filter_arguments(n)), None]
+
+
+def path_arguments(n: int = 2) -> list[Any]:
+    """Return what Path takes: n boxes that go through four."""
+    way = np.stack((rows(n), rows(n) + [9.0, 0, 0, 0, 0, 0, 0]))
+    return [np.ones((n, 3)), way, np.zeros((n, 3)), np.arange(4, 4 + n),
+            native.Index(np.ones((4, 3)), rows()), None, native.Filter(*filter_arguments()), 0.1,
+            1e-6, 10**6, 10**6]
 
 
 def writer_arguments(n: int = 4) -> list[Any]:
     """Return what TickWriter takes: the same boxes; all but the last are parts of a body."""
-    return [native.BroadPhase(*phase_arguments(n)), ContactSolver(), 0.1, 9, np.ones((n, 3)),
+    return [native.Movers(*movers_arguments(n)), ContactSolver(), 0.1, 9, np.ones((n, 3)),
             rows(n + 1), np.array([n - 1, n]), np.array([n] * (n - 1) + [-1]), rows(n),
             tuple('abcd'), np.array([[1, 0]]), ('named',), np.array([[1, 0, 1, 1]]), (None,),
             'map', 2, 3]
@@ -105,17 +118,22 @@ def refused(kind: type[Exception], call: Callable[..., Any], *args: Any) -> None
 
 
 def places_of_no_box() -> None:
-    """`BroadPhase` reads and writes at boxes and groups that it is given."""
-    assert native.BroadPhase(*phase_arguments()).find(rows(), 9)[0].tolist() == [
+    """`Filter` reads at boxes and groups that it is given."""
+    assert native.Movers(*movers_arguments()).find(rows(), 9)[0].tolist() == [
         [1, 0], [2, 1], [2, 3]]
-    for argument in (3, 4):
+    for argument in (0, 1):
         for place in (-1, 4, 2**30, -2**31):
-            given = phase_arguments()
+            given = filter_arguments()
             given[argument].flat[1] = place
-            refused(ValueError, native.BroadPhase, *given)
-    for place in (-1, 4, 2**40, -2**62):
-        refused(ValueError, native.BroadPhase(*phase_arguments()).resize, np.array([place]),
-                np.ones((1, 3)))
+            refused(ValueError, native.Filter, *given)
+    for place in (-1, 2**31, 2**40, -2**62):
+        refused(ValueError, native.Filter(*filter_arguments()).sides, np.array([[0, place]]))
+        given = path_arguments()
+        given[3][1] = place
+        refused(ValueError, native.Path, *given)
+    for kept in (4, 2**40):
+        refused(ValueError, native.Index, np.ones((4, 3)), rows(),
+                native.Index(np.ones((4, 3)), rows()), np.array([0, 1, 2, kept]))
 
 
 def rows_of_no_array() -> None:
@@ -150,26 +168,32 @@ def bodies_that_rows_lack() -> None:
 
 
 def arrays_too_short() -> None:
-    for argument in (0, 1, 4, 5, 6):
-        given = phase_arguments()
+    for argument in (1, 2, 3, 4):
+        given = filter_arguments()
         given[argument] = given[argument][:1]
-        refused(ValueError, native.BroadPhase, *given)
-    refused(ValueError, native.BroadPhase(*phase_arguments()).find, rows(3), 9)
+        refused(ValueError, native.Filter, *given)
+    refused(ValueError, native.Movers(*movers_arguments()).find, rows(3), 9)
+    refused(ValueError, native.Movers, np.ones((3, 3)), 0.0, None, path_arguments()[4])
+    refused(ValueError, native.Index, np.ones((4, 3)), rows(3))
+    refused(ValueError, path_arguments()[4].near, np.ones((2, 3)), rows(3), 0.0, 9)
+    for argument in (0, 1, 2, 3):
+        given = path_arguments()
+        given[argument] = given[argument][:1]
+        refused(ValueError, native.Path, *given)
 
 
 def bounds_without_an_order() -> None:
     """Sorting NaN is undefined in C++: none gets there."""
     n = 4000
-    phase = native.BroadPhase(np.ones((n, 3)), np.zeros(n, bool), 0.0, np.zeros((0, 2), np.int64),
-                              np.zeros(n, np.int32), np.ones((1, 1), np.uint8),
-                              np.full(n, -1, np.int32))
+    movers = native.Movers(np.ones((n, 3)), 0.0, None, None)
     place = rows(n)
     for number in (np.nan, np.inf, -np.inf, 1e60):
         bad = place.copy()
         bad[1234, 1] = number
-        assert phase.find(bad, 10**9)[2] == 1234
-    assert len(phase.find(np.full((n, 7), np.nan), 10**9)[1]) == n
-    assert len(phase.find(place, 10**9)[0]) == n - 1
+        assert movers.find(bad, 10**9)[2] == 1234
+        refused(ValueError, native.Index, np.ones((n, 3)), bad)
+    assert len(movers.find(np.full((n, 7), np.nan), 10**9)[1]) == n
+    assert len(movers.find(place, 10**9)[0]) == n - 1
 
 
 def a_network(rng: np.random.Generator | None = None, inputs: int = native.FEATURES,
@@ -351,11 +375,14 @@ def random_calls(seed: int, rounds: int) -> None:
         (native.Contact, [True, -1.0, np.ones(3), np.ones(3), 1.0, np.eye(3), 2], {}),
         (native.write_poses, [rows(), np.array([3, 0]), [POSE, None]], {}),
         (native.place_boxes, [rows(), np.array([3, -1]), rows(2)], {}),
-        (native.BroadPhase, phase_arguments(), {}),
-        (native.BroadPhase(*phase_arguments()).find, [rows(), 10], {}),
-        (native.BroadPhase(*phase_arguments()).take_fixed,
-         [native.BroadPhase(*phase_arguments()), np.array([1, 0, -1, 3])], {}),
-        (native.BroadPhase(*phase_arguments()).resize, [np.arange(4), np.ones((4, 3))], {}),
+        (native.Filter, filter_arguments(), {}),
+        (native.Filter(*filter_arguments()).sides, [np.array([[0, 1], [7, 2]])], {}),
+        (native.Index, [np.ones((4, 3)), rows(), path_arguments()[4], np.array([1, 0, -1, 3])], {}),
+        (path_arguments()[4].near, [np.ones((4, 3)), rows(), 0.1, 10], {}),
+        (native.Movers, movers_arguments(), {}),
+        (native.Movers(*movers_arguments()).find, [rows(), 10], {}),
+        (native.Path, path_arguments(), {}),
+        (native.Path(*path_arguments()).advance, [100], {}),
         (native.read_pose, [rng.bytes(int(rng.integers(90)))], {}),
         (native.NamedPoses, [tuple('abcd'), 9], {}),
         (native.NamedPoses(tuple('abcd'), 9).read, [some_names(rng)], {}),

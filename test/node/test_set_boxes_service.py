@@ -122,7 +122,7 @@ def test_a_lift(client: YardClient, scene: str) -> None:
         client.offer()
         answer = client.set_boxes(fixed=[a_box('c1', (0, 0, 1, 0, 0, 0, 1), CUBE)])
         assert (answer.success, answer.message, answer.revision) == (True, '', 1)
-        assert labels(client, hook=(0, 0, 2.4, 0, 0, 0, 1)) == ['hook_c1']
+        assert labels(client, hook=(0, 0, 2.4, 0, 0, 0, 1)) == ['c1_hook']
         checked = client.call(Check, 'contact_node/check', Check.Request(
             header=Header(frame_id='map'), boxes=[a_box('lid', (0, 0, 2.4, 0, 0, 0, 1), CUBE)]))
         assert (checked.message, checked.contacts.revision) == ('', 1)
@@ -135,9 +135,9 @@ def test_a_lift(client: YardClient, scene: str) -> None:
         now = ask(client, c1=(9, 9, 0.9, 0, 0, 0, 1), hook=(0, 0, 2.4, 0, 0, 0, 1),
                   ghost=(0, 0, 0, 0, 0, 0, 1))
         assert now.revision == 2 and not now.stale
-        assert list(contacts_by_pair(now)) == ['ground_c1']
+        assert list(contacts_by_pair(now)) == ['c1_ground']
         assert client.set_boxes(fixed=[a_box('c1', (9, 9, 1, 0, 0, 0, 1))]).revision == 3
-        assert labels(client, hook=(9, 9, 2.4, 0, 0, 0, 1), c1=ORIGIN) == ['hook_c1']
+        assert labels(client, hook=(9, 9, 2.4, 0, 0, 0, 1), c1=ORIGIN) == ['c1_hook']
         assert client.set_boxes(absent=['c1']).revision == 4
         assert labels(client, hook=(9, 9, 2.4, 0, 0, 0, 1), c1=ORIGIN) == []
         assert client.diagnostic('unknown names') == '3'
@@ -152,7 +152,7 @@ def test_bodies_come_and_are_joined(client: YardClient, scene: str) -> None:
         lorry = a_body('lorry', (0, 0, 0, 0, 0, 0, 1), a_box('bed', (0, 0, 1, 0, 0, 0, 1), CUBE),
                        a_box('cab', (3, 0, 1, 0, 0, 0, 1), CUBE))
         assert client.set_boxes(bodies=[lorry]).message == ''
-        assert labels(client, hook=(3, 0, 2.4, 0, 0, 0, 1)) == ['hook_cab']
+        assert labels(client, hook=(3, 0, 2.4, 0, 0, 0, 1)) == ['cab_hook']
         crane = a_body('crane', None, a_box('hook', ORIGIN),
                        a_box('c1', (0, 0, -1.4, 0, 0, 0, 1), CUBE))
         assert client.set_boxes(bodies=[crane]).message == ''
@@ -161,10 +161,10 @@ def test_bodies_come_and_are_joined(client: YardClient, scene: str) -> None:
         assert labels(client, crane=(0, 0, 4.3, 0, 0, 0, 1)) == ['bed_c1']
         landed = client.set_boxes(fixed=[a_box('c1', (0, 0, 3, 0, 0, 0, 1))])
         assert (landed.message, landed.revision) == ('', 3)
-        assert labels(client, crane=(0, 0, 4.4, 0, 0, 0, 1)) == ['hook_c1']
+        assert labels(client, crane=(0, 0, 4.4, 0, 0, 0, 1)) == ['c1_hook']
         assert client.set_boxes(bodies=[a_body('lorry', None)]).message == ''
         assert labels(client, crane=(0, 0, 4.4, 0, 0, 0, 1), lorry=(0, 0, 0.1, 0, 0, 0, 1)) == [
-            'hook_c1', 'bed_c1']
+            'c1_hook', 'bed_c1']
         told = client.get_boxes()
         assert [(state.box.name, state.body, state.fixed) for state in told.boxes] == [
             ('ground', '', True), ('hook', 'crane', False), ('bed', 'lorry', False),
@@ -314,7 +314,7 @@ def test_a_new_model_and_a_new_start(client: YardClient, scene: str) -> None:
         assert node.set_parameters([Parameter('model', value='mlp')])[0].successful
         told = ask(client, hook=AWAY, c1=(9, 9, 0.9, 0, 0, 0, 1))
         assert (told.epoch, told.revision) == (first.epoch, 1)
-        assert list(contacts_by_pair(told)) == ['ground_c1']
+        assert list(contacts_by_pair(told)) == ['c1_ground']
         node.trigger_deactivate()
         node.trigger_cleanup()
         assert client.set_boxes().message == 'the node is not configured'
@@ -347,7 +347,7 @@ class Yard:
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.rng = scene, np.random.default_rng(3)
-        self.boxes, self.first = dict(scene.boxes), dict.fromkeys(scene.boxes)
+        self.boxes = dict(scene.boxes)
         self.poses: dict[str, Any] = {}  # of what moves
 
     def pose(self) -> tuple[float, ...]:
@@ -358,7 +358,6 @@ class Yard:
         """Make a change, and return the fields of its request."""
         name = str(self.rng.choice(NAMES))
         box = self.boxes.get(name)
-        self.first.setdefault(name)
         if box is None or (box.pose is None and self.rng.random() < 0.7):  # comes, or lands
             self.boxes[name] = Box(CUBE if box is None else box.size, self.pose())
             size = CUBE if box is None or self.rng.random() < 0.5 else (0, 0, 0)
@@ -377,8 +376,7 @@ class Yard:
 
     def wanted(self) -> list[tuple[str, float]]:
         """Return the pairs in contact with their depths, as a new solver finds them."""
-        boxes = {name: self.boxes[name] for name in self.first if name in self.boxes}
-        whole = Scene(boxes, self.scene.pairs, 'map', 'named', self.scene.patterns)
+        whole = Scene(self.boxes, self.scene.pairs, 'map', 'named', self.scene.patterns)
         answer = SceneSolver(whole)([self.poses[name] for name in whole.moving])
         return [(pair.label, -contact.separation) for pair, contact in answer.named()]
 

@@ -46,9 +46,10 @@ def test_listed_pairs_keep_their_order_and_sides():
 
 
 def test_a_scene_finds_the_same():
+    """Where the order of names is that of the boxes."""
     rng = np.random.default_rng(2)
     size, pose = heap(rng, 50)
-    scene = Scene({f'b{n}': Box(extents) for n, extents in enumerate(size)},
+    scene = Scene({f'b{n:02}': Box(extents) for n, extents in enumerate(size)},
                   patterns=(('*', '*'),), poses='named')
     answer = SceneSolver(scene)(pose)
     pairs, contacts = contacts_of(size, pose)

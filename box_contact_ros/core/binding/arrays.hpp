@@ -213,7 +213,17 @@ struct Holder {
 // An error of the library as Python's.
 inline void check(bc_status status) {
   if (status != BC_OK)
-    fail(status == BC_NO_MEMORY ? PyExc_MemoryError : PyExc_ValueError, bc_error_text());
+    fail(status == BC_NO_MEMORY  ? PyExc_MemoryError
+         : status == BC_TOO_MUCH ? PyExc_OverflowError
+                                 : PyExc_ValueError,
+         bc_error_text());
+}
+
+// What asks an answer for its truth is refused: boxes apart have an answer, too.
+[[noreturn]] inline int refuse_truth(PyObject* self) {
+  PyErr_Format(PyExc_TypeError, "the truth value of a %s is ambiguous: ask .colliding",
+               Py_TYPE(self)->tp_name);
+  throw PythonError{};
 }
 
 // Call `work` without Python's lock. What it throws is thrown on, with the lock.

@@ -22,6 +22,9 @@ using Contact = Holder<bc_contact>;
 inline PyObject* contact_normal(PyObject* self, void*) {
   return array_of(Contact::of(self).normal, 3);
 }
+inline PyObject* contact_depth(PyObject* self, void*) {
+  return PyFloat_FromDouble(std::max(0.0, -Contact::of(self).separation));
+}
 inline PyObject* contact_point(PyObject* self, void*) {
   return array_of(Contact::of(self).point, 3);
 }
@@ -87,6 +90,8 @@ inline PyMemberDef contact_members[] = {
 inline PyGetSetDef contact_arrays[] = {
     {"normal", Guarded<contact_normal>::call, nullptr,
      "(3,) unit vector from A to B; NaN where the separation exceeds the solver's margin.", nullptr},
+    {"depth", Guarded<contact_depth>::call, nullptr,
+     "How deep the boxes overlap along the normal [m]; 0 where they touch or are apart.", nullptr},
     {"point", Guarded<contact_point>::call, nullptr,
      "(3,) centroid of A∩B [m]; NaN without contact.", nullptr},
     {"covariance", Guarded<contact_covariance>::call, nullptr,
@@ -106,6 +111,7 @@ inline PyType_Slot contact_slots[] = {
     {Py_tp_new, slot<contact_new>()},
     {Py_tp_dealloc, reinterpret_cast<void*>(Contact::dealloc)},
     {Py_tp_repr, slot<contact_repr>()},
+    {Py_nb_bool, slot<refuse_truth>()},
     {Py_tp_members, contact_members},
     {Py_tp_getset, contact_arrays},
     {Py_tp_methods, contact_methods},

@@ -5,7 +5,6 @@
 #include "../src/force/rectangle.hpp"
 #include "../src/library/force_limits.hpp"
 #include "../src/minimum_depth.hpp"
-#include "broad_phase.hpp"
 #include "faces.hpp"
 #include "forces.hpp"
 #include "message_numbers.hpp"
@@ -123,9 +122,14 @@ PyObject* make_module() {
   add("Mlp", Py_NewRef(mlp_type));
   add("Paper", Py_NewRef(paper_type));
   solver_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&solver_spec)));
-  broad_phase_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&broad_phase_spec)));
+  filter_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&filter_spec)));
+  index_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&index_spec)));
+  movers_type = reinterpret_cast<PyTypeObject*>(made(PyType_FromSpec(&movers_spec)));
   add("PairSolver", Py_NewRef(solver_type));
-  add("BroadPhase", Py_NewRef(broad_phase_type));
+  add("Filter", Py_NewRef(filter_type));
+  add("Index", Py_NewRef(index_type));
+  add("Movers", Py_NewRef(movers_type));
+  add("Path", PyType_FromSpec(&path_spec));
   add("NamedPoses", PyType_FromSpec(&named_poses_spec));
   add("TickWriter", PyType_FromSpec(&tick_writer_spec));
   add("PatchForces", PyType_FromSpec(&forces_spec));

@@ -89,6 +89,7 @@ inline PyType_Slot nearest_slots[] = {
     {Py_tp_new, slot<nearest_new>()},
     {Py_tp_dealloc, reinterpret_cast<void*>(Nearest::dealloc)},
     {Py_tp_repr, slot<nearest_repr>()},
+    {Py_nb_bool, slot<refuse_truth>()},
     {Py_tp_members, nearest_members},
     {Py_tp_getset, nearest_arrays},
     {Py_tp_methods, nearest_methods},

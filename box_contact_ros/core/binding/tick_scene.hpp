@@ -8,7 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "broad_phase.hpp"
+#include "index.hpp"
 #include "pair_solver.hpp"
 
 namespace box_contact::binding {
@@ -32,7 +32,7 @@ inline Owned tuple_of(PyObject* given, const char* name, npy_intp length) {
 // The boxes of a scene, and what is known of their pairs by name. Nothing changes from tick to tick
 // but the poses of what moves.
 struct TickScene {
-  Owned broad_phase, solver;
+  Owned movers, solver;
   double margin;                // [m]
   Py_ssize_t most_near;         // pairs that are left to the model
   std::vector<double> sizes;    // (n, 3) [m]
@@ -75,16 +75,16 @@ inline void check_places(const Array<int64_t>& places, const char* name, int64_t
 
 // Read the arguments of a TickWriter.
 inline TickScene read_scene(PyObject* args) {
-  PyObject *broad_phase, *solver, *sizes_given, *poses_given, *moving_given, *bodies_given;
+  PyObject *movers, *solver, *sizes_given, *poses_given, *moving_given, *bodies_given;
   PyObject *local_given, *names, *listed_given, *labels, *watched_given, *topics, *frame_id;
   TickScene scene;
-  if (!PyArg_ParseTuple(args, "O!O!dnOOOOOOOOOOUIK:TickWriter", broad_phase_type, &broad_phase,
+  if (!PyArg_ParseTuple(args, "O!O!dnOOOOOOOOOOUIK:TickWriter", movers_type, &movers,
                         solver_type, &solver, &scene.margin, &scene.most_near, &sizes_given,
                         &poses_given, &moving_given, &bodies_given, &local_given, &names,
                         &listed_given, &labels, &watched_given, &topics, &frame_id,
                         &scene.epoch, &scene.revision))
     throw PythonError{};
-  npy_intp count = Holder<BroadPhase>::of(broad_phase).count;
+  npy_intp count = Holder<Movers>::of(movers).count;
   auto sizes = read<double>(sizes_given, "sizes", {count, 3});
   auto poses = read<double>(poses_given, "poses", {any_length, 7});
   npy_intp rows = poses.length(0);
@@ -109,7 +109,7 @@ inline TickScene read_scene(PyObject* args) {
     pair.topics = PyTuple_GET_ITEM(topics, k);
     std::copy_n(row + 2, 2, pair.movers);
   }
-  scene.broad_phase.reset(Py_NewRef(broad_phase));
+  scene.movers.reset(Py_NewRef(movers));
   scene.solver.reset(Py_NewRef(solver));
   scene.frame_id.reset(Py_NewRef(frame_id));
   scene.sizes = copy_of(sizes);

@@ -82,7 +82,7 @@ class TickWriter {
     near.size = sizeof near;
     near.refused = -1;
     bc_status status =
-        bc_broad_phase_find(Holder<BroadPhase>::of(scene_.broad_phase.get()).made.get(),
+        bc_movers_find(Holder<Movers>::of(scene_.movers.get()).made.get(),
                             reinterpret_cast<const bc_pose*>(rows), scene_.most_near, &near);
     if (near.refused < 0 || status == BC_NO_MEMORY) check(status);
     if (near.refused >= 0 || near.count > scene_.most_near) Py_RETURN_NONE;
@@ -155,7 +155,7 @@ class TickWriter {
         {results.point, results.normal, results.separation, results.volume, results.covariance});
   }
   PyObject* solve_in_python(Rows& rows, npy_intp count) {
-    // Its code may ask the broad phase, whose pairs are others then.
+    // Its code may ask the movers, whose pairs are others then.
     auto pairs = array_of_pairs(rows.pairs, count);
     auto poses = make<double>({scene_.count(), 7}), sizes = make<double>({scene_.count(), 3});
     std::copy_n(scene_.poses.data(), 7 * scene_.count(), poses.numbers);
@@ -287,7 +287,7 @@ inline PyObject* tick_writer_call(PyObject* self, PyObject* args, PyObject* keyw
 
 inline PyType_Slot tick_writer_slots[] = {
     {Py_tp_doc,
-     const_cast<char*>("TickWriter(broad_phase, solver, margin, most_near, sizes, poses, moving, "
+     const_cast<char*>("TickWriter(movers, solver, margin, most_near, sizes, poses, moving, "
                        "bodies, local, names, listed, labels, watched, topics, frame_id, epoch, "
                        "revision)"
                        "\n--\n\n"

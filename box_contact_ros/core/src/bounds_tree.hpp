@@ -34,6 +34,20 @@ struct Bounds {
     for (int k = 1; k < 6; ++k) least = std::min(least, ends[k] - other.ends[k]);
     return least >= 0.0;
   }
+  // How far apart they are, at most the distance of what is within [m].
+  double gap(const Bounds& other) const {
+    double square = 0.0;
+    for (int k = 0; k < 3; ++k) {
+      double apart = std::max({0.0, ends[k] + other.ends[k + 3], ends[k + 3] + other.ends[k]});
+      square += apart * apart;
+    }
+    return std::sqrt(square);
+  }
+  Bounds around(const Bounds& other) const {
+    Bounds both;
+    for (int k = 0; k < 6; ++k) both.ends[k] = std::min(ends[k], other.ends[k]);
+    return both;
+  }
   Bounds grown(double length) const {
     Bounds larger;
     for (int k = 0; k < 6; ++k) larger.ends[k] = ends[k] - length;
@@ -66,7 +80,7 @@ class BoundsTree {
 
   // Whether searches since the tree was built have visited so many blocks that building it anew
   // costs less. The order of boxes that moved far tells little.
-  bool is_worn() const { return visits_ > 4 * size_t(levels_) * order_.size(); }
+  bool is_worn(size_t visits) const { return visits > 4 * size_t(levels_) * order_.size(); }
 
   // Where memory ends, the tree stays as it was.
   void build(const std::vector<int32_t>& boxes, const std::vector<Bounds>& bounds) {
@@ -83,7 +97,6 @@ class BoundsTree {
     blocks_.assign(blocks, Block());
     std::copy_n(starts, levels, starts_);
     levels_ = levels;
-    visits_ = 0;
     halve(order_.data(), order_.data() + order_.size(), bounds);
     refit(bounds);
   }
@@ -119,10 +132,10 @@ class BoundsTree {
   }
 
   // Call `visit` with each box from index `first` on whose bounds overlap, until it returns false.
-  // Returns whether it never did.
+  // Returns whether it never did. visits: how many blocks were visited, is added.
   template <class Visit>
-  bool each_near(const Bounds& bounds, size_t first, Visit visit) {
-    return levels_ == 0 || each_below(levels_ - 1, 0, bounds, first, visit);
+  bool each_near(const Bounds& bounds, size_t first, Visit visit, size_t& visits) const {
+    return levels_ == 0 || each_below(levels_ - 1, 0, bounds, first, visit, visits);
   }
 
  private:
@@ -163,14 +176,16 @@ class BoundsTree {
   };
 
   template <class Visit>
-  bool each_below(int level, size_t block, const Bounds& bounds, size_t first, Visit& visit) {
-    ++visits_;
+  bool each_below(int level, size_t block, const Bounds& bounds, size_t first, Visit& visit,
+                  size_t& visits) const {
+    ++visits;
     unsigned near = blocks_[starts_[level] + block].overlapping(bounds);
     size_t begin = width * block, first_here = first >> (width_bits * level);
     if (first_here > begin) near &= ~0U << (first_here - begin);
     for (; near; near &= near - 1) {
       size_t index = begin + size_t(__builtin_ctz(near));
-      if (level ? !each_below(level - 1, index, bounds, first, visit) : !visit(order_[index]))
+      if (level ? !each_below(level - 1, index, bounds, first, visit, visits)
+                : !visit(order_[index]))
         return false;
     }
     return true;
@@ -202,7 +217,6 @@ class BoundsTree {
   std::vector<Block> blocks_;  // those of boxes, then level by level up to the root
   size_t starts_[levels_max] = {};
   int levels_ = 0;
-  size_t visits_ = 0;
 };
 
 }  // namespace box_contact::detail

@@ -45,7 +45,8 @@ typedef enum bc_status {
   BC_BAD_ROWS = 4,     /* some rows of a batch are refused: bad poses, sizes or places */
   BC_NO_MEMORY = 5,
   BC_BAD_ENVIRONMENT = 6, /* BOX_CONTACT_INSTRUCTION_SET names none that this machine has */
-  BC_BAD_ABI = 7          /* the program was compiled for another version of this header */
+  BC_BAD_ABI = 7,         /* the program was compiled for another version of this header */
+  BC_TOO_MUCH = 8         /* more than the program allows: see bc_way */
 } bc_status;
 
 typedef enum bc_model {

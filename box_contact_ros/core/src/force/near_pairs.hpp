@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "../broad_phase.hpp"
+#include "../movers.hpp"
 #include "patch.hpp"
 
 namespace box_contact::BOX_CONTACT_SET::force {
@@ -66,7 +66,7 @@ class NearPairs {
       for (int32_t box : of_body_) look(box);
     else
       for (int32_t box : active_) look(box);
-    if (all || (!left_.empty() && tree_.is_worn()))
+    if (all || (!left_.empty() && tree_.is_worn(visits_)))
       build();
     else
       for (int32_t box : left_) tree_.refit_one(place_[size_t(box)], fat_[size_t(box)]);
@@ -85,6 +85,7 @@ class NearPairs {
     });
   }
   void build() {
+    visits_ = 0;
     tree_.build(of_body_, fat_);
     for (size_t index = 0; index < tree_.order().size(); ++index)
       place_[size_t(tree_.order()[index])] = index;
@@ -107,7 +108,7 @@ class NearPairs {
         bool is_pair = its != body && (bodies[its].is_free() || bodies[body].is_free());
         if (is_pair && !is_twice) pairs_.push_back(std::minmax(box, other));
         return true;
-      });
+      }, visits_);
     }
     for (int32_t box : searched) is_searched_[size_t(box)] = 0;
     std::sort(pairs_.begin() + kept, pairs_.end());
@@ -124,6 +125,7 @@ class NearPairs {
   std::vector<detail::Bounds> fat_;
   std::vector<size_t> place_;  // of each box in the tree
   detail::BoundsTree tree_;
+  size_t visits_ = 0;  // of its blocks, since it was built
 };
 
 }  // namespace box_contact::BOX_CONTACT_SET::force

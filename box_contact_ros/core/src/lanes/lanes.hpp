@@ -5,7 +5,7 @@
 //
 // From poses to moments, the core's functions are templates over T: `double` for a pair alone, or
 // `Lanes<double, W>`, a vector of the compiler, with one pair in each of its W lanes. The blocks of forces
-// are such templates, too, and the broad phase has no lanes. All functions here work on each lane alone,
+// are such templates, too, and the index has no lanes. All functions here work on each lane alone,
 // so a pair has the same bits in every lane of every width. Where a pair alone takes another way
 // (`packed`), tests compare bits.
 #pragma once

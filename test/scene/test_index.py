@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The broad phase: it finds what a test of every two boxes finds, and takes little memory."""
+"""Index and movers: they find what a test of every two boxes finds, and take little memory."""
 from __future__ import annotations
 
 import fnmatch
@@ -20,7 +20,7 @@ from box_contact_ros.scene.scene_solver import SceneSolver
 from box_contact_ros.solver.contacts_of import TooManyNear
 from box_contact_ros.stream.streams import partners_of
 
-ALL = np.ones((1, 1), np.uint8)
+ALL = np.full((1, 1), 3, np.uint8)
 NONE = np.zeros((0, 2), np.int64)
 PLENTY = 10**9
 ROUNDING = 1e-13
@@ -71,12 +71,16 @@ def made(rng, kind, n, upright=False):
     return size, np.hstack((place, turn))
 
 
-def broad_phase(size, fixed=None, *, margin=0.0, listed=NONE, groups=None, allowed=ALL,
-                bodies=None):
+def movers(size, index=None, *, margin=0.0, listed=NONE, groups=None, allowed=ALL, bodies=None):
     n = len(size)
-    return native.BroadPhase(size, np.zeros(n, bool) if fixed is None else fixed, margin, listed,
-                             np.zeros(n, np.int32) if groups is None else groups, allowed,
-                             np.full(n, -1, np.int32) if bodies is None else bodies)
+    wanted = native.Filter(listed, np.zeros(n, np.int32) if groups is None else groups, allowed,
+                           np.full(n, -1, np.int32) if bodies is None else bodies,
+                           np.arange(n, dtype=np.int32))
+    return native.Movers(size, margin, wanted, index)
+
+
+def index_of(size, pose, fixed, *former):
+    return native.Index(size, np.where(fixed[:, None], pose, np.nan), *former)
 
 
 def gaps(size, pose):
@@ -103,8 +107,10 @@ def test_boxes_that_are_near(kind, upright):
     for n in (1, 2, 31, 34, 90, 200):
         size, pose = made(rng, kind, n, upright)
         known, fixed = rng.random(n) < 0.9, rng.random(n) < 0.4
+        known |= fixed
         rows = np.where(known[:, None], pose, np.nan)
-        pairs, stale, refused = broad_phase(size, fixed).find(rows, PLENTY)
+        index = index_of(size, pose, fixed)
+        pairs, stale, refused = movers(size, index).find(rows, PLENTY)
         gap, scale = gaps(size, pose)
         asked = np.triu(known & known[:, None] & ~(fixed & fixed[:, None]), 1)
         found = np.zeros((n, n), bool)
@@ -114,6 +120,11 @@ def test_boxes_that_are_near(kind, upright):
         assert found[asked & (gap <= 0.0)].all()
         assert stale.tolist() == [[box, ALONE] for box in np.flatnonzero(~known)]
         count += len(pairs)
+        beside = np.zeros((n, n), bool)  # of any box and those of the index
+        beside[tuple(index.near(size, rows, 0.0, PLENTY).T)] = True
+        asked = known[:, None] & fixed
+        assert not (beside & ~asked).any() and not (beside & (gap > ROUNDING * scale)).any()
+        assert beside[asked & (gap <= 0.0)].all()
     assert count > 30
 
 
@@ -122,13 +133,13 @@ def test_what_is_found_depends_on_the_poses_alone(kind):
     """Not on the ticks before: boxes moved a little, far, left, and came back."""
     rng = np.random.default_rng(5)
     size, pose = made(rng, kind, 120)
-    used = broad_phase(size)
+    used = movers(size)
     for tick in range(8):
         if tick == 4:
             pose[:, :3] = rng.permutation(pose[:, :3])
         pose[:, :3] += rng.uniform(-0.1, 0.1, (120, 3))
         rows = np.where(rng.random((120, 1)) < 0.1, np.nan, pose) if tick % 2 else pose
-        for one, other in zip(used.find(rows, PLENTY), broad_phase(size).find(rows, PLENTY)):
+        for one, other in zip(used.find(rows, PLENTY), movers(size).find(rows, PLENTY)):
             assert np.array_equal(one, other)
 
 
@@ -142,17 +153,18 @@ def test_few_boxes_move_at_a_time(kind, share):
     fixed, gone = rng.random(n) < 0.3, np.zeros(n, bool)
     bodies = rng.integers(-1, 40, n).astype(np.int32)
     of_other = (bodies != bodies[:, None]) | (bodies < 0)
-    asked = {'fixed': fixed, 'bodies': bodies, 'groups': rng.integers(0, 3, n).astype(np.int32),
-             'allowed': rng.integers(0, 3, (3, 3)).astype(np.uint8),
+    asked = {'index': index_of(size, pose, fixed), 'bodies': bodies,
+             'groups': rng.integers(0, 3, n).astype(np.int32),
+             'allowed': rng.integers(0, 4, (3, 3)).astype(np.uint8),
              'listed': np.argwhere(np.triu((rng.random((n, n)) < 0.01) & of_other, 1))}
-    used = broad_phase(size, **asked)
+    used = movers(size, **asked)
     for _ in range(40):
         moved = ~fixed & (rng.random(n) < share)
         step = size.min(axis=1) * 10.0**rng.uniform(-3, 2, n)
         pose[moved, :3] += (step[:, None] * rng.normal(size=(n, 3)))[moved]
         gone ^= ~fixed & (rng.random(n) < 0.02)
         rows = np.where(gone[:, None], np.nan, pose)
-        fresh = broad_phase(size, **asked)
+        fresh = movers(size, **asked)
         for one, other in zip(used.find(rows, PLENTY), fresh.find(rows, PLENTY)):
             assert np.array_equal(one, other)
 
@@ -160,22 +172,20 @@ def test_few_boxes_move_at_a_time(kind, share):
 def test_a_search_that_ended_early_or_was_refused_leaves_nothing_out():
     rng = np.random.default_rng(12)
     size, pose = made(rng, scattered, 90)
-    fixed = np.arange(90) < 20
-    late = np.where((np.arange(90) < 5)[:, None], np.nan, pose)  # fixed boxes that come later
     bad = np.where((np.arange(90) == 70)[:, None], np.inf, pose)
     moved = np.where((np.arange(90) % 9 == 2)[:, None], pose + 1.0, pose)
     moved[:, 3:] = pose[:, 3:]
     moved_bad = np.where((np.arange(90) == 70)[:, None], np.inf, moved)
-    used = broad_phase(size, fixed)
-    for rows, most in ((bad, PLENTY), (late, 7), (late, PLENTY), (pose, 7), (bad, PLENTY),
-                       (pose, PLENTY), (pose - 1e-3, PLENTY), (pose - 1e-3, PLENTY),
-                       (moved_bad, PLENTY), (moved, PLENTY), (moved, PLENTY)):
+    index = index_of(size, pose, np.arange(90) < 20)
+    used = movers(size, index)
+    for rows, most in ((bad, PLENTY), (pose, 7), (bad, PLENTY), (pose, PLENTY),
+                       (pose - 1e-3, PLENTY), (pose - 1e-3, PLENTY), (moved_bad, PLENTY),
+                       (moved, PLENTY), (moved, PLENTY)):
         pairs, stale, refused = used.find(rows, most)
         if rows is bad or rows is moved_bad:
             assert refused == 70 and not len(pairs)
             continue
-        rows = np.where(fixed[:, None] & ~np.isnan(rows), pose, rows)  # read once
-        every, gone, _ = broad_phase(size, fixed).find(rows, PLENTY)
+        every, gone, _ = movers(size, index).find(rows, PLENTY)
         assert refused == -1 and np.array_equal(stale, gone) and len(every) > 50
         if most == PLENTY:
             assert np.array_equal(pairs, every)
@@ -190,16 +200,16 @@ def test_boxes_of_one_body_are_never_a_pair(kind):
     for n in (31, 90, 200):
         size, pose = made(rng, kind, n)
         bodies = rng.integers(-1, 5, n).astype(np.int32)
-        every, *_ = broad_phase(size).find(pose, PLENTY)
+        every, *_ = movers(size).find(pose, PLENTY)
         kept = (bodies[every[:, 0]] != bodies[every[:, 1]]) | (bodies[every[:, 0]] < 0)
         assert 0 < kept.sum() < len(every)
-        pairs, *_ = broad_phase(size, bodies=bodies).find(pose, PLENTY)
+        pairs, *_ = movers(size, bodies=bodies).find(pose, PLENTY)
         assert np.array_equal(pairs, every[kept])
     size, pose = made(rng, one_place, 41)
-    pairs, *_ = broad_phase(size, bodies=np.zeros(41, np.int32)).find(pose, PLENTY)
+    pairs, *_ = movers(size, bodies=np.zeros(41, np.int32)).find(pose, PLENTY)
     assert pairs.shape == (0, 2)
     with pytest.raises(ValueError, match=r'listed.0. is \(2, 1\), boxes of one body'):
-        broad_phase(size, listed=np.array([[2, 1]]), bodies=np.zeros(41, np.int32))
+        movers(size, listed=np.array([[2, 1]]), bodies=np.zeros(41, np.int32))
 
 
 def exact_touch(rng, n):
@@ -227,7 +237,7 @@ def test_no_touching_pair_is_left_out():
         found = ContactSolver().batch(
             *np.ascontiguousarray(pose), size_a=size[0].copy(), size_b=size[1].copy())
         listed = np.stack((np.arange(n), np.arange(n, 2 * n)), axis=1)
-        pairs, _, refused = broad_phase(
+        pairs, _, refused = movers(
             size.reshape(-1, 3), listed=listed, allowed=np.zeros((0, 0), np.uint8)).find(
             pose.reshape(-1, 7), PLENTY)
         assert refused == -1 and set(np.flatnonzero(found.colliding)) <= set(pairs[:, 0])
@@ -236,44 +246,23 @@ def test_no_touching_pair_is_left_out():
     assert touching > 1500 and barely > 300
 
 
-def test_boxes_of_other_sizes_are_found_as_if_made_with_them():
-    """Fixed boxes keep their sizes: their bounds are read once."""
-    rng = np.random.default_rng(8)
-    size, pose = made(rng, scattered, 90)
-    fixed, boxes = np.arange(90) < 30, np.arange(30, 90)
-    used = broad_phase(np.where(fixed[:, None], size, 0.01), fixed, margin=0.1)
-    used.find(pose, PLENTY)
-    few = len(used.find(pose, PLENTY)[0])
-    used.resize(boxes, size[30:])
-    pairs = used.find(pose, PLENTY)[0]
-    assert few < len(pairs)
-    assert np.array_equal(pairs, broad_phase(size, fixed, margin=0.1).find(pose, PLENTY)[0])
-    with pytest.raises(ValueError, match='box 0 is fixed, or none of the 90 boxes'):
-        used.resize(boxes - 30, size[30:])
-
-
 @pytest.mark.parametrize('share', [0.02, 0.3])
 def test_fixed_boxes_that_stay_are_taken_over(share):
-    """Where a share of the boxes comes, goes, moves or lands, and groups change: as if made anew.
-
-    Some are asked at each change, some at every third one.
-    """
+    """Where a share of the boxes comes, goes, moves or lands, an index is as if made anew."""
     rng, found = np.random.default_rng(15), 0
     size, pose = made(rng, scattered, 150)
     fixed, group = rng.random(150) < 0.8, rng.integers(0, 3, 150).astype(np.int32)
-    former = None
+    former = ()
     for change in range(90):
-        allowed = np.triu(rng.integers(0, 3, (3, 3))).astype(np.uint8)
-        phase = broad_phase(size, fixed, groups=group, allowed=allowed)
-        if former is not None:
-            phase.take_fixed(former, kept)  # noqa: F821
+        index = index_of(size, pose, fixed, *former)
+        asked = {'groups': group, 'allowed': np.triu(rng.integers(0, 4, (3, 3))).astype(np.uint8)}
         poses = np.where(fixed[:, None], pose, made(rng, scattered, len(size))[1])
         if change % 3 == 0 or share > 0.1:
-            pairs = phase.find(poses, PLENTY)[0]
-            fresh = broad_phase(size, fixed, groups=group, allowed=allowed)
+            pairs = movers(size, index, **asked).find(poses, PLENTY)[0]
+            fresh = movers(size, index_of(size, pose, fixed), **asked)
             assert np.array_equal(pairs, fresh.find(poses, PLENTY)[0])
             found += len(pairs)
-        former, count = phase, len(size)
+        count = len(size)
         kept = np.arange(count)
         kept[rng.random(count) < share] = -1
         kept = np.append(kept[rng.random(count) >= 0.5 * share],
@@ -284,24 +273,25 @@ def test_fixed_boxes_that_stay_are_taken_over(share):
                       for new, old in ((new_size, size), (new_pose, pose)))
         fixed = np.where(is_new, rng.random(len(kept)) < 0.8, fixed[kept])
         group = np.where(is_new, rng.integers(0, 3, len(kept)), group[kept]).astype(np.int32)
+        former = index, kept
     assert found > 1000
     with pytest.raises(ValueError, match=r'kept\[0\] is 150, but there were'):
-        broad_phase(size).take_fixed(former, np.full(len(size), 150))
-    with pytest.raises(ValueError, match='margin 1 is not that of the former one, 0'):
-        broad_phase(size, margin=1.0).take_fixed(former, kept)
+        index_of(size, pose, fixed, index, np.full(len(size), 150))
 
 
 def test_a_margin_loses_no_pair_within_it():
+    """Of movers, and of an index."""
     rng = np.random.default_rng(6)
     count = 0
     for margin in (0.1, 0.5, 1.0):
         size, pose = made(rng, scattered, 60)
         every = np.argwhere(np.triu(np.ones((60, 60)), 1))
-        apart = ContactSolver().batch(
-            pose, sizes=size, pairs=every).separation
-        pairs, *_ = broad_phase(size, margin=margin).find(pose, PLENTY)
+        apart = ContactSolver().distance_batch(pose, sizes=size, pairs=every).distance
         wanted = set(map(tuple, every[apart <= margin].tolist()))
-        assert wanted <= set(map(tuple, pairs.tolist()))
+        index = index_of(size, pose, np.arange(60) < 60)
+        for pairs in (movers(size, margin=margin).find(pose, PLENTY)[0],
+                      index.near(size, pose, margin, PLENTY)):
+            assert wanted <= set(map(tuple, pairs.tolist()))
         count += len(wanted)
     assert count > 100
 
@@ -314,7 +304,7 @@ def wanted_pairs(boxes, pairs, patterns):
     asked = {frozenset((pair.a, pair.b)): pair for pair in pairs}
     for pattern_a, pattern_b in patterns:
         for first, second in itertools.combinations(boxes, 2):
-            for a, b in ((first, second), (second, first)):
+            for a, b in (sorted((first, second)), sorted((first, second))[::-1]):
                 if (fnmatch.fnmatchcase(a, pattern_a) and fnmatch.fnmatchcase(b, pattern_b)
                         and not (boxes[a].pose and boxes[b].pose)):
                     asked.setdefault(frozenset((a, b)), Pair.between(a, b))
@@ -393,12 +383,11 @@ def memory():
 n = 1500
 place = np.tile([0.0, 0, 0, 0, 0, 0, 1], (8000, 1))
 rows = place[:n] + np.arange(n)[:, None] * [5.0, 0, 0, 0, 0, 0, 0]
-phase = native.BroadPhase(np.ones((n, 3)), np.zeros(n, bool), 0.0, np.zeros((0, 2), int),
-                          np.zeros(n, 'i4'), np.ones((1, 1), 'u1'), np.full(n, -1, 'i4'))
+movers = native.Movers(np.ones((n, 3)), 0.0, None, None)
 before = memory()
 for row in rows:
     row[0] = 0.0
-    phase.find(rows, 1000)
+    movers.find(rows, 1000)
 print(memory() - before, end=' ')
 boxes = {f'b{n}': Box((1.0, 1.0, 1.0)) for n in range(8000)}
 before = memory()
