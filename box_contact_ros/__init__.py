@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from .solver.contact import Contact, Contacts
 from .solver.contact_solver import ContactSolver
-from .solver.motion import Approach, Approaches
+from .solver.motion import Approach, Approaches, Sweep
 from .solver.nearest import Nearest, Nearests
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 __all__ = ['Approach', 'Approaches', 'Body', 'Box', 'Contact', 'ContactSolver', 'Contacts',
            'FacePatches', 'Fall', 'Fault', 'Frame', 'Inspection', 'Nearest', 'Nearests', 'Pair',
            'PatchForces', 'PathCheck', 'Plan', 'ReadContacts', 'Row', 'Scene', 'SceneSolver',
-           'contacts_of', 'face_patches', 'inspect_plan', 'make_model', 'read_contacts',
+           'Sweep', 'contacts_of', 'face_patches', 'inspect_plan', 'make_model', 'read_contacts',
            'read_plan', 'read_scene']
 # `ContactNode` and `YardClient` need ROS, and `import *` does without.
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..core import native
 from ..solver.contact_solver import ContactSolver
-from ..solver.motion import Approaches
+from ..solver.motion import Approaches, Sweep
 from ..solver.nearest import Nearests
 from ..solver.pose import rotation_matrix
 
@@ -263,7 +263,7 @@ class Rides:
             starts = starts.copy()
             for box, row in zip(rides[0, 1:].tolist(), rows[0]):
                 starts[row] = self.poses_at(box, rides[:1, 0], shares[:1])[0]
-        found = ask(starts, self._ends, sizes=sizes, centres=self._centres, pairs=rows)
+        found = ask(Sweep(starts, self._ends, self._centres), sizes=sizes, pairs=rows)
         return replace(found, time=rides[:, 0] + shares + (1.0 - shares) * found.time,
                        closing_speed=found.closing_speed / (1.0 - shares))
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Never
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,13 +25,26 @@ from .checks import (
 )
 from .contact import Contact, Contacts, without_patch
 from .model import NATIVE_TYPES, Model, as_model
-from .motion import Approach, Approaches, find_approaches
+from .motion import Approach, Approaches, Sweep, as_sweeps, find_approaches
 from .nearest import Nearest, Nearests
 
-Names = tuple[str, str, str, str]  # of poses and sizes of A and B, in a refusal
+Names = tuple[str, str, str, str]  # of two arguments for A and B each, in a refusal
 _SINGLE: Names = ('pose_a', 'pose_b', 'size_a', 'size_b')
 _MANY: Names = ('poses_a', 'poses_b', 'size_a', 'size_b')
 _BY_PLACE: Names = ('poses', 'poses', 'sizes', 'sizes')
+_SWEPT: Names = ('end_a', 'end_b', 'centre_a', 'centre_b')
+_SWEPT_MANY: Names = ('ends_a', 'ends_b', 'centre_a', 'centre_b')
+_SWEPT_BY_PLACE: Names = ('ends', 'ends', 'centres', 'centres')
+
+
+class _Rows(NamedTuple):
+    """What a batch takes besides its poses, of any kind of numbers."""
+
+    size_a: ArrayLike | None
+    size_b: ArrayLike | None
+    sizes: ArrayLike | None
+    pairs: ArrayLike | None
+    threads: int
 
 
 class _Asked(NamedTuple):
@@ -54,7 +67,7 @@ class ContactSolver(native.PairSolver):
     contact = solver(pose_a, pose_b)
     contacts = solver.batch(poses_a, poses_b)
     nearest = solver.distance(pose_a, pose_b)
-    first = solver.time_of_impact(start_a, end_a, start_b, end_b)
+    first = solver.time_of_impact(Sweep(start_a, end_a), Sweep(start_b, end_b))
     ```
 
     Sizes are three full extents [m]. Without them, each batch brings its own. Poses are
@@ -108,16 +121,9 @@ class ContactSolver(native.PairSolver):
         distance = native.PairSolver.distance
         distance_batch = native.PairSolver.distance_batch
 
-    def time_of_impact(self, start_a: ArrayLike, end_a: ArrayLike, start_b: ArrayLike,
-                       end_b: ArrayLike, *, clearance: float = 0.0, tolerance: float = 1e-6,
-                       centre_a: ArrayLike | None = None, centre_b: ArrayLike | None = None,
-                       ) -> Approach:
+    def time_of_impact(self, sweep_a: Sweep, sweep_b: Sweep, *more: Never, clearance: float = 0.0,
+                       tolerance: float = 1e-6) -> Approach:
         """Return when two boxes first come as near as the clearance [m], and where.
-
-        Each box goes from a pose (7,) to another while s goes from 0 to 1: its centre on a line,
-        its axes the shortest way, at constant rate. centre_a, centre_b (3,): the points in the
-        boxes' own frames that go on lines instead of the centres [m]; for a box of a body, the
-        origin of the body's frame.
 
         Before `time` the distance is above the clearance, by proof. At `time` it is at most
         clearance + tolerance. NaN: they never come so near. Boxes that are so near at the start
@@ -126,50 +132,40 @@ class ContactSolver(native.PairSolver):
         Raises ValueError, with field and value, for a turn by 180 degrees, which has two ways, and
         for a tolerance that rounding does not allow.
         """
-        return self._approach(start_a, end_a, start_b, end_b, centre_a, centre_b, clearance,
-                              tolerance)
+        return self._approach((sweep_a, sweep_b, *more), clearance, tolerance)
 
-    def least_distance(self, start_a: ArrayLike, end_a: ArrayLike, start_b: ArrayLike,
-                       end_b: ArrayLike, *, tolerance: float = 1e-6,
-                       centre_a: ArrayLike | None = None, centre_b: ArrayLike | None = None,
+    def least_distance(self, sweep_a: Sweep, sweep_b: Sweep, *more: Never, tolerance: float = 1e-6,
                        ) -> Approach:
         """Return the least distance on the way, to the tolerance [m], when it is, and where.
 
         Boxes that touch on the way have the first time, as `time_of_impact` without a clearance:
-        the distance is then at most the tolerance. Arguments and errors are those of
-        `time_of_impact`.
+        the distance is then at most the tolerance. Errors are those of `time_of_impact`.
         """
-        return self._approach(start_a, end_a, start_b, end_b, centre_a, centre_b, None, tolerance)
+        return self._approach((sweep_a, sweep_b, *more), None, tolerance)
 
     def time_of_impact_batch(
-            self, starts_a: ArrayLike, ends_a: ArrayLike, starts_b: ArrayLike | None = None,
-            ends_b: ArrayLike | None = None, *, size_a: ArrayLike | None = None,
-            size_b: ArrayLike | None = None, sizes: ArrayLike | None = None,
-            pairs: ArrayLike | None = None, clearance: float = 0.0, tolerance: float = 1e-6,
-            centre_a: ArrayLike | None = None, centre_b: ArrayLike | None = None,
-            centres: ArrayLike | None = None, threads: int = 1) -> Approaches:
+            self, sweeps_a: Sweep, sweeps_b: Sweep | None = None, *more: Never,
+            size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
+            sizes: ArrayLike | None = None, pairs: ArrayLike | None = None, clearance: float = 0.0,
+            tolerance: float = 1e-6, threads: int = 1) -> Approaches:
         """Return the Approaches of n pairs: row i is what `time_of_impact` gives for row i.
 
-        Poses at the start and at the end, sizes, pairs and threads are those of `batch`: (starts_a,
-        ends_a, starts_b, ends_b), or (starts, ends, sizes=…, pairs=…). Centres are (3,), or have a
-        row for each pose.
+        Sweeps of rows take the place of poses. Sizes, pairs and threads are those of `batch`.
         """
-        return self._approaches(starts_a, ends_a, starts_b, ends_b, size_a, size_b, sizes, pairs,
-                                centre_a, centre_b, centres, clearance, tolerance, threads)
+        return self._approaches((sweeps_a, sweeps_b, *more), clearance, tolerance,
+                                _Rows(size_a, size_b, sizes, pairs, threads))
 
     def least_distance_batch(
-            self, starts_a: ArrayLike, ends_a: ArrayLike, starts_b: ArrayLike | None = None,
-            ends_b: ArrayLike | None = None, *, size_a: ArrayLike | None = None,
-            size_b: ArrayLike | None = None, sizes: ArrayLike | None = None,
-            pairs: ArrayLike | None = None, tolerance: float = 1e-6,
-            centre_a: ArrayLike | None = None, centre_b: ArrayLike | None = None,
-            centres: ArrayLike | None = None, threads: int = 1) -> Approaches:
+            self, sweeps_a: Sweep, sweeps_b: Sweep | None = None, *more: Never,
+            size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
+            sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
+            tolerance: float = 1e-6, threads: int = 1) -> Approaches:
         """Return the Approaches of n pairs: row i is what `least_distance` gives for row i.
 
         All arguments are those of `time_of_impact_batch`.
         """
-        return self._approaches(starts_a, ends_a, starts_b, ends_b, size_a, size_b, sizes, pairs,
-                                centre_a, centre_b, centres, None, tolerance, threads)
+        return self._approaches((sweeps_a, sweeps_b, *more), None, tolerance,
+                                _Rows(size_a, size_b, sizes, pairs, threads))
 
     def __reduce__(self) -> tuple[Callable[..., ContactSolver], tuple[Any, ...]]:
         """Pickle the arguments."""
@@ -214,42 +210,30 @@ class ContactSolver(native.PairSolver):
         return self._find_distances(
             self._rows(poses_a, poses_b, size_a, size_b, sizes, pairs, threads))
 
-    def _approach(self, start_a: ArrayLike, end_a: ArrayLike, start_b: ArrayLike, end_b: ArrayLike,
-                  centre_a: ArrayLike | None, centre_b: ArrayLike | None,
-                  clearance: float | None, tolerance: float) -> Approach:
-        found = native.approach(start_a, end_a, start_b, end_b, self._size_a, self._size_b,
-                                centre_a, centre_b, clearance, tolerance)
+    def _approach(self, sweeps: tuple[Sweep, ...], clearance: float | None, tolerance: float,
+                  ) -> Approach:
+        a, b = as_sweeps(sweeps)
+        found = native.approach(a.start, a.end, b.start, b.end, self._size_a, self._size_b,
+                                a.centre, b.centre, clearance, tolerance)
         if found:
             return Approach(*found)
+        asked = _Asked(_pose(a.start, 'start_a'), _pose(b.start, 'start_b'),
+                       _known(self._size_a, 'size_a'), _known(self._size_b, 'size_b'), _SINGLE)
+        ends = _pose(a.end, 'end_a'), _pose(b.end, 'end_b')
         try:
-            return find_approaches(
-                (_pose(start_a, 'start_a'), _pose(start_b, 'start_b'),
-                 _known(self._size_a, 'size_a'), _known(self._size_b, 'size_b')),
-                (_pose(end_a, 'end_a'), _pose(end_b, 'end_b')), (centre_a, centre_b),
-                ('end_a', 'end_b', 'centre_a', 'centre_b'), clearance=clearance,
-                tolerance=tolerance, threads=1, pairs=None)[0]
+            return find_approaches(asked[:4], ends, (a.centre, b.centre), _SWEPT, clearance,
+                                   tolerance)[0]
         except ValueError as error:
             raise ValueError(str(error).removeprefix('row 0: ')) from None
 
-    def _approaches(self, starts_a: ArrayLike, ends_a: ArrayLike, starts_b: ArrayLike | None,
-                    ends_b: ArrayLike | None, size_a: ArrayLike | None, size_b: ArrayLike | None,
-                    sizes: ArrayLike | None, pairs: ArrayLike | None, centre_a: ArrayLike | None,
-                    centre_b: ArrayLike | None, centres: ArrayLike | None,
-                    clearance: float | None, tolerance: float, threads: int) -> Approaches:
-        names = 'ends_a', 'ends_b', 'centre_a', 'centre_b'
-        if pairs is not None:
-            if any(value is not None for value in (centre_a, centre_b, ends_b)):
-                raise ValueError('pairs are places in starts, ends, sizes and centres: there is '
-                                 'neither ends_b nor centre_a nor centre_b')
-            names = 'ends', 'ends', 'centres', 'centres'
-            ends_b, centre_a, centre_b = ends_a, centres, centres
-        elif centres is not None or ends_b is None:
-            raise ValueError('a batch takes (starts_a, ends_a, starts_b, ends_b), or (starts, '
-                             'ends, sizes=…, pairs=…) and centres')
-        asked = self._rows(starts_a, starts_b, size_a, size_b, sizes, pairs, threads)
-        return find_approaches(asked[:4], (ends_a, ends_b), (centre_a, centre_b), names,
-                               clearance=clearance, tolerance=tolerance, threads=asked.threads,
-                               pairs=asked.places)
+    def _approaches(self, sweeps: tuple[Sweep | None, ...], clearance: float | None,
+                    tolerance: float, rows: _Rows) -> Approaches:
+        by_place = rows.pairs is not None
+        a, b = as_sweeps(sweeps, by_place=by_place)
+        asked = self._rows(a.start, None if by_place else b.start, *rows, kind='starts')
+        return find_approaches(asked[:4], (a.end, b.end), (a.centre, b.centre),
+                               _SWEPT_BY_PLACE if by_place else _SWEPT_MANY, clearance,
+                               tolerance, asked.threads, asked.places)
 
     def _pair(self, pose_a: ArrayLike, pose_b: ArrayLike) -> _Asked:
         """Return one pair of poses of any kind of numbers."""
@@ -258,24 +242,28 @@ class ContactSolver(native.PairSolver):
 
     def _rows(self, poses_a: ArrayLike, poses_b: ArrayLike | None, size_a: ArrayLike | None,
               size_b: ArrayLike | None, sizes: ArrayLike | None, pairs: ArrayLike | None,
-              threads: int) -> _Asked:
-        """Return the rows of a batch whose arguments are of any kind of numbers."""
+              threads: int, *, kind: str = 'poses') -> _Asked:
+        """Return the rows of a batch whose arguments are of any kind of numbers.
+
+        kind: what a refusal calls the poses.
+        """
         threads = as_whole(threads, 'threads', 1, THREADS_MAX)
         if pairs is not None:
             if poses_b is not None or size_a is not None or size_b is not None:
                 raise ValueError('pairs are places in poses and sizes: batch(poses, sizes=…, '
                                  'pairs=…) has neither poses_b nor size_a nor size_b')
-            poses = as_floats(poses_a, 'poses', 'poses (m, 7) of rows x y z qx qy qz qw', (None, 7))
+            poses = as_floats(poses_a, kind, 'poses (m, 7) of rows x y z qx qy qz qw', (None, 7))
             rows_a = self._sizes(sizes, 'sizes', self._size_a, len(poses))
             rows_b = self._sizes(sizes, 'sizes', self._size_b, len(poses))
             return _Asked(poses, poses, rows_a, rows_b, _BY_PLACE, threads,
                           as_places(pairs, 'pairs', len(poses)))
         if sizes is not None or poses_b is None:
             raise ValueError('batch takes (poses_a, poses_b), or (poses, sizes=…, pairs=…)')
-        a = as_floats(poses_a, 'poses_a', 'poses (n, 7) of rows x y z qx qy qz qw', (None, 7))
-        b = as_floats(poses_b, 'poses_b', 'poses (n, 7) of rows x y z qx qy qz qw', (None, 7))
+        a, b = (as_floats(poses, f'{kind}_{side}', 'poses (n, 7) of rows x y z qx qy qz qw',
+                          (None, 7)) for poses, side in ((poses_a, 'a'), (poses_b, 'b')))
         if len(a) != len(b):
-            raise ValueError(f'poses_a and poses_b must be equally many, not {len(a)} and {len(b)}')
+            raise ValueError(f'{kind}_a and {kind}_b must be equally many, not {len(a)} and '
+                             f'{len(b)}')
         return _Asked(a, b, self._sizes(size_a, 'size_a', self._size_a, len(a)),
                       self._sizes(size_b, 'size_b', self._size_b, len(a)), _MANY, threads)
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a solver returns of boxes on their ways: how near two of them come, and when."""
+"""Boxes on their ways: what a solver is asked, how near two of them come, and when."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -10,9 +10,25 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import native
-from .checks import as_floats, as_number
+from .checks import as_floats, as_number, short_repr
 from .nearest import Nearest, Nearests
 from .rows import Rows
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sweep:
+    """The way of a box from one pose to another while s goes from 0 to 1, or the ways of n boxes.
+
+    The centre goes on a line and the axes turn the shortest way, both at constant rate.
+    """
+
+    start: ArrayLike
+    """The pose at s = 0 (7,), or rows (n, 7)."""
+    end: ArrayLike
+    """The pose at s = 1 (7,), or a row for each start."""
+    centre: ArrayLike | None = None
+    """The point in the box's own frame that goes on a line instead of its centre (3,) or (n, 3)
+    [m]; for a box of a body, the origin of the body's frame."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,11 +61,27 @@ class Approaches(Rows[Approach]):
         return Approach(float(time), float(closing_speed), nearest)
 
 
+def as_sweeps(given: tuple[object, ...], *, by_place: bool = False) -> tuple[Sweep, Sweep]:
+    """Return the sweeps of A and B; by_place: one sweep, of whose rows pairs are made.
+
+    Raises ValueError for anything else, and shows the form.
+    """
+    a, b, *more = given
+    if isinstance(a, Sweep) and not more:
+        if isinstance(b, Sweep) and not by_place:
+            return a, b
+        if b is None and by_place:
+            return a, a
+    form = ('one Sweep(starts, ends) comes with pairs' if by_place else
+            'motions are two sweeps, Sweep(start_a, end_a), Sweep(start_b, end_b)')
+    raise ValueError(f'{form}; not {", ".join(map(short_repr, given))}')
+
+
 def find_approaches(starts: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
                     ends: tuple[ArrayLike, ArrayLike],
                     centres: tuple[ArrayLike | None, ArrayLike | None], names: tuple[str, ...],
-                    *, clearance: float | None, tolerance: float, threads: int,
-                    pairs: np.ndarray | None) -> Approaches:
+                    clearance: float | None, tolerance: float, threads: int = 1,
+                    pairs: np.ndarray | None = None) -> Approaches:
     """Return the approaches of rows; clearance None: those of their least distances.
 
     starts: poses and sizes of A and B, checked. ends, centres: of A and B, of any kind of numbers.
