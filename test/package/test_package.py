@@ -12,8 +12,10 @@ import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import pytest
 from conftest import EXTRAS, PROGRAMS
@@ -238,6 +240,33 @@ def test_exported_names_are_what_dir_lists() -> None:
     assert set(box_contact_ros.__all__) <= set(dir(box_contact_ros))
     with pytest.raises(AttributeError, match='SceneSolvr'):
         _ = box_contact_ros.SceneSolvr
+
+
+def _documented() -> Iterator[Any]:
+    """Yield what the reference of the Python API documents, and members that it names."""
+    page = (ROOT / 'docs' / 'reference' / 'python_api.md').read_text('utf-8')
+    for name, options in re.findall(r':: box_contact_ros\.(\w+)\n((?:   :.*\n)*)', page):
+        yield (thing := getattr(box_contact_ros, name))
+        names = re.findall(r'\w+', options.replace(':members:\n', ' '.join(vars(thing))))
+        members = [vars(thing).get(name) for name in names
+                   if name == '__call__' or not name.startswith('_')]
+        yield from (getattr(part, '__func__', getattr(part, 'fget', part)) for part in members)
+
+
+def test_what_is_returned_or_raised_can_be_imported() -> None:
+    """Each class of ours in an annotation of a documented result or field, or behind `Raises`."""
+    ours = {name for path in ROOT.glob('box_contact_ros/**/*.py')
+            for name in re.findall(r'^class (\w+)', path.read_text('utf-8'), re.MULTILINE)}
+    told: set[str] = set()
+    for thing in _documented():
+        hints = dict(getattr(thing, '__annotations__', {}))
+        if not isinstance(thing, type):
+            hints = {'return': hints.get('return')}
+        words = [*(hint for hint in map(str, hints.values()) if 'ClassVar' not in hint),
+                 *re.findall(r'[Rr]aises? `?\w+', getattr(thing, '__doc__', None) or '')]
+        told |= ours.intersection(re.findall(r'\w+', ' '.join(words)))
+    assert told >= {'Answer', 'Assembly', 'Loads', 'Motion', 'SceneError', 'TooManyNear'}
+    assert told <= {*dir(box_contact_ros)}
 
 
 def test_a_build_without_a_compiler_names_it() -> None:
