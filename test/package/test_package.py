@@ -13,16 +13,15 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import EXTRAS, PROGRAMS
+from conftest import PROGRAMS
 from patience import PATIENCE
 
 import box_contact_ros
-from box_contact_ros import resources
+from box_contact_ros import extras, resources
 from box_contact_ros.arguments import program_parser
 from box_contact_ros.resources import resource_path
 
@@ -127,25 +126,13 @@ def test_a_missing_extra_is_one_line_that_names_it() -> None:
 @pytest.mark.parametrize('module', PROGRAMS.values())
 def test_a_program_without_extras_ends_in_one_line(module: str) -> None:
     """Before it imports what it misses. Of a plan, only some files need an extra."""
-    absent = [name for modules in EXTRAS.values() for name in modules if name != 'safetensors']
     arguments = ['docs/examples/files/ship.edi'] if module == 'plans.inspect_files' else []
-    done = _run('-c', f'import sys; sys.modules.update(dict.fromkeys({absent}))\n'
+    done = _run('-c', f'import sys; sys.modules.update(dict.fromkeys({[*extras.EXTRA_OF]}))\n'
                       f'import box_contact_ros.{module} as program\n'
                       f'sys.exit(program.main({arguments}))')
     status = 2 if module == 'plans.inspect_files' else 1  # there 1 is a plan that is not sound
     assert (done.returncode, done.stderr.count('\n')) == (status, 1), done.stderr
     assert 'pip install' in done.stderr
-
-
-@pytest.mark.parametrize('program, module', PROGRAMS.items())
-def test_help_of_each_program(program: str, module: str, capsys: pytest.CaptureFixture[str],
-                              monkeypatch: pytest.MonkeyPatch) -> None:
-    """As entry points call it: without arguments, by the name that the shell gave."""
-    main = import_module(f'box_contact_ros.{module}').main
-    monkeypatch.setattr(sys, 'argv', [f'bin/box_contact_{program}', '--help'])
-    with pytest.raises(SystemExit, match='0'):
-        main()
-    assert capsys.readouterr().out.startswith(f'usage: box_contact_{program}')
 
 
 # --- metadata -------------------------------------------------------------------------------------

@@ -43,7 +43,7 @@ from box_contact_ros.models.make_model import most_near
 from box_contact_ros.models.weights_file import load_weights
 from box_contact_ros.node import check, diagnostics, topics
 from box_contact_ros.node.check import CheckAnswerer
-from box_contact_ros.node.contact_node import PARAMETERS
+from box_contact_ros.node.parameters import CONTACT_PARAMETERS
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene import scene_check, scene_file
 from box_contact_ros.scene.scene import two_boxes
@@ -194,7 +194,7 @@ def parameter(words: list[str], **_) -> None:
     """`ros2 param set NODE NAME VALUE`: the node has it, and takes the value."""
     node, name, value = words[3:]
     assert node == '/contact_node'
-    PARAMETERS[name].validate(name, yaml.safe_load(value))
+    CONTACT_PARAMETERS[name].validate(name, yaml.safe_load(value))
 
 
 def pip(words: list[str], setup_arguments, **_) -> None:
@@ -228,7 +228,8 @@ def launch(words: list[str], **_) -> None:
     assert words[2] == 'box_contact_ros'
     text = (ROOT / 'launch' / words[3]).read_text('utf-8')
     names = [word.partition(':=')[0] for word in words[4:]]
-    assert all(f"'{name}'" in text or 'PARAMETERS' in text and name in PARAMETERS for name in names)
+    assert all(f"'{name}'" in text or 'PARAMETERS' in text and name in CONTACT_PARAMETERS
+               for name in names)
 
 
 def elsewhere(words: list[str], **_) -> None:
