@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..solver.checks import printable
+from ..solver.rows import NoTruth
 from .plan import LACKS, VERDICTS, Plan
 from .room import SIDES
 from .verdict import CAUSES, GOES
@@ -64,7 +65,7 @@ class Fall(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Inspection:
+class Inspection(NoTruth):
     """What is wrong with a plan of n boxes, and what each of them carries.
 
     Of boxes without masses, loads, pressures and loaded margins are NaN. Of those on the ground,
@@ -124,6 +125,8 @@ class Inspection:
     ways: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), int))
     """(w, 2) a box and another that blocks its way, by index: by steps, and by what it meets first.
     """
+
+    _instead = '.sound or .verdict'
 
     @property
     def verdict(self) -> str:

@@ -21,6 +21,7 @@ from ..solver.contact_solver import ContactSolver
 from ..solver.motion import Approach, Approaches
 from ..solver.nearest import Nearests
 from ..solver.pose import rotation_matrix
+from ..solver.rows import NoTruth
 from .rides import Course, Rides, Surroundings, turns_between
 from .scene import Pair, Scene
 
@@ -38,7 +39,7 @@ SOLVED = 2048
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PathCheck:
+class PathCheck(NoTruth):
     """What a path meets. Boxes are their indices in `scene`; times go from 0 to m − 1."""
 
     pairs: np.ndarray
@@ -55,6 +56,8 @@ class PathCheck:
     """When, and how near it comes; where boxes touch, the first of these times."""
     scene: Scene
     revision: int = 0  # of the scene, as of `SceneSolver.set_boxes`
+
+    _instead = '.is_free'
 
     @classmethod
     def of(cls, found: Found, scene: Scene, revision: int) -> PathCheck:

@@ -38,6 +38,8 @@ class Contacts(Rows[Contact]):
     axis: np.ndarray
     """(n,) int32."""
 
+    _instead = '.colliding, .colliding.any() or len()'
+
     @classmethod
     def of(cls, contacts: Iterable[Contact]) -> Contacts:
         """Return single contacts as arrays."""

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..core import native
 from .checks import as_floats, as_number, short_repr
 from .nearest import Nearest, Nearests
-from .rows import Rows
+from .rows import NoTruth, Rows
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +32,7 @@ class Sweep:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Approach:
+class Approach(NoTruth):
     """How near two boxes come on their ways, and when."""
 
     time: float
@@ -41,6 +41,8 @@ class Approach:
     """Minus the rate of the distance at that time [m per unit of s]."""
     nearest: Nearest
     """The nearest points at that time."""
+
+    _instead = 'whether .time is NaN, or .nearest.colliding'
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,6 +58,8 @@ class Approaches(Rows[Approach]):
     """(n,) [m per unit of s]."""
     nearest: Nearests
     """(n,)."""
+
+    _instead = '.time, .nearest.colliding or len()'
 
     def _one(self, time: np.float64, closing_speed: np.float64, nearest: Nearest) -> Approach:
         return Approach(float(time), float(closing_speed), nearest)
