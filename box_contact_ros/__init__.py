@@ -62,14 +62,18 @@ _LOADED_WHEN_USED = {
 
 
 def __getattr__(name: str) -> Any:
-    """Return an exported name whose module was not imported yet."""
+    """Return an exported name whose module was not imported yet, or the version."""
+    if name == '__version__':
+        return _import_module('importlib.metadata').version(__name__)
     for module, names in _LOADED_WHEN_USED.items():
         if name in names:
             globals()[name] = value = getattr(_import_module(f'.{module}', __name__), name)
             return value
-    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    here = ': ContactSolver(size_a, size_b)(pose_a, pose_b) does it' if name == 'collide' else ''
+    raise AttributeError(f'module {__name__!r} has no attribute {name!r}{here}')
 
 
 def __dir__() -> list[str]:
     """Return the exported names too that were not used yet."""
-    return sorted({*globals(), *(name for names in _LOADED_WHEN_USED.values() for name in names)})
+    names = (name for names in _LOADED_WHEN_USED.values() for name in names)
+    return sorted({*globals(), '__version__', *names})

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from itertools import groupby
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -339,13 +340,16 @@ class Inspection(NoTruth):
             if lack and counts[lack]:
                 yield one if counts[lack] == 1 else more.format(counts[lack])
 
-    def plot(self) -> Figure:
+    def plot(self, file: str | Path | None = None) -> Figure:
         """Return a figure of the plan, coloured by verdict; the worst boxes have their names.
 
-        It needs Matplotlib, the extra `report`.
+        file: where the picture is written to, too. It needs Matplotlib, the extra `report`.
         """
         from .plot import picture
-        return picture(self.plan, self.verdicts, self.rows(), self.summary())
+        figure = picture(self.plan, self.verdicts, self.rows(), self.summary())
+        if file is not None:
+            figure.savefig(file, dpi=120)
+        return figure
 
     def to_json(self, **first: str) -> str:
         """Return all that was found as a line of JSON, as msg_schemas/inspection.json has it.

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple, Never
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,16 +25,15 @@ from .checks import (
 )
 from .contact import Contact, Contacts, without_patch
 from .model import NATIVE_TYPES, Model, as_model
-from .motion import Approach, Approaches, Sweep, as_sweeps, find_approaches
+from .motion import Approach, Approaches, Sweep, as_sweeps, find_approaches, takes_sweeps
 from .nearest import Nearest, Nearests
+from .poses import ORDER, PoseLike, as_many, as_pose, as_poses
 
-Names = tuple[str, str, str, str]  # of two arguments for A and B each, in a refusal
+Names = tuple[str, str, str, str]  # of poses and sizes of A and B, in a refusal
 _SINGLE: Names = ('pose_a', 'pose_b', 'size_a', 'size_b')
 _MANY: Names = ('poses_a', 'poses_b', 'size_a', 'size_b')
 _BY_PLACE: Names = ('poses', 'poses', 'sizes', 'sizes')
-_SWEPT: Names = ('end_a', 'end_b', 'centre_a', 'centre_b')
-_SWEPT_MANY: Names = ('ends_a', 'ends_b', 'centre_a', 'centre_b')
-_SWEPT_BY_PLACE: Names = ('ends', 'ends', 'centres', 'centres')
+_CENTRES = ('centre_a', 'centre_b')
 
 
 class _Rows(NamedTuple):
@@ -71,8 +70,9 @@ class ContactSolver(native.PairSolver):
     ```
 
     Sizes are three full extents [m]. Without them, each batch brings its own. Poses are
-    `x y z qx qy qz qw` in a common frame. Raises `ValueError`, with the field and the value, for
-    anything that is not a size or a pose. A solver may be called from several threads.
+    `x y z qx qy qz qw` in a common frame, 4×4 matrices, (position, rotation) or messages. Raises
+    `ValueError`, with the field and the value, for anything that is not a size or a pose. A solver
+    may be called from several threads.
 
     model: 'exact', 'mlp', or an object with `solve` as `models.Model` describes it.
     margin: separation up to which pairs apart have a normal too [m]; infinity: all.
@@ -102,17 +102,17 @@ class ContactSolver(native.PairSolver):
         super().__init__(answers, a, b, margin)
 
     if TYPE_CHECKING:  # the core, which does it, knows no type of ours
-        def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact: ...  # noqa: D102
+        def __call__(self, pose_a: PoseLike, pose_b: PoseLike) -> Contact: ...  # noqa: D102
 
-        def batch(self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,  # noqa: D102
+        def batch(self, poses_a: PoseLike, poses_b: PoseLike | None = None, *,  # noqa: D102
                   size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
                   sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
                   threads: int = 1, patch: bool = True) -> Contacts: ...
 
-        def distance(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Nearest: ...  # noqa: D102
+        def distance(self, pose_a: PoseLike, pose_b: PoseLike) -> Nearest: ...  # noqa: D102
 
         def distance_batch(  # noqa: D102
-                self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,
+                self, poses_a: PoseLike, poses_b: PoseLike | None = None, *,
                 size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
                 sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
                 threads: int = 1) -> Nearests: ...
@@ -121,7 +121,8 @@ class ContactSolver(native.PairSolver):
         distance = native.PairSolver.distance
         distance_batch = native.PairSolver.distance_batch
 
-    def time_of_impact(self, sweep_a: Sweep, sweep_b: Sweep, *more: Never, clearance: float = 0.0,
+    @takes_sweeps
+    def time_of_impact(self, sweep_a: Sweep, sweep_b: Sweep, *, clearance: float = 0.0,
                        tolerance: float = 1e-6) -> Approach:
         """Return when two boxes first come as near as the clearance [m], and where.
 
@@ -132,19 +133,21 @@ class ContactSolver(native.PairSolver):
         Raises ValueError, with field and value, for a turn by 180 degrees, which has two ways, and
         for a tolerance that rounding does not allow.
         """
-        return self._approach((sweep_a, sweep_b, *more), clearance, tolerance)
+        return self._approach(sweep_a, sweep_b, clearance, tolerance)
 
-    def least_distance(self, sweep_a: Sweep, sweep_b: Sweep, *more: Never, tolerance: float = 1e-6,
+    @takes_sweeps
+    def least_distance(self, sweep_a: Sweep, sweep_b: Sweep, *, tolerance: float = 1e-6,
                        ) -> Approach:
         """Return the least distance on the way, to the tolerance [m], when it is, and where.
 
         Boxes that touch on the way have the first time, as `time_of_impact` without a clearance:
         the distance is then at most the tolerance. Errors are those of `time_of_impact`.
         """
-        return self._approach((sweep_a, sweep_b, *more), None, tolerance)
+        return self._approach(sweep_a, sweep_b, None, tolerance)
 
+    @takes_sweeps
     def time_of_impact_batch(
-            self, sweeps_a: Sweep, sweeps_b: Sweep | None = None, *more: Never,
+            self, sweeps_a: Sweep, sweeps_b: Sweep | None = None, *,
             size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
             sizes: ArrayLike | None = None, pairs: ArrayLike | None = None, clearance: float = 0.0,
             tolerance: float = 1e-6, threads: int = 1) -> Approaches:
@@ -152,11 +155,12 @@ class ContactSolver(native.PairSolver):
 
         Sweeps of rows take the place of poses. Sizes, pairs and threads are those of `batch`.
         """
-        return self._approaches((sweeps_a, sweeps_b, *more), clearance, tolerance,
+        return self._approaches(sweeps_a, sweeps_b, clearance, tolerance,
                                 _Rows(size_a, size_b, sizes, pairs, threads))
 
+    @takes_sweeps
     def least_distance_batch(
-            self, sweeps_a: Sweep, sweeps_b: Sweep | None = None, *more: Never,
+            self, sweeps_a: Sweep, sweeps_b: Sweep | None = None, *,
             size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
             sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
             tolerance: float = 1e-6, threads: int = 1) -> Approaches:
@@ -164,22 +168,29 @@ class ContactSolver(native.PairSolver):
 
         All arguments are those of `time_of_impact_batch`.
         """
-        return self._approaches((sweeps_a, sweeps_b, *more), None, tolerance,
+        return self._approaches(sweeps_a, sweeps_b, None, tolerance,
                                 _Rows(size_a, size_b, sizes, pairs, threads))
+
+    def __repr__(self) -> str:
+        """Return the call that makes the same solver."""
+        sizes = [f'size_{side}={tuple(size[0].tolist())}' for side, size in (
+            ('a', self._size_a), ('b', self._size_b)) if size is not None]
+        margin = [f'margin={self._margin:g}'] if self._margin else []
+        return f'ContactSolver({", ".join((*sizes, f"model={self.model!r}", *margin))})'
 
     def __reduce__(self) -> tuple[Callable[..., ContactSolver], tuple[Any, ...]]:
         """Pickle the arguments."""
         return (partial(ContactSolver, model=self.model, margin=self._margin),
                 tuple(None if size is None else size[0] for size in (self._size_a, self._size_b)))
 
-    def _call_general(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact:
+    def _call_general(self, pose_a: PoseLike, pose_b: PoseLike) -> Contact:
         """Return the contact of one pair whose poses (7,) are of any kind of numbers.
 
         Raises ValueError, with field and value, for poses that are refused.
         """
         return self._solve(self._pair(pose_a, pose_b))[0]
 
-    def _batch_general(self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,
+    def _batch_general(self, poses_a: PoseLike, poses_b: PoseLike | None = None, *,
                        size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
                        sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
                        threads: int = 1, patch: bool = True) -> Contacts:
@@ -195,11 +206,11 @@ class ContactSolver(native.PairSolver):
         return self._solve(self._rows(poses_a, poses_b, size_a, size_b, sizes, pairs, threads),
                            bool(patch))
 
-    def _distance_general(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Nearest:
+    def _distance_general(self, pose_a: PoseLike, pose_b: PoseLike) -> Nearest:
         """Return what `distance` does, for poses of any kind; ValueError as of a call."""
         return self._find_distances(self._pair(pose_a, pose_b))[0]
 
-    def _distance_batch_general(self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,
+    def _distance_batch_general(self, poses_a: PoseLike, poses_b: PoseLike | None = None, *,
                                 size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
                                 sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
                                 threads: int = 1) -> Nearests:
@@ -210,9 +221,9 @@ class ContactSolver(native.PairSolver):
         return self._find_distances(
             self._rows(poses_a, poses_b, size_a, size_b, sizes, pairs, threads))
 
-    def _approach(self, sweeps: tuple[Sweep, ...], clearance: float | None, tolerance: float,
+    def _approach(self, sweep_a: Sweep, sweep_b: Sweep, clearance: float | None, tolerance: float,
                   ) -> Approach:
-        a, b = as_sweeps(sweeps)
+        a, b = as_sweeps(sweep_a, sweep_b)
         found = native.approach(a.start, a.end, b.start, b.end, self._size_a, self._size_b,
                                 a.centre, b.centre, clearance, tolerance)
         if found:
@@ -221,49 +232,48 @@ class ContactSolver(native.PairSolver):
                        _known(self._size_a, 'size_a'), _known(self._size_b, 'size_b'), _SINGLE)
         ends = _pose(a.end, 'end_a'), _pose(b.end, 'end_b')
         try:
-            return find_approaches(asked[:4], ends, (a.centre, b.centre), _SWEPT, clearance,
+            return find_approaches(asked[:4], ends, (a.centre, b.centre), _CENTRES, clearance,
                                    tolerance)[0]
         except ValueError as error:
             raise ValueError(str(error).removeprefix('row 0: ')) from None
 
-    def _approaches(self, sweeps: tuple[Sweep | None, ...], clearance: float | None,
+    def _approaches(self, sweeps_a: Sweep, sweeps_b: Sweep | None, clearance: float | None,
                     tolerance: float, rows: _Rows) -> Approaches:
         by_place = rows.pairs is not None
-        a, b = as_sweeps(sweeps, by_place=by_place)
-        asked = self._rows(a.start, None if by_place else b.start, *rows, kind='starts')
-        return find_approaches(asked[:4], (a.end, b.end), (a.centre, b.centre),
-                               _SWEPT_BY_PLACE if by_place else _SWEPT_MANY, clearance,
+        a, b = as_sweeps(sweeps_a, sweeps_b, by_place=by_place)
+        names = _CENTRES
+        if by_place:
+            start_a, end_a = as_many(starts=a.start, ends=a.end)
+            start_b, end_b, names = None, end_a, ('centres', 'centres')
+        else:
+            start_a, end_a, start_b, end_b = as_many(
+                starts_a=a.start, ends_a=a.end, starts_b=b.start, ends_b=b.end)
+        asked = self._rows(start_a, start_b, *rows)
+        return find_approaches(asked[:4], (end_a, end_b), (a.centre, b.centre), names, clearance,
                                tolerance, asked.threads, asked.places)
 
-    def _pair(self, pose_a: ArrayLike, pose_b: ArrayLike) -> _Asked:
+    def _pair(self, pose_a: PoseLike, pose_b: PoseLike) -> _Asked:
         """Return one pair of poses of any kind of numbers."""
         return _Asked(_pose(pose_a, 'pose_a'), _pose(pose_b, 'pose_b'),
                       _known(self._size_a, 'size_a'), _known(self._size_b, 'size_b'), _SINGLE)
 
-    def _rows(self, poses_a: ArrayLike, poses_b: ArrayLike | None, size_a: ArrayLike | None,
+    def _rows(self, poses_a: PoseLike, poses_b: PoseLike | None, size_a: ArrayLike | None,
               size_b: ArrayLike | None, sizes: ArrayLike | None, pairs: ArrayLike | None,
-              threads: int, *, kind: str = 'poses') -> _Asked:
-        """Return the rows of a batch whose arguments are of any kind of numbers.
-
-        kind: what a refusal calls the poses.
-        """
+              threads: int) -> _Asked:
+        """Return the rows of a batch whose arguments are of any kind of numbers."""
         threads = as_whole(threads, 'threads', 1, THREADS_MAX)
         if pairs is not None:
             if poses_b is not None or size_a is not None or size_b is not None:
                 raise ValueError('pairs are places in poses and sizes: batch(poses, sizes=…, '
                                  'pairs=…) has neither poses_b nor size_a nor size_b')
-            poses = as_floats(poses_a, kind, 'poses (m, 7) of rows x y z qx qy qz qw', (None, 7))
+            poses = as_poses(poses_a, 'poses')
             rows_a = self._sizes(sizes, 'sizes', self._size_a, len(poses))
             rows_b = self._sizes(sizes, 'sizes', self._size_b, len(poses))
             return _Asked(poses, poses, rows_a, rows_b, _BY_PLACE, threads,
                           as_places(pairs, 'pairs', len(poses)))
         if sizes is not None or poses_b is None:
             raise ValueError('batch takes (poses_a, poses_b), or (poses, sizes=…, pairs=…)')
-        a, b = (as_floats(poses, f'{kind}_{side}', 'poses (n, 7) of rows x y z qx qy qz qw',
-                          (None, 7)) for poses, side in ((poses_a, 'a'), (poses_b, 'b')))
-        if len(a) != len(b):
-            raise ValueError(f'{kind}_a and {kind}_b must be equally many, not {len(a)} and '
-                             f'{len(b)}')
+        a, b = as_many(poses_a=poses_a, poses_b=poses_b)
         return _Asked(a, b, self._sizes(size_a, 'size_a', self._size_a, len(a)),
                       self._sizes(size_b, 'size_b', self._size_b, len(a)), _MANY, threads)
 
@@ -310,7 +320,7 @@ class ContactSolver(native.PairSolver):
                                               (asked.size_b, asked.names[3], size_fault, of_b)):
             if fault := fault_of(values[place % len(values)]):
                 numbered = name.startswith('poses') or len(asked.a) > 1
-                order = '; a pose is x y z qx qy qz qw' if fault_of is pose_fault else ''
+                order = ORDER if fault_of is pose_fault else ''
                 return f'{name}[{place}] {fault}{order}' if numbered else f'{name} {fault}{order}'
         fault = self._size_fault(asked.size_a[of_a % len(asked.size_a)],
                                  asked.size_b[of_b % len(asked.size_b)])
@@ -339,9 +349,9 @@ def _checked(answer: object, model: str, count: int) -> tuple[Contacts, int]:
     return contacts, int(refused)
 
 
-def _pose(pose: ArrayLike, name: str) -> np.ndarray:
-    """Return a pose (7,) of any kind of numbers as (1, 7)."""
-    return as_floats(pose, name, 'a pose (x y z qx qy qz qw)', (7,)).reshape(1, 7)
+def _pose(pose: PoseLike, name: str) -> np.ndarray:
+    """Return a pose of any form as (1, 7)."""
+    return as_pose(pose, name).reshape(1, 7)
 
 
 def _known(size: np.ndarray | None, name: str) -> np.ndarray:

@@ -33,7 +33,7 @@ MASSES = {'c1': 20_000.0, 'c2': 12_000.0, FRAME: 8_000.0}  # [kg]
 TOP, STIFFNESS, DAMPING, GRAVITY = 20.0, 1e6, 2e5, 9.81  # of the rope [m], [N/m], [N s/m]
 STEP, STEPS = 0.002, 20  # of physics [s]; how many from question to question
 WIDE = 1e12  # inertia of a load that guides keep from turning [kg m²]
-FIXED = Body(mass=0.0, inertia=np.zeros(3))
+FIXED = Body.fixed()
 
 
 class Crane(Node):

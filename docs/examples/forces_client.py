@@ -36,7 +36,7 @@ def main() -> None:
     client.wait_for_node()
     places = {'box_a': 0, 'box_b': 1}  # of the bodies, by the names of their boxes
     forces = PatchForces([Body(mass=MASS, inertia=[WIDE] * 3),
-                          Body(mass=0.0, inertia=np.zeros(3))])
+                          Body.fixed()])
     forces.set_boxes([SIZE, SIZE])  # then corners of loads are those of the faces
     poses = np.array([[0.0, 0.0, 2.611, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
     velocities, weights = np.zeros((2, 6)), np.zeros((2, 6))

@@ -61,7 +61,7 @@ def main() -> None:
     mujoco.mj_forward(model, data)
     boxes = {'load': Box(SIZE), 'stack': Box(SIZE, STACK)}
     solver = SceneSolver(Scene(boxes, (Pair.between('load', 'stack'),)), margin=MARGIN)
-    fixed = Body(mass=0.0, inertia=np.zeros(3))
+    fixed = Body.fixed()
     forces = PatchForces([Body.of_box(SIZE, MASS), fixed])  # body 0, the load, and 1, the stack
     forces.set_boxes([SIZE, SIZE])
     velocities, weights = np.zeros((2, 6)), np.zeros((2, 6))

@@ -58,7 +58,7 @@ def tower() -> np.ndarray:
     velocities, weights = np.zeros((2, count, 6))
     weights[1:, 2] = -GRAVITY * 600.0
     solver = ContactSolver((1, 1, 1), (1, 1, 1))
-    forces = PatchForces([Body(mass=0.0, inertia=(0, 0, 0))]
+    forces = PatchForces([Body.fixed()]
                          + [Body.of_box((1, 1, 1), 600.0)] * (count - 1))
     for _ in range(400):
         forces.hold(pairs, solver.batch(poses, sizes=sizes, pairs=pairs), poses)

@@ -346,12 +346,12 @@ def test_arguments_that_do_not_go_together():
     two = r'motions are two sweeps, Sweep\(start_a, end_a\), '
     for arguments, options, words in (
             ((still,), {'size_a': UNIT, 'size_b': UNIT}, f'{two}.*not Sweep.*, None'),
-            ((rows, rows, rows, rows), {'size_a': UNIT, 'size_b': UNIT}, f'{two}.*not array'),
+            ((rows, rows, rows, rows), {'size_a': UNIT, 'size_b': UNIT}, f'{two}.*not four poses'),
             ((still, still), {'sizes': UNIT, 'pairs': pairs}, one),
             ((rows, rows), {'sizes': UNIT, 'pairs': pairs}, one),
             ((still,), {'sizes': UNIT, 'pairs': pairs, 'size_a': UNIT}, 'pairs are places'),
-            ((cut, still), {'size_a': UNIT, 'size_b': UNIT}, 'ends_a must be'),
-            ((cut,), {'sizes': UNIT, 'pairs': pairs}, 'ends must be poses'),
+            ((cut, still), {'size_a': UNIT, 'size_b': UNIT}, 'ends_a and starts_b and ends_b must'),
+            ((cut,), {'sizes': UNIT, 'pairs': pairs}, 'starts and ends must be equally many'),
             ((still,), {'sizes': UNIT, 'pairs': [(0, 3)]}, r'pairs\[0\] is \(0, 3\)'),
             ((still,), {'sizes': UNIT, 'pairs': pairs, 'threads': 0}, 'threads must be')):
         with pytest.raises(ValueError, match=words):
@@ -361,6 +361,8 @@ def test_arguments_that_do_not_go_together():
     for call in (solver.time_of_impact, solver.least_distance):
         with pytest.raises(ValueError, match=two):
             call(*WAYS)
+        with pytest.raises(ValueError, match=two):
+            call(**dict(zip(NAMES, WAYS)))
 
 
 # --- bits -----------------------------------------------------------------------------------------
