@@ -17,6 +17,9 @@ It prints:
 """
 from itertools import combinations
 
+from box_contact_ros.extras import require
+
+require('sim')  # what is missing is named in one line
 import mujoco
 import numpy as np
 

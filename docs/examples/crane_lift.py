@@ -14,6 +14,9 @@ It prints:
     c1: swayed 0.18 m, stands at 5.89 m, 0.6 mm deep
     c2: swayed 0.40 m, stands at 5.88 m, 1.3 mm deep
 """
+from box_contact_ros.extras import require
+
+require('ros')  # what is missing is named in one line
 import numpy as np
 import rclpy
 from geometry_msgs.msg import Point, Pose, Quaternion, Transform, Vector3

@@ -17,6 +17,9 @@ It prints:
     force / weight 1.0000, slid 20 mm
     corner loads 49.1 49.1 49.0 49.0 kN
 """
+from box_contact_ros.extras import require
+
+require('ros')  # what is missing is named in one line
 import numpy as np
 import rclpy
 from lockstep_client import LockstepClient

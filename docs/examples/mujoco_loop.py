@@ -17,6 +17,9 @@ It prints:
     1.01 s: 0.0 mm deep, 0 mm/s
     at rest: force / weight 1.0000, tilt below 0.001°: True
 """
+from box_contact_ros.extras import require
+
+require('sim')  # what is missing is named in one line
 import mujoco
 import numpy as np
 
