@@ -24,9 +24,9 @@ COMPILER = os.environ.get('CXX', 'c++').split()
 # A wheel of CMake may lie in an environment that is not activated.
 os.environ['PATH'] += os.pathsep + sysconfig.get_path('scripts')
 
-PROGRAMS = {'bench': 'bench.bench', 'contact_node': 'node.contact_node',
-            'crane': 'demo.crane_node', 'inspect': 'plans.inspect_files',
-            'markers': 'view.live.markers', 'soup_node': 'node.soup_node', 'view': 'view.view'}
+PROGRAMS = {'bench': 'bench.bench', 'contact_node': 'node.run_contact_node',
+            'crane': 'demo.run_crane', 'inspect': 'plans.inspect_files',
+            'markers': 'view.markers', 'soup_node': 'node.run_soup_node', 'view': 'view.view'}
 """The module of each program, whose `main` starts it."""
 
 # colcon and bloom run `setup.py install` or `develop`. `ros2 run` needs programs under their bare

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.motion import Approaches
+from box_contact_ros.solver.motion import Approaches, Sweep
 from box_contact_ros.solver.pose import rotation_matrix
 
 from .pose_sets import CONTAINER, log_uniform, quaternion_multiply, turns, unit_quaternions
@@ -42,17 +42,21 @@ class Motions(NamedTuple):
         """Return some of the motions, in contiguous arrays."""
         return Motions(*(np.ascontiguousarray(part[chosen]) for part in self))
 
+    def sweeps(self) -> tuple[Sweep, Sweep]:
+        """Return the ways of A and B."""
+        return (Sweep(self.start_a, self.end_a, self.centre_a),
+                Sweep(self.start_b, self.end_b, self.centre_b))
+
     def least(self, tolerance: float = TOLERANCE) -> Approaches:
         """Return the least distances of all."""
         return ContactSolver().least_distance_batch(
-            *self[:4], size_a=self.size_a, size_b=self.size_b, centre_a=self.centre_a,
-            centre_b=self.centre_b, tolerance=tolerance)
+            *self.sweeps(), size_a=self.size_a, size_b=self.size_b, tolerance=tolerance)
 
     def first(self, clearance: float, tolerance: float = TOLERANCE) -> Approaches:
         """Return the times of impact of all, with one clearance."""
         return ContactSolver().time_of_impact_batch(
-            *self[:4], size_a=self.size_a, size_b=self.size_b, centre_a=self.centre_a,
-            centre_b=self.centre_b, clearance=clearance, tolerance=tolerance)
+            *self.sweeps(), size_a=self.size_a, size_b=self.size_b, clearance=clearance,
+            tolerance=tolerance)
 
 
 class Body(NamedTuple):

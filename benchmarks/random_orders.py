@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from box_contact_ros import ContactSolver, Plan, inspect_plan
+from box_contact_ros import ContactSolver, Plan, Sweep, inspect_plan
 from box_contact_ros.core import DEPTH_FLOOR
 from box_contact_ros.extras import require
 from box_contact_ros.plans.ways import SIDES
@@ -140,8 +140,8 @@ def met(plan: Plan, side: str, by: float) -> set[tuple[int, int]]:
             ~fixed & (plan.stack == plan.stack[n])))
         starts[n, :3] += (most + _reach(plan.poses[n], sizes[n], -towards)) * towards
     when = solver.time_of_impact_batch(
-        starts[box], plan.poses[box], plan.poses[other], plan.poses[other], size_a=sizes[box],
-        size_b=plan.sizes[other], tolerance=1e-7).time
+        Sweep(starts[box], plan.poses[box]), Sweep(plan.poses[other], plan.poses[other]),
+        size_a=sizes[box], size_b=plan.sizes[other], tolerance=1e-7).time
     return {pair for pair, time in zip(zip(box.tolist(), other.tolist()), when.tolist())
             if time == time and tuple(sorted(pair)) not in overlaps}
 

@@ -217,7 +217,7 @@ def main(args: Sequence[str] | None = None) -> int:
         file = Path(folder) / 'yard.yaml'
         file.write_text(scene_text(), 'utf-8')
         read_scene(file)
-        ending.enter_context(running(program('node.contact_node', scene=str(file),
+        ending.enter_context(running(program('node.run_contact_node', scene=str(file),
                                              pair_topics=False)))
         ending.enter_context(running([*own, '--echo']))
         asker, executor = ending.enter_context(running_node(Asker))

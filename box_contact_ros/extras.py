@@ -1,35 +1,29 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Extras of setup.py: what misses one ends in a line that names it, and `--help` needs none.
+"""Extras of setup.py: what misses one ends in a line that names it.
 
-A folder or module of the package names its extras by `require`. Folders of programs that run from
-the checkout call `expect_extras`, and import what they like.
+A program parses its arguments, calls `require`, and then imports modules of extras. Folders of
+programs that run from the checkout call `expect_extras`, and import what they like.
 """
 from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from importlib.abc import Loader, MetaPathFinder
-from importlib.machinery import ModuleSpec
 from importlib.util import find_spec
-from pathlib import Path
-from types import ModuleType, TracebackType
-from typing import Any
+from types import TracebackType
 
 MODULES = {
-    'ros': ('rclpy', 'box_contact_msgs', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs',
-            'rcl_interfaces', 'std_msgs', 'std_srvs', 'visualization_msgs'),
-    'sim': ('mujoco',), 'view': ('viser',), 'soup': ('fcl',), 'train': ('torch',),
-    'report': ('matplotlib', 'PIL', 'tqdm'), 'fuzz': ('gmpy2', 'mpmath'),
-    'plans': ('clarabel', 'scipy')}
+    'ros': ('rclpy', 'box_contact_msgs', 'builtin_interfaces', 'composition_interfaces',
+            'diagnostic_msgs', 'geometry_msgs', 'lifecycle_msgs', 'rcl_interfaces', 'rosgraph_msgs',
+            'sensor_msgs', 'std_msgs', 'std_srvs', 'tf2_ros', 'visualization_msgs'),
+    'sim': ('mujoco',), 'view': ('viser',), 'bag': ('rosbags',), 'soup': ('fcl',),
+    'plans': ('clarabel', 'scipy'), 'train': ('torch',), 'report': ('matplotlib', 'PIL', 'tqdm'),
+    'fuzz': ('gmpy2', 'mpmath'), 'peers': ('coal', 'pybullet'), 'cluster': ('distributed',),
+    'test': ('catkin_pkg', 'hypothesis')}
 """The modules of each extra; an extra is missing where its first module is."""
 EXTRA_OF = {module: extra for extra, modules in MODULES.items() for module in modules}
 APT = ', or apt install ros-jazzy-ros-base and source /opt/ros/jazzy/setup.bash'
-
-
-CHECKOUT = ('benchmarks', 'training', 'figures/make_')
-"""How the names of programs begin that run from the checkout."""
 
 
 class MissingExtra(ModuleNotFoundError):
@@ -46,10 +40,8 @@ def require(*extras: str) -> None:
 
 
 def expect_extras() -> None:
-    """Let a program's `--help` need no extra, and a missing module end in one line."""
+    """Let a missing module of an extra end this process in one line."""
     sys.excepthook = _end_in_one_line
-    if _asks_for_help() and not any(isinstance(finder, HelpFinder) for finder in sys.meta_path):
-        sys.meta_path.append(HelpFinder())
 
 
 def _words(module: str, extras: Sequence[str]) -> str:
@@ -67,59 +59,3 @@ def _end_in_one_line(kind: type[BaseException], error: BaseException,
         print(_words(str(error.name), [extra]), file=sys.stderr)
     else:
         sys.__excepthook__(kind, error, trace)
-
-
-# --- help without extras --------------------------------------------------------------------------
-
-
-def _asks_for_help() -> bool:
-    """Return whether this process prints the help of one of our programs, and nothing else."""
-    words = sys.orig_argv[1:]  # sys.argv lacks the module's name while it is imported
-    if {'-h', '--help'}.isdisjoint(words):
-        return False
-    # bin/box_contact_NAME by pip, lib/box_contact_ros/NAME by colcon, -m MODULE
-    programs = ('/'.join(Path(word).parts[-2:]) for word in words)
-    return any('box_contact_' in name or name.startswith(CHECKOUT) for name in programs)
-
-
-class HelpFinder(MetaPathFinder, Loader):
-    """Finds a missing module of an extra as a `Stub`: help is made of defaults and words alone."""
-
-    def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
-        """Return the spec of a stub for an extra's module or a part of one, None for others."""
-        root = name.partition('.')[0]
-        return ModuleSpec(name, self, is_package=True) if root in EXTRA_OF else None
-
-    def create_module(self, spec: ModuleSpec) -> ModuleType:
-        """Return an empty module, any name of which is a stub."""
-        module = ModuleType(spec.name)
-        module.__getattr__ = _stub  # type: ignore[method-assign]
-        return module
-
-    def exec_module(self, module: ModuleType) -> None:
-        """Do nothing."""
-
-
-class _StubType(type):
-    def __getattr__(cls, name: str) -> Any:
-        return _stub(name)
-
-
-class Stub(Exception, metaclass=_StubType):
-    """What a name of a missing module is: a class to call, to derive from, or to catch."""
-
-    def __init__(self, *arguments: Any, **options: Any) -> None:
-        pass
-
-    def __call__(self, *arguments: Any, **options: Any) -> Stub:
-        """Return a stub: a decorator's function, too, becomes one."""
-        return self
-
-    def __getattr__(self, name: str) -> Any:
-        return _stub(name)
-
-
-def _stub(name: str) -> Any:
-    if name.startswith('__'):
-        raise AttributeError(name)
-    return _StubType(name, (Stub,), {})

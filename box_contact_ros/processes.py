@@ -36,7 +36,7 @@ def keep_to_this_host() -> str:
 def program(name: str, **values: object) -> list[str]:
     """Return Python's arguments for a program with ROS parameters, by its module's name here.
 
-    name: such as `node.contact_node`. The program logs warnings and errors alone.
+    name: such as `node.run_contact_node`. The program logs warnings and errors alone.
     """
     parameters = [word for parameter, value in values.items()  # YAML reads JSON
                   for word in ('-p', f'{parameter}:={json.dumps(value, ensure_ascii=False)}')]

@@ -14,15 +14,15 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
-from box_contact_ros.node.contact_node import PARAMETERS
-from box_contact_ros.node.parameters import Setting, flag
+from box_contact_ros.node.parameters import CONTACT_PARAMETERS, Setting, flag
 
 ARGUMENTS = {
     'namespace': ('', 'namespace of the node'),
     'use_respawn': ('false', 'whether a node that has ended is started anew'),
     'log_level': ('info', 'lowest level that is logged'),
 }
-SETTINGS = {**PARAMETERS, 'use_sim_time': Setting(False, 'whether /clock tells the time', flag)}
+SETTINGS = {**CONTACT_PARAMETERS,
+            'use_sim_time': Setting(False, 'whether /clock tells the time', flag)}
 
 
 def type_of(setting: Setting) -> type | None:

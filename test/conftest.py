@@ -9,6 +9,7 @@ first test module imports it. Every process that a test starts inherits it.
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import os
 import re
@@ -111,19 +112,12 @@ sys.path.append(str(Path(__file__).resolve().parents[1]))
 # start.
 os.environ.pop('PYTEST_ADDOPTS', None)
 
-PROGRAMS = {'bench': 'bench.bench', 'contact_node': 'node.contact_node',
-            'crane': 'demo.crane_node', 'inspect': 'plans.inspect_files',
-            'markers': 'view.live.markers', 'soup_node': 'node.soup_node', 'view': 'view.view'}
+from box_contact_ros.extras import MODULES  # noqa: E402  from where tests import it
+
+PROGRAMS: dict[str, str] = ast.literal_eval(re.search(
+    r'^PROGRAMS = (\{.*?\})', (Path(__file__).resolve().parents[1] / 'setup.py').read_text(),
+    re.MULTILINE | re.DOTALL)[1])
 """The module of each program, as setup.py has them."""
-EXTRAS = {
-    'ros': ('rclpy', 'box_contact_msgs', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs',
-            'rcl_interfaces', 'std_msgs', 'visualization_msgs'),
-    'sim': ('mujoco',), 'bag': ('rosbags',), 'soup': ('fcl',), 'view': ('viser',),
-    'train': ('safetensors', 'torch', 'tqdm'), 'report': ('matplotlib', 'tqdm'),
-    'peers': ('coal', 'pybullet'), 'fuzz': ('mpmath',),
-    'plans': ('clarabel', 'scipy', 'tqdm'),
-    'test': ('catkin_pkg', 'gmpy2', 'hypothesis')}
-"""The modules of each extra of setup.py that tests import."""
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -163,7 +157,7 @@ def pytest_runtest_call() -> Iterator[None]:
 
 def skip_without_extra(missing: str | None) -> None:
     """Skip what cannot import a module, if that is one of an extra."""
-    for extra, modules in EXTRAS.items():
+    for extra, modules in MODULES.items():
         if missing in modules:
             pytest.skip(f'{missing} is not installed: pip install .[{extra}]'
                         + (', or make test-training' if extra == 'train' else ''),
@@ -284,8 +278,8 @@ def program(tmp_path: Path) -> Iterator[Callable[..., RunningProgram]]:
     def start(*args: str) -> RunningProgram:
         for extra in {'crane': ('sim',), 'soup_node': ('soup',), 'view': ('view',)}.get(
                 args[0], ()):
-            if importlib.util.find_spec(EXTRAS[extra][0]) is None:
-                skip_without_extra(EXTRAS[extra][0])
+            if importlib.util.find_spec(MODULES[extra][0]) is None:
+                skip_without_extra(MODULES[extra][0])
         module = PROGRAMS.get(args[0], args[0])
         log = tmp_path / f'program_{len(started)}.log'
         with log.open('wb') as out:

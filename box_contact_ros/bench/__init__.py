@@ -2,7 +2,3 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """The bench: compares latency, losses and errors of running nodes."""
-
-from ..extras import require
-
-require('ros')

@@ -43,23 +43,29 @@ from ..arguments import model_name, outside_ros_args, program_main, program_pars
 from ..core import native
 from ..extras import require
 from ..models.make_model import MODELS
-from ..node.runtime import exit_on_refusal, running_node
 from ..processes import asked_to_end, keep_to_this_host, program, running
-from .drive import NODES, BenchNode
 from .poses import swaying_containers
-from .report import comparison, draw, figures, table, void_reason
+from .report import NODES, comparison, draw, figures, table, void_reason
 
 RATE, SECONDS, LONGEST = 200.0, 60.0, 3600.0  # [Hz], [s], [s]
 QUIET, NICE, BUSY = SURROUNDINGS = ('quiet', 'nice', 'busy')
 NICENESS = {NICE: 10, BUSY: 0}  # of loops
 
 
-@exit_on_refusal
 @program_main
 def main(args: Sequence[str] | None = None) -> int:
     """Run the bench; return its exit status."""
     args = sys.argv[1:] if args is None else list(args)
     options = _options(outside_ros_args(args))
+    require('ros')
+    from ..node.runtime import exit_on_refusal
+    return exit_on_refusal(_run)(options, args)
+
+
+def _run(options: argparse.Namespace, args: Sequence[str]) -> int:
+    from ..node.runtime import running_node
+    from .drive import BenchNode
+
     names = list(dict.fromkeys(options.nodes))
     if 'soup' in names and not find_spec('fcl'):
         print('without the soup node: python-fcl is not installed (extra: soup)')

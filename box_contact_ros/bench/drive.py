@@ -32,19 +32,13 @@ from ..scene.scene import CONTAINER
 from ..solver.contact_solver import ContactSolver
 from ..stream.read_contacts import read_contacts
 from .echo_node import FRAME, raw_stamp, with_stamp
-from .report import AnswerLog
+from .report import NODES, AnswerLog
 
 BLOCK_SECONDS = 0.5
 SLICE = 0.05  # time [s] between looks at whether the bench was called off
 START_LIMIT = 60.0  # time [s] until a node answers
 DRAIN_SECONDS = 1.0  # time [s] without an answer, after which what is still out is lost
 
-NODES: dict[str, tuple[str, str, dict[str, object]]] = {
-    'echo': ('bench.echo_node', 'echo/', {}),
-    'floor': ('bench.echo_node', 'echo/', {'contacts': True}),
-    'contact': ('node.contact_node', '', {}), 'soup': ('node.soup_node', 'soup/', {})}
-"""Module of each node, what precedes the topics that it answers on, and its parameters. All topics
-of a node are in the namespace bench/NAME."""
 ANSWERS = {'point': (PointStamped, 'contact/point'), 'normal': (Vector3Stamped, 'contact/normal'),
            'contacts': (ContactsMessage, 'contacts')}
 """Type and topic of each kind of answer."""

@@ -22,6 +22,12 @@ from ..solver.contact import Contacts
 DEPTH_TOLERANCE = 1e-9
 """Largest difference of a right depth from the exact one [m]; all models take it from the same
 separating-axis test. The depths of two ticks differ by a thousand times more."""
+NODES: dict[str, tuple[str, str, dict[str, object]]] = {
+    'echo': ('bench.echo_node', 'echo/', {}),
+    'floor': ('bench.echo_node', 'echo/', {'contacts': True}),
+    'contact': ('node.run_contact_node', '', {}), 'soup': ('node.run_soup_node', 'soup/', {})}
+"""Module of each node, what precedes the topics that it answers on, and its parameters. All topics
+of a node are in the namespace bench/NAME."""
 RESAMPLES = 2000  # of the bootstrap
 PERCENTILES = {'p50': 50, 'p99': 99}
 LATE = 'bench late p99 [ms]'  # the column by which a run is void

@@ -1,18 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The crane: publishes the poses of a load and a stack, and lands the load on their contacts.
-
-`box_a` is the load on the ropes, `box_b` the stack. Each tick publishes both poses under one stamp.
-The node then waits for the answer to them on `contacts`, at most for most of the tick, and
-simulates the tick under the patch of the newest answer. A contact acts from the time at which it
-really came. In lockstep simulated time waits for each answer instead, so every landing is the same.
-
-The landing ends 8 s after the first touch. The exit status is 0 only if the load came to rest and
-no answer was lost. At rest means: settled within 3 s, slack ropes, and corner speed, tilt, depth
-and gap within the printed limits. With `judge_force`, the force must equal the weight, too, as it
-does by model `exact`.
-"""
+"""The crane as a node: publishes poses, and simulates under the contacts that answer them."""
 from __future__ import annotations
 
 import gc
@@ -24,9 +13,6 @@ from dataclasses import replace
 from itertools import count
 from typing import Any
 
-from ..extras import require
-
-require('ros', 'sim')
 import numpy as np
 from geometry_msgs.msg import Point, PoseStamped, Vector3, WrenchStamped
 from rclpy.context import Context
@@ -37,15 +23,15 @@ from visualization_msgs.msg import Marker
 
 from box_contact_msgs.msg import Contacts
 
-from ..arguments import parse_command_line, program_main
 from ..node.messages import make_header, pose_message
-from ..node.parameters import Setting, declare, flag, number, warn_of_unknown
+from ..node.parameters import declare, warn_of_unknown
 from ..node.runtime import REFUSALS, GuardedNode, running_node, spin_once
 from ..node.topics import DEEP_RELIABLE, contact_qos
 from ..stream.read_contacts import read_contacts
 from . import CRANE_ROPES, CRANE_WRENCH
 from .crane import CraneScenario
 from .landing import CORNER_SPEED_LIMIT, ClosedLoop, Landing, LandingRecord, LoopState, with_patch
+from .run_crane import PARAMETERS
 
 FRAME = 'world'  # of the published poses
 OFFER_PERIOD = 0.1  # time between the pairs that only ask whether anyone answers [s]
@@ -57,14 +43,6 @@ ROPE_WIDTH = 0.04  # as drawn [m]
 STAGES = ('hanging', 'first touch', 'settling', 'at rest')
 POINTS_ALONE = ("the contact node's model gives contacts without a patch: the whole load stands "
                 'for it, and may not come to rest')
-
-PARAMETERS = {
-    'rate': Setting(200.0, 'pairs of poses published per second [Hz]', number(1, 2000)),
-    'wait': Setting(30.0, 'patience for a contact node to answer [s]', number(0, 600)),
-    'lockstep': Setting(False, 'no real time: every tick waits for its answer', flag),
-    'paced': Setting(False, 'in lockstep, never faster than real time', flag),
-    'judge_force': Setting(False, 'the force must equal the weight, as by model exact', flag),
-}
 
 
 class CraneNode(GuardedNode):
@@ -241,10 +219,8 @@ def verdict(landing: Landing, latencies: Sequence[float], lost: int) -> tuple[bo
                   f'p99 {p99:.2f} ms')
 
 
-@program_main
-def main(args: Sequence[str] | None = None) -> int:
+def run(args: Sequence[str] | None) -> int:
     """Land once; 0 only if the load came to rest and no answer was lost."""
-    parse_command_line('crane', __doc__, PARAMETERS, args)
     try:
         with running_node(CraneNode, args, signals=SignalHandlerOptions.ALL) as (node, executor):
             node.await_node(executor)
@@ -261,7 +237,3 @@ def main(args: Sequence[str] | None = None) -> int:
         return 1
     print('\n'.join(filter(None, (words, str(landing), corners))), flush=True)
     return 0 if passed else 1
-
-
-if __name__ == '__main__':
-    sys.exit(main())

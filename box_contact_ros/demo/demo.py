@@ -52,11 +52,11 @@ def main(args: Sequence[str] | None = None) -> int:
           f'{domain}, on this host alone.', flush=True)
     with asked_to_end() as signals, ExitStack() as ending:
         others = {'contact_node': ending.enter_context(running(
-            program('node.contact_node', model=options.model)))}
+            program('node.run_contact_node', model=options.model)))}
         if options.view:
             others['view'] = ending.enter_context(running(program('view.view')))
         wait = not options.real_time
-        crane = program('demo.crane_node', lockstep=wait, paced=wait,
+        crane = program('demo.run_crane', lockstep=wait, paced=wait,
                         judge_force=options.model == 'exact')
         try:
             status = _land(crane, others, signals)

@@ -84,7 +84,7 @@ class LoadForces:
         if self._late > 2.0 * latest:
             self._late *= 1.0 - min(1.0, self._period / FADING)
         self._late = max(self._late, latest)
-        fixed = Body(mass=0.0, inertia=np.zeros(3))
+        fixed = Body.fixed()
         self._forces.set_bodies([self._load, *[fixed] * len(self._places)])
         pairs = np.array([(0, self._places[name]) for name in contacts]).reshape(-1, 2)
         self._forces.hold(pairs, Contacts.of(contacts.values()), self._rows(pose, NO_TURN),

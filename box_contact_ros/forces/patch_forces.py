@@ -47,6 +47,7 @@ from ..solver.checks import (
 )
 from ..solver.contact import Contacts
 from ..solver.pose import rotation_matrix
+from ..solver.poses import as_poses
 
 GRAVITY = 9.81
 """Gravitational acceleration [m/s²]."""
@@ -86,6 +87,11 @@ class Body:
         if not (np.abs(centre) <= LENGTH_MAX).all():
             raise ValueError(f'centre ({", ".join(f"{x:g}" for x in centre)}) is not finite, or '
                              f'exceeds {LENGTH_MAX:g} m')
+
+    @classmethod
+    def fixed(cls) -> Self:
+        """Return a body of mass 0, which no force moves: ground, or what the caller moves."""
+        return cls(mass=0.0, inertia=(0.0, 0.0, 0.0))
 
     @classmethod
     def of_box(cls, size: Sequence[float] | np.ndarray, mass: float) -> Self:
@@ -445,5 +451,7 @@ def _columns_of_pairs(friction: ArrayLike | None, surface_velocity: ArrayLike | 
 
 def _as_rows(value: ArrayLike, name: str, *shape: int) -> np.ndarray:
     """Return a row for each body or contact; C++ compares how many there are."""
+    if shape == (7,) and (type(value) is not np.ndarray or value.ndim > 2):
+        return as_poses(value, name)
     shapes = f'({", ".join(("n", *map(str, shape)))})' if shape else '(n,)'
     return as_floats(value, name, f'an array {shapes}', (None, *shape))

@@ -2,7 +2,3 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """All rclpy of the product: the contact node and the parts that it is wired from."""
-
-from ..extras import require
-
-require('ros')

@@ -1,24 +1,10 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The contact node: box poses in, contact points and normals out.
-
-Subscribes box_a/pose and box_b/pose (geometry_msgs/PoseStamped). Publishes contact/point
-(PointStamped) and contact/normal (Vector3Stamped, from A to B) while the boxes touch. On every
-evaluation it publishes contacts (box_contact_msgs/Contacts), and once a second /diagnostics.
-
-With a scene file: <name>/pose of every box and body that moves, and of every pair
-<pair>/contact/point, <pair>/contact/normal.
-The services ~/check and ~/check_path answer about the boxes of a request, without stamps.
-~/set_boxes changes boxes of the scene, ~/get_boxes tells them, and the topic ~/boxes each change.
-The service ~/reset (std_srvs/Trigger) forgets all poses and stamps.
-It is a lifecycle node that configures and activates itself, unless autostart is false. Its
-parameters are read when it is configured; model, tolerance and max_age may be set while it runs.
-"""
+"""The contact node as a class: wires parameters, topics, ticks and services."""
 from __future__ import annotations
 
 import gc
-import sys
 from collections import Counter
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from typing import Any, ClassVar
@@ -34,69 +20,29 @@ from std_srvs.srv import Trigger
 
 from box_contact_msgs.srv import Check, CheckPath, GetBoxes, SetBoxes
 
-from ..arguments import parse_command_line, program_main
-from ..core import LENGTH_MAX
-from ..models.make_model import MODELS, check_model, make_model, most_near
-from ..scene.scene import CONTAINER, Scene, two_boxes
+from ..models.make_model import make_model, most_near
+from ..scene.scene import Scene, two_boxes
 from ..scene.scene_check import Row
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import short_repr
 from ..solver.model import NATIVE
-from ..stream.pairing import PAIRINGS, RESETS
+from ..stream.pairing import RESETS
 from ..stream.streams import watched_of
 from . import check, check_path, get_boxes, set_boxes
 from .check import CheckAnswerer
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
 from .get_boxes import Lister
 from .paced_service import NotActive, Outdated, PacedService
-from .parameters import (
-    Setting,
-    declare,
-    flag,
-    limited,
-    number,
-    one_of,
-    reason_of,
-    size,
-    text,
-    warn_of_unknown,
-)
+from .parameters import CONTACT_PARAMETERS, Setting, declare, model, reason_of, warn_of_unknown
 from .rclpy_workarounds import ends_within, lifecycle_state
 from .runtime import END_SECONDS, LOG_SECONDS, GuardedNode, run_node
 from .tick import TickAnswerer
 from .topics import SceneTopics
 
-LONGEST = 1e6  # s, about twelve days
 TICK_SECONDS = 0.1
 """A report waits so long for a tick, behind which it comes: one takes 0.4 ms."""
 NAMED_TOPICS = 3  # how many pose topics the node names when it is ready
-
-
-@limited(additional_constraints=f'one of: {", ".join(MODELS)}')
-def model(name: str, value: Any) -> str:
-    """Validate the name of a model."""
-    check_model(name, text(name, value))
-    return str(value)
-
-
-PARAMETERS = {
-    'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', size),
-    'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', size),
-    'scene': Setting('', 'scene file, which replaces size_a and size_b', text),
-    'model': Setting('exact', f'how the contact point is found: {", ".join(MODELS)}', model),
-    'pairing': Setting('stamp', 'stamp: answer once, when poses of equal stamp are in; latest: '
-                                "answer every pose with the other boxes' last", one_of(PAIRINGS)),
-    'tolerance': Setting(0.0, 'with pairing stamp: stamps this far apart still belong together [s]',
-                         number(0.0, LONGEST)),
-    'max_age': Setting(1.0, 'a box whose newest stamp is older than this is reported as stale; '
-                            'with pairing latest, its pairs get no contact; 0: never [s]',
-                       number(0.0, LONGEST)),
-    'margin': Setting(0.0, 'pairs apart are listed as near up to this distance [m]',
-                      number(0.0, LENGTH_MAX)),
-    'pair_topics': Setting(True, 'whether pairs have topics of their own next to contacts', flag),
-    'autostart': Setting(True, 'whether the node configures and activates itself', flag),
-}
 
 
 def live_model(name: str, value: Any) -> str:
@@ -108,7 +54,7 @@ def live_model(name: str, value: Any) -> str:
 
 
 LIVE = {'model': live_model} | {
-    name: PARAMETERS[name].validate for name in ('tolerance', 'max_age')}
+    name: CONTACT_PARAMETERS[name].validate for name in ('tolerance', 'max_age')}
 """The parameters that may be set while the node runs, and what they may be then; none of them
 touches a topic."""
 
@@ -118,7 +64,7 @@ def scene_of(values: Mapping[str, Any]) -> Scene:
     if not values['scene']:
         return two_boxes(values['size_a'], values['size_b'])
     for name in ('size_a', 'size_b'):
-        if values[name] != PARAMETERS[name].default:
+        if values[name] != CONTACT_PARAMETERS[name].default:
             raise ValueError(f'{name} {short_repr(values[name])} has no effect while scene is set: '
                              'write sizes into the scene file')
     return read_scene(values['scene'])
@@ -143,7 +89,7 @@ class ContactNode(GuardedNode, LifecycleNode):
 
     name: ClassVar[str] = 'contact_node'
     prefix: ClassVar[str] = ''
-    parameters: ClassVar[Mapping[str, Setting]] = PARAMETERS
+    parameters: ClassVar[Mapping[str, Setting]] = CONTACT_PARAMETERS
     has_process = False
     """Whether the whole process is the node's, as of `run`."""
 
@@ -407,10 +353,8 @@ class ContactNode(GuardedNode, LifecycleNode):
                 self._checks.take_times())
 
 
-def run(node_type: type[ContactNode], doc: str | None, args: Sequence[str] | None) -> int:
+def run(node_type: type[ContactNode], args: Sequence[str] | None) -> int:
     """Run a node of this class until SIGINT or SIGTERM; return the exit status."""
-    parse_command_line(node_type.name, doc, node_type.parameters, args)
-
     def started(context: Context) -> ContactNode:
         node = node_type(context)
         node.has_process = True
@@ -427,13 +371,3 @@ def run(node_type: type[ContactNode], doc: str | None, args: Sequence[str] | Non
             raise
         return node
     return run_node(started, args)
-
-
-@program_main
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node until SIGINT or SIGTERM."""
-    return run(ContactNode, __doc__, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -11,11 +11,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from itertools import groupby
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..solver.checks import printable
+from ..solver.rows import NoTruth
 from .plan import LACKS, VERDICTS, Plan
 from .room import SIDES
 from .verdict import CAUSES, GOES
@@ -64,7 +66,7 @@ class Fall(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Inspection:
+class Inspection(NoTruth):
     """What is wrong with a plan of n boxes, and what each of them carries.
 
     Of boxes without masses, loads, pressures and loaded margins are NaN. Of those on the ground,
@@ -124,6 +126,8 @@ class Inspection:
     ways: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), int))
     """(w, 2) a box and another that blocks its way, by index: by steps, and by what it meets first.
     """
+
+    _instead = '.sound or .verdict'
 
     @property
     def verdict(self) -> str:
@@ -336,13 +340,16 @@ class Inspection:
             if lack and counts[lack]:
                 yield one if counts[lack] == 1 else more.format(counts[lack])
 
-    def plot(self) -> Figure:
+    def plot(self, file: str | Path | None = None) -> Figure:
         """Return a figure of the plan, coloured by verdict; the worst boxes have their names.
 
-        It needs Matplotlib, the extra `report`.
+        file: where the picture is written to, too. It needs Matplotlib, the extra `report`.
         """
         from .plot import picture
-        return picture(self.plan, self.verdicts, self.rows(), self.summary())
+        figure = picture(self.plan, self.verdicts, self.rows(), self.summary())
+        if file is not None:
+            figure.savefig(file, dpi=120)
+        return figure
 
     def to_json(self, **first: str) -> str:
         """Return all that was found as a line of JSON, as msg_schemas/inspection.json has it.

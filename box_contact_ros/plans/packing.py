@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from ..core import LENGTH_MAX, MASS_MAX
+from ..core import MASS_MAX
 from ..solver.checks import pose_fault, short_repr, size_fault
 from ..solver.contacts_of import contacts_of
 from ..solver.pose import rotation_matrix
 from .forms import Form, form_of
 from .meetings import most_near
-from .plan import NO_ROOM, UNTURNED, Fault, Plan
+from .plan import GROUND, NO_ROOM, UNTURNED, Fault, Plan, slab_below
 from .roles import (
     ANGLES,
     MASS_UNITS,
@@ -41,7 +41,6 @@ from .table import Record, Table
 
 FIXED = {'true': True, '1': True, 'yes': True, 'false': False, '0': False, 'no': False, '': False}
 """What `fixed` may be."""
-GROUND, GROUND_THICKNESS, GROUND_MARGIN = 'ground', 1.0, 1.0
 """Name, thickness, and how far it reaches beyond the boxes [m]."""
 ROOM = 1.0  # between the containers of one file, which are placed side by side [m]
 LONG, LONG_ROOM, FULL = 20.0, 30.0, 5.0
@@ -455,20 +454,14 @@ def _on_ground(boxes: Sequence[Box], labels: Sequence[str], weighed: bool, fault
     if bare:
         size, pose = slab_below(sizes[bare], poses[bare])
         slabs.append((GROUND, size, pose.tolist()))
-    if slabs:
-        sizes = np.vstack((sizes, [size for _, size, _ in slabs]))
-        poses = np.vstack((poses, [pose for *_, pose in slabs]))
-    count, order = len(boxes), _loading(boxes, faults)
-    return Plan(
-        sizes, poses, [box.mass or 0.0 for box in boxes] + [0.0] * len(slabs) if weighed else None,
-        ground=[*(n for n, box in enumerate(boxes) if box.fixed), *range(count, len(sizes))],
-        names=[box.name for box in boxes] + [name for name, *_ in slabs],
-        limits=[box.limit for box in boxes] + [math.inf] * len(slabs),
-        friction=[box.friction for box in boxes] + [math.nan] * len(slabs),
-        order=order and [*order, *[0] * len(slabs)],
-        stack=[*(box.stack for box in boxes), *[0] * len(slabs)],
+    plan = Plan(
+        sizes, poses, [box.mass or 0.0 for box in boxes] if weighed else None,
+        ground=[n for n, box in enumerate(boxes) if box.fixed], names=[box.name for box in boxes],
+        limits=[box.limit for box in boxes], friction=[box.friction for box in boxes],
+        order=_loading(boxes, faults), stack=[box.stack for box in boxes],
         stacks=labels if len(labels) > 1 else (), faults=faults,
-        room=np.array([*(rooms.get(box.stack, NO_ROOM) for box in boxes), *[NO_ROOM] * len(slabs)]))
+        room=np.array([rooms.get(box.stack, NO_ROOM) for box in boxes]))
+    return plan.with_fixed(*zip(*slabs)) if slabs else plan
 
 
 def _odd_rooms(boxes: Sequence[Box], rooms: Mapping[int, np.ndarray], scale: float) -> list[Fault]:
@@ -510,11 +503,3 @@ def _loading(boxes: Sequence[Box], faults: list[Fault]) -> list[int] | None:
 
 def _is_whole_number(value: float | None) -> bool:
     return value is not None and value.is_integer() and abs(value) <= MOST_STEPS
-
-
-def slab_below(sizes: np.ndarray, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return full extents (3,) and pose (7,) of a slab under all boxes, its top at z = 0."""
-    reach = np.linalg.norm(sizes, axis=1, keepdims=True) / 2.0 + GROUND_MARGIN
-    low, high = (poses[:, :2] - reach).min(axis=0), (poses[:, :2] + reach).max(axis=0)
-    return (np.array([*np.minimum(high - low, LENGTH_MAX), GROUND_THICKNESS]),
-            np.array([*(low + high) / 2.0, -GROUND_THICKNESS / 2.0, *UNTURNED]))

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,14 +14,15 @@ from numpy.typing import ArrayLike
 from ..core import LENGTH_MAX, MASS_MAX
 from ..solver.checks import (
     absent_poses,
-    as_boxes,
     as_floats,
+    as_number,
     as_places,
     as_whole,
     as_wholes,
     pose_fault,
     short_repr,
 )
+from ..solver.poses import PoseLike, as_boxes
 
 MOST_BYTES = 2**28
 """Of a file: 256 MiB, some hundred times the largest ship's plan."""
@@ -47,6 +48,8 @@ FAULT_KINDS = {
 NO_ROOM = ((-np.inf,) * 3, (np.inf,) * 3)
 UNTURNED = (0.0, 0.0, 0.0, 1.0)
 """The quaternion x y z w of a box that is not turned."""
+GROUND, GROUND_THICKNESS, GROUND_MARGIN = 'ground', 1.0, 1.0
+"""The name of the ground as a box; its thickness, and how far it reaches beyond the others [m]."""
 LACKS = {
     '': ('', ''), 'place': ('1 box was not placed', '{:,} boxes were not placed'),
     'weight': ('1 has no weight', '{:,} have no weight'),
@@ -135,8 +138,9 @@ class Plan:
     """(n, 2, 3) the least and the greatest corner of the inner space that each box must be in [m];
     infinite where there is none."""
 
-    def __init__(self, sizes: ArrayLike, poses: ArrayLike, masses: ArrayLike | None = None, *,
-                 ground: ArrayLike = (), names: Sequence[str] | None = None,
+    def __init__(self, sizes: ArrayLike, poses: PoseLike | None = None,
+                 masses: ArrayLike | None = None, *, ground: ArrayLike = (),
+                 names: Sequence[str] | None = None,
                  centres: ArrayLike | None = None, limits: ArrayLike | None = None,
                  friction: ArrayLike | None = None, body: ArrayLike | None = None,
                  order: ArrayLike | None = None, stack: ArrayLike | None = None,
@@ -152,6 +156,9 @@ class Plan:
 
         Raises ValueError, with field, row and value, for bad input.
         """
+        if poses is None:
+            raise ValueError('poses is missing: boxes are Plan(sizes, poses) or Plan.from_corners('
+                             'least, sizes), and those of a file read_plan(path)')
         sizes, poses = as_boxes(sizes, poses)
         count = len(poses)
         for row in np.flatnonzero(absent_poses(poses))[:1]:
@@ -177,16 +184,39 @@ class Plan:
                 raise ValueError(f'faults[{row}] must be a Fault, not {short_repr(fault)}')
 
     @classmethod
-    def from_corners(cls, least: ArrayLike, sizes: ArrayLike, masses: ArrayLike | None = None,
-                     **known: Any) -> Plan:
+    def from_corners(cls, least: ArrayLike, sizes: ArrayLike, masses: ArrayLike | None = None, *,
+                     floor: float | None = None, **known: Any) -> Plan:
         """Return the plan of boxes that are not turned, by the least corner of each (n, 3) [m].
 
+        floor: z of a floor under all [m], which is one more box, 'ground'; None: there is none.
         The rest is as `Plan` takes it. Raises ValueError, with field, row and value, for bad input.
         """
         least = as_floats(least, 'least', 'corners (n, 3) of rows x y z', (None, 3))
         turns = np.tile(UNTURNED, (len(least), 1))
         sizes, _ = as_boxes(sizes, np.hstack((least, turns)), names=('sizes', 'least'))
-        return cls(sizes, np.hstack((least + sizes / 2.0, turns)), masses, **known)
+        plan = cls(sizes, np.hstack((least + sizes / 2.0, turns)), masses, **known)
+        if floor is None or not len(plan):
+            return plan
+        size, pose = slab_below(plan.sizes, plan.poses, as_number(floor, 'floor'))
+        return plan.with_fixed([GROUND], [size], [pose])
+
+    def with_fixed(self, names: Sequence[str], sizes: ArrayLike, poses: ArrayLike) -> Plan:
+        """Return the plan with more fixed boxes behind the others: names, (k, 3) [m], (k, 7)."""
+        count, more = len(self), len(names)
+
+        def longer(values: np.ndarray, value: object) -> np.ndarray:
+            return np.concatenate((values, np.full((more, *values.shape[1:]), value)))
+
+        return replace(
+            self, sizes=np.concatenate((self.sizes, sizes)),
+            poses=np.concatenate((self.poses, poses)), names=(*self.names, *names),
+            ground=np.concatenate((self.ground, np.arange(count, count + more))),
+            masses=None if self.masses is None else longer(self.masses, 0.0),
+            centres=longer(self.centres, 0.0), limits=longer(self.limits, np.inf),
+            friction=longer(self.friction, np.nan),
+            body=np.concatenate((self.body, self.body.max(initial=-1) + 1 + np.arange(more))),
+            order=None if self.order is None else longer(self.order, 0),
+            stack=longer(self.stack, 0), room=longer(self.room, NO_ROOM))
 
     def _set(self, **fields: object) -> None:
         for name, value in fields.items():
@@ -210,6 +240,15 @@ class Plan:
     def __len__(self) -> int:
         """Return how many boxes there are."""
         return len(self.poses)
+
+
+def slab_below(sizes: np.ndarray, poses: np.ndarray, z: float = 0.0,
+               ) -> tuple[np.ndarray, np.ndarray]:
+    """Return full extents (3,) and pose (7,) of a slab under all boxes, its top at z [m]."""
+    reach = np.linalg.norm(sizes, axis=1, keepdims=True) / 2.0 + GROUND_MARGIN
+    low, high = (poses[:, :2] - reach).min(axis=0), (poses[:, :2] + reach).max(axis=0)
+    return (np.array([*np.minimum(high - low, LENGTH_MAX), GROUND_THICKNESS]),
+            np.array([*(low + high) / 2.0, z - GROUND_THICKNESS / 2.0, *UNTURNED]))
 
 
 def _amounts(value: ArrayLike, name: str, count: int, most: float, unit: str) -> np.ndarray:

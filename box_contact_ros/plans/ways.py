@@ -14,6 +14,7 @@ import numpy as np
 from ..core import DEPTH_FLOOR, LENGTH_MIN
 from ..solver.contact_solver import ContactSolver
 from ..solver.contacts_of import contacts_of
+from ..solver.motion import Sweep
 from ..solver.pose import rotation_matrix
 from .meetings import Meetings, most_near
 from .plan import Plan
@@ -58,8 +59,8 @@ def blocked_ways(plan: Plan, meet: Meetings, tolerances: np.ndarray, side: str) 
     starts[:, :3] += travel[:, None] * towards
     box, other = pairs[turned].T
     meets = ContactSolver().time_of_impact_batch(
-        starts[box], plan.poses[box], plan.poses[other], plan.poses[other], size_a=sizes[box],
-        size_b=plan.sizes[other], tolerance=IMPACT)
+        Sweep(starts[box], plan.poses[box]), Sweep(plan.poses[other], plan.poses[other]),
+        size_a=sizes[box], size_b=plan.sizes[other], tolerance=IMPACT)
     pairs = np.delete(pairs, turned[np.isnan(meets.time)], axis=0)
     assert plan.order is not None
     return pairs[np.lexsort((-top[pairs[:, 1]], pairs[:, 0], plan.order[pairs[:, 0]]))]

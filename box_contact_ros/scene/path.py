@@ -19,6 +19,7 @@ from ..core import native
 from ..solver.checks import TooMuch, absent_poses, as_floats, as_margin, pose_fault
 from ..solver.motion import Approach, Approaches
 from ..solver.pose import rotation_matrix
+from ..solver.rows import NoTruth
 from .scene import Pair, Scene
 
 TOLERANCE = 1e-6  # of distances [m]
@@ -29,7 +30,7 @@ WORK = 256
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PathCheck:
+class PathCheck(NoTruth):
     """What a path meets. Boxes are their indices in `scene`; times go from 0 to m − 1."""
 
     pairs: np.ndarray
@@ -46,6 +47,8 @@ class PathCheck:
     """When, and how near it comes; where boxes touch, the first of these times."""
     scene: Scene
     revision: int = 0  # of the scene, as of `SceneSolver.set_boxes`
+
+    _instead = '.is_free'
 
     @classmethod
     def of(cls, found: Found, scene: Scene, revision: int) -> PathCheck:

@@ -29,6 +29,7 @@ from ..solver.checks import (
     short_repr,
     size_fault,
 )
+from ..solver.poses import as_pose
 
 EVERY_PAIR = (('*', '*'),)
 """Patterns of a scene in which each two boxes are a pair, if one of them moves."""
@@ -78,7 +79,8 @@ def _as_numbers(value: Any, key: str, shape: str, count: int) -> tuple[float, ..
             and {float, int}.issuperset(map(type, value))):
         with suppress(OverflowError):
             return tuple(map(float, value))
-    return tuple(as_floats(value, key, shape, (count,)).tolist())
+    array = as_pose(value, key) if key == 'pose' else as_floats(value, key, shape, (count,))
+    return tuple(array.tolist())
 
 
 def _keep(part: object, key: str, shape: str, count: int,

@@ -23,6 +23,7 @@ from ..solver.contact_solver import ContactSolver
 from ..solver.contacts_of import find_contacts, touching_and_near
 from ..solver.model import Model
 from ..solver.nearest import Nearest, Nearests
+from ..solver.poses import as_pose
 from .changes import checked_changes
 from .path import PathCheck, as_path, boxes_of, moved_boxes, start
 from .scene import NOWHERE, Box, Frame, Pair, Scene
@@ -268,8 +269,7 @@ class SceneSolver:
             rows[moving_rows] = poses
             return
         for name, index, pose in zip(self.moving, moving_rows, poses):
-            rows[index] = NOWHERE if pose is None else as_floats(
-                pose, f'pose of {name}', 'a pose (x y z qx qy qz qw)', (7,))
+            rows[index] = NOWHERE if pose is None else as_pose(pose, f'pose of {name}')
 
 
 def finished(steps: Generator[None, None, Any]) -> Any:

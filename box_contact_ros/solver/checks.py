@@ -224,29 +224,6 @@ def _holds_numbers(array: np.ndarray) -> bool:
     return array.dtype.kind in 'fiu'
 
 
-def as_boxes(sizes: ArrayLike, poses: ArrayLike, names: tuple[str, str] = ('sizes', 'poses'),
-             ) -> tuple[np.ndarray, np.ndarray]:
-    """Return full extents and poses of n boxes as arrays (n, 3) and (n, 7), checked.
-
-    Extents (3,) are those of all boxes. A row of seven NaN is no bad pose: the box is not there.
-    names: of both, in a refusal.
-    """
-    of_sizes, of_poses = names
-    poses = as_floats(poses, of_poses, 'poses (n, 7) of rows x y z qx qy qz qw', (None, 7))
-    count = len(poses)
-    sizes = as_floats(sizes, of_sizes, f'full extents (3,) or ({count}, 3)', (3,), (None, 3))
-    if sizes.ndim == 2 and len(sizes) != count:
-        raise ValueError(f'{of_sizes}: {len(sizes):,} size{"s"[:len(sizes) != 1]}, but {count:,} '
-                         f'pose{"s"[:count != 1]}')
-    if sizes.ndim == 1:
-        sizes = np.tile(as_size(sizes, of_sizes), (count, 1))
-    for row in np.flatnonzero(~((sizes >= LENGTH_MIN) & (sizes <= LENGTH_MAX)).all(axis=1))[:1]:
-        raise ValueError(f'{of_sizes}[{row}] {size_fault(sizes[row])}')
-    for row in np.flatnonzero(~(are_poses(poses) | absent_poses(poses)))[:1]:
-        raise ValueError(f'{of_poses}[{row}] {pose_fault(poses[row])}; a pose is x y z qx qy qz qw')
-    return sizes, poses
-
-
 def as_size(size: ArrayLike, name: str) -> np.ndarray:
     """Return three full extents (3,) [m], checked, as (1, 3)."""
     array = as_floats(size, name, 'three full extents', (3,))

@@ -38,6 +38,13 @@ class Contacts(Rows[Contact]):
     axis: np.ndarray
     """(n,) int32."""
 
+    @property
+    def depth(self) -> np.ndarray:
+        """(n,) how deep the boxes overlap along the normal [m]; 0 of boxes apart."""
+        return np.maximum(0.0, -self.separation)
+
+    _instead = '.colliding, .colliding.any() or len()'
+
     @classmethod
     def of(cls, contacts: Iterable[Contact]) -> Contacts:
         """Return single contacts as arrays."""

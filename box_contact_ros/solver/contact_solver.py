@@ -25,13 +25,25 @@ from .checks import (
 )
 from .contact import Contact, Contacts, without_patch
 from .model import NATIVE_TYPES, Model, as_model
-from .motion import Approach, Approaches, find_approaches
+from .motion import Approach, Approaches, Sweep, as_sweeps, find_approaches, takes_sweeps
 from .nearest import Nearest, Nearests
+from .poses import ORDER, PoseLike, as_many, as_pose, as_poses
 
 Names = tuple[str, str, str, str]  # of poses and sizes of A and B, in a refusal
 _SINGLE: Names = ('pose_a', 'pose_b', 'size_a', 'size_b')
 _MANY: Names = ('poses_a', 'poses_b', 'size_a', 'size_b')
 _BY_PLACE: Names = ('poses', 'poses', 'sizes', 'sizes')
+_CENTRES = ('centre_a', 'centre_b')
+
+
+class _Rows(NamedTuple):
+    """What a batch takes besides its poses, of any kind of numbers."""
+
+    size_a: ArrayLike | None
+    size_b: ArrayLike | None
+    sizes: ArrayLike | None
+    pairs: ArrayLike | None
+    threads: int
 
 
 class _Asked(NamedTuple):
@@ -54,12 +66,13 @@ class ContactSolver(native.PairSolver):
     contact = solver(pose_a, pose_b)
     contacts = solver.batch(poses_a, poses_b)
     nearest = solver.distance(pose_a, pose_b)
-    first = solver.time_of_impact(start_a, end_a, start_b, end_b)
+    first = solver.time_of_impact(Sweep(start_a, end_a), Sweep(start_b, end_b))
     ```
 
     Sizes are three full extents [m]. Without them, each batch brings its own. Poses are
-    `x y z qx qy qz qw` in a common frame. Raises `ValueError`, with the field and the value, for
-    anything that is not a size or a pose. A solver may be called from several threads.
+    `x y z qx qy qz qw` in a common frame, 4×4 matrices, (position, rotation) or messages. Raises
+    `ValueError`, with the field and the value, for anything that is not a size or a pose. A solver
+    may be called from several threads.
 
     model: 'exact', 'mlp', or an object with `solve` as `models.Model` describes it.
     margin: separation up to which pairs apart have a normal too [m]; infinity: all.
@@ -89,17 +102,17 @@ class ContactSolver(native.PairSolver):
         super().__init__(answers, a, b, margin)
 
     if TYPE_CHECKING:  # the core, which does it, knows no type of ours
-        def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact: ...  # noqa: D102
+        def __call__(self, pose_a: PoseLike, pose_b: PoseLike) -> Contact: ...  # noqa: D102
 
-        def batch(self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,  # noqa: D102
+        def batch(self, poses_a: PoseLike, poses_b: PoseLike | None = None, *,  # noqa: D102
                   size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
                   sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
                   threads: int = 1, patch: bool = True) -> Contacts: ...
 
-        def distance(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Nearest: ...  # noqa: D102
+        def distance(self, pose_a: PoseLike, pose_b: PoseLike) -> Nearest: ...  # noqa: D102
 
         def distance_batch(  # noqa: D102
-                self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,
+                self, poses_a: PoseLike, poses_b: PoseLike | None = None, *,
                 size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
                 sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
                 threads: int = 1) -> Nearests: ...
@@ -108,16 +121,10 @@ class ContactSolver(native.PairSolver):
         distance = native.PairSolver.distance
         distance_batch = native.PairSolver.distance_batch
 
-    def time_of_impact(self, start_a: ArrayLike, end_a: ArrayLike, start_b: ArrayLike,
-                       end_b: ArrayLike, *, clearance: float = 0.0, tolerance: float = 1e-6,
-                       centre_a: ArrayLike | None = None, centre_b: ArrayLike | None = None,
-                       ) -> Approach:
+    @takes_sweeps
+    def time_of_impact(self, sweep_a: Sweep, sweep_b: Sweep, *, clearance: float = 0.0,
+                       tolerance: float = 1e-6) -> Approach:
         """Return when two boxes first come as near as the clearance [m], and where.
-
-        Each box goes from a pose (7,) to another while s goes from 0 to 1: its centre on a line,
-        its axes the shortest way, at constant rate. centre_a, centre_b (3,): the points in the
-        boxes' own frames that go on lines instead of the centres [m]; for a box of a body, the
-        origin of the body's frame.
 
         Before `time` the distance is above the clearance, by proof. At `time` it is at most
         clearance + tolerance. NaN: they never come so near. Boxes that are so near at the start
@@ -126,64 +133,64 @@ class ContactSolver(native.PairSolver):
         Raises ValueError, with field and value, for a turn by 180 degrees, which has two ways, and
         for a tolerance that rounding does not allow.
         """
-        return self._approach(start_a, end_a, start_b, end_b, centre_a, centre_b, clearance,
-                              tolerance)
+        return self._approach(sweep_a, sweep_b, clearance, tolerance)
 
-    def least_distance(self, start_a: ArrayLike, end_a: ArrayLike, start_b: ArrayLike,
-                       end_b: ArrayLike, *, tolerance: float = 1e-6,
-                       centre_a: ArrayLike | None = None, centre_b: ArrayLike | None = None,
+    @takes_sweeps
+    def least_distance(self, sweep_a: Sweep, sweep_b: Sweep, *, tolerance: float = 1e-6,
                        ) -> Approach:
         """Return the least distance on the way, to the tolerance [m], when it is, and where.
 
         Boxes that touch on the way have the first time, as `time_of_impact` without a clearance:
-        the distance is then at most the tolerance. Arguments and errors are those of
-        `time_of_impact`.
+        the distance is then at most the tolerance. Errors are those of `time_of_impact`.
         """
-        return self._approach(start_a, end_a, start_b, end_b, centre_a, centre_b, None, tolerance)
+        return self._approach(sweep_a, sweep_b, None, tolerance)
 
+    @takes_sweeps
     def time_of_impact_batch(
-            self, starts_a: ArrayLike, ends_a: ArrayLike, starts_b: ArrayLike | None = None,
-            ends_b: ArrayLike | None = None, *, size_a: ArrayLike | None = None,
-            size_b: ArrayLike | None = None, sizes: ArrayLike | None = None,
-            pairs: ArrayLike | None = None, clearance: float = 0.0, tolerance: float = 1e-6,
-            centre_a: ArrayLike | None = None, centre_b: ArrayLike | None = None,
-            centres: ArrayLike | None = None, threads: int = 1) -> Approaches:
+            self, sweeps_a: Sweep, sweeps_b: Sweep | None = None, *,
+            size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
+            sizes: ArrayLike | None = None, pairs: ArrayLike | None = None, clearance: float = 0.0,
+            tolerance: float = 1e-6, threads: int = 1) -> Approaches:
         """Return the Approaches of n pairs: row i is what `time_of_impact` gives for row i.
 
-        Poses at the start and at the end, sizes, pairs and threads are those of `batch`: (starts_a,
-        ends_a, starts_b, ends_b), or (starts, ends, sizes=…, pairs=…). Centres are (3,), or have a
-        row for each pose.
+        Sweeps of rows take the place of poses. Sizes, pairs and threads are those of `batch`.
         """
-        return self._approaches(starts_a, ends_a, starts_b, ends_b, size_a, size_b, sizes, pairs,
-                                centre_a, centre_b, centres, clearance, tolerance, threads)
+        return self._approaches(sweeps_a, sweeps_b, clearance, tolerance,
+                                _Rows(size_a, size_b, sizes, pairs, threads))
 
+    @takes_sweeps
     def least_distance_batch(
-            self, starts_a: ArrayLike, ends_a: ArrayLike, starts_b: ArrayLike | None = None,
-            ends_b: ArrayLike | None = None, *, size_a: ArrayLike | None = None,
-            size_b: ArrayLike | None = None, sizes: ArrayLike | None = None,
-            pairs: ArrayLike | None = None, tolerance: float = 1e-6,
-            centre_a: ArrayLike | None = None, centre_b: ArrayLike | None = None,
-            centres: ArrayLike | None = None, threads: int = 1) -> Approaches:
+            self, sweeps_a: Sweep, sweeps_b: Sweep | None = None, *,
+            size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
+            sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
+            tolerance: float = 1e-6, threads: int = 1) -> Approaches:
         """Return the Approaches of n pairs: row i is what `least_distance` gives for row i.
 
         All arguments are those of `time_of_impact_batch`.
         """
-        return self._approaches(starts_a, ends_a, starts_b, ends_b, size_a, size_b, sizes, pairs,
-                                centre_a, centre_b, centres, None, tolerance, threads)
+        return self._approaches(sweeps_a, sweeps_b, None, tolerance,
+                                _Rows(size_a, size_b, sizes, pairs, threads))
+
+    def __repr__(self) -> str:
+        """Return the call that makes the same solver."""
+        sizes = [f'size_{side}={tuple(size[0].tolist())}' for side, size in (
+            ('a', self._size_a), ('b', self._size_b)) if size is not None]
+        margin = [f'margin={self._margin:g}'] if self._margin else []
+        return f'ContactSolver({", ".join((*sizes, f"model={self.model!r}", *margin))})'
 
     def __reduce__(self) -> tuple[Callable[..., ContactSolver], tuple[Any, ...]]:
         """Pickle the arguments."""
         return (partial(ContactSolver, model=self.model, margin=self._margin),
                 tuple(None if size is None else size[0] for size in (self._size_a, self._size_b)))
 
-    def _call_general(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact:
+    def _call_general(self, pose_a: PoseLike, pose_b: PoseLike) -> Contact:
         """Return the contact of one pair whose poses (7,) are of any kind of numbers.
 
         Raises ValueError, with field and value, for poses that are refused.
         """
         return self._solve(self._pair(pose_a, pose_b))[0]
 
-    def _batch_general(self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,
+    def _batch_general(self, poses_a: PoseLike, poses_b: PoseLike | None = None, *,
                        size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
                        sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
                        threads: int = 1, patch: bool = True) -> Contacts:
@@ -199,11 +206,11 @@ class ContactSolver(native.PairSolver):
         return self._solve(self._rows(poses_a, poses_b, size_a, size_b, sizes, pairs, threads),
                            bool(patch))
 
-    def _distance_general(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Nearest:
+    def _distance_general(self, pose_a: PoseLike, pose_b: PoseLike) -> Nearest:
         """Return what `distance` does, for poses of any kind; ValueError as of a call."""
         return self._find_distances(self._pair(pose_a, pose_b))[0]
 
-    def _distance_batch_general(self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,
+    def _distance_batch_general(self, poses_a: PoseLike, poses_b: PoseLike | None = None, *,
                                 size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
                                 sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
                                 threads: int = 1) -> Nearests:
@@ -214,49 +221,43 @@ class ContactSolver(native.PairSolver):
         return self._find_distances(
             self._rows(poses_a, poses_b, size_a, size_b, sizes, pairs, threads))
 
-    def _approach(self, start_a: ArrayLike, end_a: ArrayLike, start_b: ArrayLike, end_b: ArrayLike,
-                  centre_a: ArrayLike | None, centre_b: ArrayLike | None,
-                  clearance: float | None, tolerance: float) -> Approach:
-        found = native.approach(start_a, end_a, start_b, end_b, self._size_a, self._size_b,
-                                centre_a, centre_b, clearance, tolerance)
+    def _approach(self, sweep_a: Sweep, sweep_b: Sweep, clearance: float | None, tolerance: float,
+                  ) -> Approach:
+        a, b = as_sweeps(sweep_a, sweep_b)
+        found = native.approach(a.start, a.end, b.start, b.end, self._size_a, self._size_b,
+                                a.centre, b.centre, clearance, tolerance)
         if found:
             return Approach(*found)
+        asked = _Asked(_pose(a.start, 'start_a'), _pose(b.start, 'start_b'),
+                       _known(self._size_a, 'size_a'), _known(self._size_b, 'size_b'), _SINGLE)
+        ends = _pose(a.end, 'end_a'), _pose(b.end, 'end_b')
         try:
-            return find_approaches(
-                (_pose(start_a, 'start_a'), _pose(start_b, 'start_b'),
-                 _known(self._size_a, 'size_a'), _known(self._size_b, 'size_b')),
-                (_pose(end_a, 'end_a'), _pose(end_b, 'end_b')), (centre_a, centre_b),
-                ('end_a', 'end_b', 'centre_a', 'centre_b'), clearance=clearance,
-                tolerance=tolerance, threads=1, pairs=None)[0]
+            return find_approaches(asked[:4], ends, (a.centre, b.centre), _CENTRES, clearance,
+                                   tolerance)[0]
         except ValueError as error:
             raise ValueError(str(error).removeprefix('row 0: ')) from None
 
-    def _approaches(self, starts_a: ArrayLike, ends_a: ArrayLike, starts_b: ArrayLike | None,
-                    ends_b: ArrayLike | None, size_a: ArrayLike | None, size_b: ArrayLike | None,
-                    sizes: ArrayLike | None, pairs: ArrayLike | None, centre_a: ArrayLike | None,
-                    centre_b: ArrayLike | None, centres: ArrayLike | None,
-                    clearance: float | None, tolerance: float, threads: int) -> Approaches:
-        names = 'ends_a', 'ends_b', 'centre_a', 'centre_b'
-        if pairs is not None:
-            if any(value is not None for value in (centre_a, centre_b, ends_b)):
-                raise ValueError('pairs are places in starts, ends, sizes and centres: there is '
-                                 'neither ends_b nor centre_a nor centre_b')
-            names = 'ends', 'ends', 'centres', 'centres'
-            ends_b, centre_a, centre_b = ends_a, centres, centres
-        elif centres is not None or ends_b is None:
-            raise ValueError('a batch takes (starts_a, ends_a, starts_b, ends_b), or (starts, '
-                             'ends, sizes=…, pairs=…) and centres')
-        asked = self._rows(starts_a, starts_b, size_a, size_b, sizes, pairs, threads)
-        return find_approaches(asked[:4], (ends_a, ends_b), (centre_a, centre_b), names,
-                               clearance=clearance, tolerance=tolerance, threads=asked.threads,
-                               pairs=asked.places)
+    def _approaches(self, sweeps_a: Sweep, sweeps_b: Sweep | None, clearance: float | None,
+                    tolerance: float, rows: _Rows) -> Approaches:
+        by_place = rows.pairs is not None
+        a, b = as_sweeps(sweeps_a, sweeps_b, by_place=by_place)
+        names = _CENTRES
+        if by_place:
+            start_a, end_a = as_many(starts=a.start, ends=a.end)
+            start_b, end_b, names = None, end_a, ('centres', 'centres')
+        else:
+            start_a, end_a, start_b, end_b = as_many(
+                starts_a=a.start, ends_a=a.end, starts_b=b.start, ends_b=b.end)
+        asked = self._rows(start_a, start_b, *rows)
+        return find_approaches(asked[:4], (end_a, end_b), (a.centre, b.centre), names, clearance,
+                               tolerance, asked.threads, asked.places)
 
-    def _pair(self, pose_a: ArrayLike, pose_b: ArrayLike) -> _Asked:
+    def _pair(self, pose_a: PoseLike, pose_b: PoseLike) -> _Asked:
         """Return one pair of poses of any kind of numbers."""
         return _Asked(_pose(pose_a, 'pose_a'), _pose(pose_b, 'pose_b'),
                       _known(self._size_a, 'size_a'), _known(self._size_b, 'size_b'), _SINGLE)
 
-    def _rows(self, poses_a: ArrayLike, poses_b: ArrayLike | None, size_a: ArrayLike | None,
+    def _rows(self, poses_a: PoseLike, poses_b: PoseLike | None, size_a: ArrayLike | None,
               size_b: ArrayLike | None, sizes: ArrayLike | None, pairs: ArrayLike | None,
               threads: int) -> _Asked:
         """Return the rows of a batch whose arguments are of any kind of numbers."""
@@ -265,17 +266,14 @@ class ContactSolver(native.PairSolver):
             if poses_b is not None or size_a is not None or size_b is not None:
                 raise ValueError('pairs are places in poses and sizes: batch(poses, sizes=…, '
                                  'pairs=…) has neither poses_b nor size_a nor size_b')
-            poses = as_floats(poses_a, 'poses', 'poses (m, 7) of rows x y z qx qy qz qw', (None, 7))
+            poses = as_poses(poses_a, 'poses')
             rows_a = self._sizes(sizes, 'sizes', self._size_a, len(poses))
             rows_b = self._sizes(sizes, 'sizes', self._size_b, len(poses))
             return _Asked(poses, poses, rows_a, rows_b, _BY_PLACE, threads,
                           as_places(pairs, 'pairs', len(poses)))
         if sizes is not None or poses_b is None:
             raise ValueError('batch takes (poses_a, poses_b), or (poses, sizes=…, pairs=…)')
-        a = as_floats(poses_a, 'poses_a', 'poses (n, 7) of rows x y z qx qy qz qw', (None, 7))
-        b = as_floats(poses_b, 'poses_b', 'poses (n, 7) of rows x y z qx qy qz qw', (None, 7))
-        if len(a) != len(b):
-            raise ValueError(f'poses_a and poses_b must be equally many, not {len(a)} and {len(b)}')
+        a, b = as_many(poses_a=poses_a, poses_b=poses_b)
         return _Asked(a, b, self._sizes(size_a, 'size_a', self._size_a, len(a)),
                       self._sizes(size_b, 'size_b', self._size_b, len(a)), _MANY, threads)
 
@@ -322,7 +320,7 @@ class ContactSolver(native.PairSolver):
                                               (asked.size_b, asked.names[3], size_fault, of_b)):
             if fault := fault_of(values[place % len(values)]):
                 numbered = name.startswith('poses') or len(asked.a) > 1
-                order = '; a pose is x y z qx qy qz qw' if fault_of is pose_fault else ''
+                order = ORDER if fault_of is pose_fault else ''
                 return f'{name}[{place}] {fault}{order}' if numbered else f'{name} {fault}{order}'
         fault = self._size_fault(asked.size_a[of_a % len(asked.size_a)],
                                  asked.size_b[of_b % len(asked.size_b)])
@@ -351,9 +349,9 @@ def _checked(answer: object, model: str, count: int) -> tuple[Contacts, int]:
     return contacts, int(refused)
 
 
-def _pose(pose: ArrayLike, name: str) -> np.ndarray:
-    """Return a pose (7,) of any kind of numbers as (1, 7)."""
-    return as_floats(pose, name, 'a pose (x y z qx qy qz qw)', (7,)).reshape(1, 7)
+def _pose(pose: PoseLike, name: str) -> np.ndarray:
+    """Return a pose of any form as (1, 7)."""
+    return as_pose(pose, name).reshape(1, 7)
 
 
 def _known(size: np.ndarray | None, name: str) -> np.ndarray:

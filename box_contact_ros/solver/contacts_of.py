@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import native
-from .checks import TooMuch, as_boxes, as_margin, as_places, pose_fault, short_repr
+from .checks import TooMuch, as_margin, as_places, pose_fault, short_repr
 from .contact import Contacts
 from .contact_solver import ContactSolver
 from .faces import as_tolerances
 from .nearest import Nearests
+from .poses import as_boxes
 
 
 class Found(NamedTuple):

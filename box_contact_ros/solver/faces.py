@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import native
-from .checks import as_boxes, as_floats, as_margin, as_number, as_places
+from .checks import as_floats, as_margin, as_number, as_places
+from .poses import as_boxes
 
 TOLERANCE = 1e-4
 """Gap up to which faces touch [m]: that of a simulation at rest."""

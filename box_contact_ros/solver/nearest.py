@@ -32,6 +32,8 @@ class Nearests(Rows[Nearest]):
     point_b: np.ndarray
     """(n, 3) [m]."""
 
+    _instead = '.colliding, .colliding.any() or len()'
+
     def _one(self, colliding: np.bool_, distance: np.float64, normal: np.ndarray,
              point_a: np.ndarray, point_b: np.ndarray) -> Nearest:
         return Nearest(bool(colliding), float(distance), normal, point_a, point_b)

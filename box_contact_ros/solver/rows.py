@@ -8,7 +8,7 @@ import operator
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import fields
-from typing import Any, Self, TypeVar, overload
+from typing import Any, ClassVar, Never, Self, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +16,17 @@ from numpy.typing import ArrayLike
 One = TypeVar('One')
 
 
-class Rows(Sequence[One]):
+class NoTruth:
+    """An answer without a truth value, as NumPy's arrays are: `if answer:` says what to ask."""
+
+    __slots__ = ()
+    _instead: ClassVar[str]
+
+    def __bool__(self) -> Never:
+        raise TypeError(f'{type(self).__name__} has no truth value: ask {self._instead}')
+
+
+class Rows(NoTruth, Sequence[One]):
     """A dataclass of arrays that all have n rows. A number gives one row, a mask gives Rows."""
 
     __slots__ = ()

@@ -1,14 +1,29 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""A page in the browser: of the plan of a file if one is named, else of running nodes."""
+"""A live page in the browser: boxes, contacts, depth and force over time.
+
+It draws the boxes of a scene as the running nodes publish them, and the contacts that answer them.
+It also shows which model the contact node runs, and the force on a crane's load. It prints the
+page's address.
+
+`view FILE` shows the plan of a file instead, and what is wrong with it. It needs no ROS:
+`view FILE --help`.
+"""
 from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
 
-from ..arguments import outside_ros_args, program_main
+from ..arguments import outside_ros_args, parse_command_line, program_main
 from ..extras import MissingExtra, require
+from ..node.parameters import SCENE_PARAMETERS, Setting, text, whole_number
+
+PARAMETERS = SCENE_PARAMETERS | {
+    'host': Setting('127.0.0.1', 'address to serve at; everybody who reaches it sees the page',
+                    text),
+    'port': Setting(8080, 'port to serve at, or the next that is free', whole_number(1, 65535)),
+}
 
 
 @program_main
@@ -18,12 +33,16 @@ def main(args: Sequence[str] | None = None) -> int:
     if any(not arg.startswith('-') for arg in outside_ros_args(args)):
         from . import plan_page
         return plan_page.main(args)
+    parse_command_line('view', __doc__, PARAMETERS, args)
     try:
-        require('ros')
+        require('ros', 'view')
     except MissingExtra as error:
         raise MissingExtra(f'{error}; or name a FILE to see its plan', name=error.name) from None
-    from .live import view_node
-    return view_node.main(args)
+    from ..node.runtime import run_node
+    from .live.view_node import ViewNode
+
+    # The page is served by another thread, which must not wait until this one is idle.
+    return run_node(ViewNode, args, undisturbed=False)
 
 
 if __name__ == '__main__':

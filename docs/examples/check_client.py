@@ -10,6 +10,9 @@ It prints:
 
     load_stack: 10.0 mm deep, 0.297 m³
 """
+from box_contact_ros.extras import require
+
+require('ros')  # what is missing is named in one line
 import rclpy
 from geometry_msgs.msg import Point, Pose, Vector3
 from rclpy.qos import QoSProfile

@@ -17,6 +17,9 @@ It prints:
 """
 from itertools import combinations
 
+from box_contact_ros.extras import require
+
+require('sim')  # what is missing is named in one line
 import mujoco
 import numpy as np
 
@@ -56,7 +59,7 @@ def main() -> None:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     solver = ContactSolver(SIZE, SIZE, model='exact')
-    bodies = [Body(mass=0.0, inertia=np.zeros(3)), *[Body.of_box(SIZE, MASS)] * COUNT]
+    bodies = [Body.fixed(), *[Body.of_box(SIZE, MASS)] * COUNT]
     forces = PatchForces(bodies)
     forces.set_boxes(SIZES)  # then corners of loads are those of the faces
     weights = np.zeros((COUNT + 1, 6))

@@ -14,6 +14,9 @@ It prints:
     c1: swayed 0.18 m, stands at 5.89 m, 0.6 mm deep
     c2: swayed 0.40 m, stands at 5.88 m, 1.3 mm deep
 """
+from box_contact_ros.extras import require
+
+require('ros')  # what is missing is named in one line
 import numpy as np
 import rclpy
 from geometry_msgs.msg import Point, Pose, Quaternion, Transform, Vector3
@@ -33,7 +36,7 @@ MASSES = {'c1': 20_000.0, 'c2': 12_000.0, FRAME: 8_000.0}  # [kg]
 TOP, STIFFNESS, DAMPING, GRAVITY = 20.0, 1e6, 2e5, 9.81  # of the rope [m], [N/m], [N s/m]
 STEP, STEPS = 0.002, 20  # of physics [s]; how many from question to question
 WIDE = 1e12  # inertia of a load that guides keep from turning [kg m²]
-FIXED = Body(mass=0.0, inertia=np.zeros(3))
+FIXED = Body.fixed()
 
 
 class Crane(Node):

@@ -19,6 +19,9 @@ It prints:
 import sys
 from pathlib import Path
 
+from box_contact_ros.extras import require
+
+require('cluster', 'plans')  # what is missing is named in one line
 from distributed import Client, LocalCluster
 
 FILES = Path(__file__).with_name('files')

@@ -9,6 +9,9 @@ It needs Matplotlib, and writes first_contact.png. It prints:
 """
 from __future__ import annotations
 
+from box_contact_ros.extras import require
+
+require('report')  # what is missing is named in one line
 import numpy as np
 from matplotlib import pyplot as plt
 

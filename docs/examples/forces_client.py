@@ -17,6 +17,9 @@ It prints:
     force / weight 1.0000, slid 20 mm
     corner loads 49.1 49.1 49.0 49.0 kN
 """
+from box_contact_ros.extras import require
+
+require('ros')  # what is missing is named in one line
 import numpy as np
 import rclpy
 from lockstep_client import LockstepClient
@@ -36,7 +39,7 @@ def main() -> None:
     client.wait_for_node()
     places = {'box_a': 0, 'box_b': 1}  # of the bodies, by the names of their boxes
     forces = PatchForces([Body(mass=MASS, inertia=[WIDE] * 3),
-                          Body(mass=0.0, inertia=np.zeros(3))])
+                          Body.fixed()])
     forces.set_boxes([SIZE, SIZE])  # then corners of loads are those of the faces
     poses = np.array([[0.0, 0.0, 2.611, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
     velocities, weights = np.zeros((2, 6)), np.zeros((2, 6))

@@ -14,6 +14,9 @@ It prints:
     on the lorry: c1_lorry
     detached: spreader_frame_c1
 """
+from box_contact_ros.extras import require
+
+require('ros')  # what is missing is named in one line
 import rclpy
 from geometry_msgs.msg import Point, Pose, Transform, Vector3
 from rclpy.qos import QoSProfile

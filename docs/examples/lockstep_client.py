@@ -15,6 +15,9 @@ It prints:
     20 ms: contact, 1.5 mm deep
     25 ms: contact, 2.5 mm deep
 """
+from box_contact_ros.extras import require
+
+require('ros')  # what is missing is named in one line
 import numpy as np
 import rclpy
 from builtin_interfaces.msg import Time

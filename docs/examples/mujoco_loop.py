@@ -17,6 +17,9 @@ It prints:
     1.01 s: 0.0 mm deep, 0 mm/s
     at rest: force / weight 1.0000, tilt below 0.001°: True
 """
+from box_contact_ros.extras import require
+
+require('sim')  # what is missing is named in one line
 import mujoco
 import numpy as np
 
@@ -61,7 +64,7 @@ def main() -> None:
     mujoco.mj_forward(model, data)
     boxes = {'load': Box(SIZE), 'stack': Box(SIZE, STACK)}
     solver = SceneSolver(Scene(boxes, (Pair.between('load', 'stack'),)), margin=MARGIN)
-    fixed = Body(mass=0.0, inertia=np.zeros(3))
+    fixed = Body.fixed()
     forces = PatchForces([Body.of_box(SIZE, MASS), fixed])  # body 0, the load, and 1, the stack
     forces.set_boxes([SIZE, SIZE])
     velocities, weights = np.zeros((2, 6)), np.zeros((2, 6))

@@ -14,6 +14,9 @@ near them, equalities and odd gravity are named, so that not all is judged. It p
 import sys
 from pathlib import Path
 
+from box_contact_ros.extras import require
+
+require('sim', 'plans')  # what is missing is named in one line
 import mujoco
 import numpy as np
 

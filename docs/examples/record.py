@@ -12,10 +12,13 @@ It prints:
     5 of /box_b/pose
     5 of /contacts
 """
-import sys
+import argparse
 from functools import partial
 from pathlib import Path
 
+from box_contact_ros.extras import require
+
+require('ros', 'bag')  # what is missing is named in one line
 import rclpy
 from geometry_msgs.msg import PoseStamped
 from rclpy.executors import ExternalShutdownException
@@ -58,4 +61,6 @@ def main(folder: str) -> None:
 
 
 if __name__ == '__main__':
-    main(sys.argv[1])
+    parser = argparse.ArgumentParser(description=__doc__.partition('\n')[0])
+    parser.add_argument('folder', metavar='FOLDER', help='a new folder')
+    main(parser.parse_args().folder)

@@ -10,10 +10,14 @@ It prints:
 
     4 boxes in /tmp/yard.yaml
 """
+import argparse
 import sys
 from pathlib import Path
 from typing import Any
 
+from box_contact_ros.extras import require
+
+require('ros')  # what is missing is named in one line
 import rclpy
 import yaml
 
@@ -33,10 +37,13 @@ def pair_of(pair: Pair | tuple[str, str]) -> dict[str, str]:
     return dict(zip('ab', pair[-2:])) | named
 
 
+parser = argparse.ArgumentParser(description=__doc__.partition('\n')[0])
+parser.add_argument('file', metavar='NEW', type=Path, help='the scene file to write')
+file = parser.parse_args().file
 rclpy.init()
 node = rclpy.create_node('save_yard')
 client = YardClient(node)
-print('waiting for contact_node', end='\r', file=sys.stderr)
+print('waiting for contact_node', file=sys.stderr)
 while client.yard is None:
     rclpy.spin_once(node)
 scene = client.yard.scene
@@ -44,7 +51,7 @@ parts = {'frame_id': scene.frame_id, 'poses': scene.poses,
          'boxes': {name: entry_of(box) for name, box in scene.boxes.items()},
          'bodies': {name: entry_of(body) for name, body in scene.bodies.items()},
          'pairs': [pair_of(pair) for pair in (*scene.pairs, *scene.patterns)]}
-Path(sys.argv[1]).write_text(yaml.safe_dump({key: part for key, part in parts.items() if part},
-                                            sort_keys=False))
-print(f'{len(scene.boxes)} boxes in {sys.argv[1]}')
+file.write_text(yaml.safe_dump({key: part for key, part in parts.items() if part},
+                               sort_keys=False))
+print(f'{len(scene.boxes)} boxes in {file}')
 rclpy.shutdown()

@@ -10,6 +10,9 @@ Not tested with tf2_ros from apt. PyPI has no wheel of it.
 """
 import sys
 
+from box_contact_ros.extras import require
+
+require('ros')  # what is missing is named in one line
 import rclpy
 from geometry_msgs.msg import PoseStamped
 from rclpy.node import Node

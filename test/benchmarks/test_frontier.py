@@ -128,7 +128,7 @@ def test_contacts_that_an_engine_misses_are_odd() -> None:
     exact = ours('exact')
     engine = dataclasses.replace(exact, name='blind', causes={'missed': 'Planted.'}, boxes=lambda
                                  p, q: (lambda a, b: None) if p[0] > 10.0 else exact.boxes(p, q),
-                                 read=lambda found: exact.read(found) if found else APART,
+                                 read=lambda found: APART if found is None else exact.read(found),
                                  prepare_batch=None)
     rows = []
     for name in ('random cubes', 'containers'):

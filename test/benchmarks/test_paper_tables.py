@@ -21,6 +21,7 @@ from benchmarks.paper import dataset, rotation, soup_tables, tables, tree
 from benchmarks.paper.errors import errors_of, figures
 from benchmarks.paper.models import weights_path
 from benchmarks.pose_sets import at_depth, on_cube
+from box_contact_ros import extras
 from box_contact_ros.models import soup
 from box_contact_ros.models.weights_file import load_weights
 from box_contact_ros.solver.contact_solver import ContactSolver
@@ -223,7 +224,11 @@ def test_the_share_that_the_times_suggest() -> None:
 
 
 def test_a_part_leaves_the_whole_page_alone(tmp_path, monkeypatch, capsys):
-    """One table goes to quick-results/, and the program tells what it works on."""
+    """One table goes to quick-results/, and the program tells what it works on.
+
+    FCL is asked for by the tables and figures of soups alone.
+    """
+    monkeypatch.setitem(extras.MODULES, 'soup', ('no_such_module',))
     page = tmp_path / 'docs' / 'results' / 'paper_tables.md'
     page.parent.mkdir(parents=True)
     page.write_text('all tables')
@@ -234,6 +239,9 @@ def test_a_part_leaves_the_whole_page_alone(tmp_path, monkeypatch, capsys):
     assert page.read_text() == 'all tables'
     assert '[1]' in (tmp_path / 'quick-results' / 'paper_tables.md').read_text()
     assert capsys.readouterr().out.startswith('paper: tables 1 and 2 ...\n')
+    for part in (['--table', '3'], ['--figure', '10'], []):
+        with pytest.raises(extras.MissingExtra, match=r'\[soup\]'):
+            program.main([*part, '--out', str(tmp_path / 'new')])
 
 
 @pytest.mark.reports

@@ -17,7 +17,7 @@ import poses
 import pytest
 from test_library import EACH_FUNCTION_ONCE
 
-from box_contact_ros import Body, ContactSolver, PatchForces
+from box_contact_ros import Body, ContactSolver, PatchForces, Sweep
 from box_contact_ros.forces.patch_forces import GRAVITY
 
 CORE = Path(__file__).resolve().parents[2] / 'box_contact_ros' / 'core'
@@ -58,7 +58,7 @@ def tower() -> np.ndarray:
     velocities, weights = np.zeros((2, count, 6))
     weights[1:, 2] = -GRAVITY * 600.0
     solver = ContactSolver((1, 1, 1), (1, 1, 1))
-    forces = PatchForces([Body(mass=0.0, inertia=(0, 0, 0))]
+    forces = PatchForces([Body.fixed()]
                          + [Body.of_box((1, 1, 1), 600.0)] * (count - 1))
     for _ in range(400):
         forces.hold(pairs, solver.batch(poses, sizes=sizes, pairs=pairs), poses)
@@ -90,7 +90,7 @@ def test_another_build_has_the_same_bits(name: str, tmp_path: Path) -> None:
     good = of_motion[:, 0] != -1.0
     ways = [np.roll(pose, shift, axis=0)[good] for pose in pairs[:2] for shift in (0, -1)]
     first, least = (getattr(ContactSolver(), f'{name}_batch')(
-        *ways, size_a=pairs.size_a[good], size_b=pairs.size_b[good])
+        Sweep(*ways[:2]), Sweep(*ways[2:]), size_a=pairs.size_a[good], size_b=pairs.size_b[good])
         for name in ('time_of_impact', 'least_distance'))
     assert good.mean() > 0.5
     assert np.array_equal(of_motion[good], np.column_stack(

@@ -196,7 +196,7 @@ def test_forces_have_the_bits_of_python(tmp_path: Path, source: str) -> None:
     size, pair = (12.192, 2.438, 2.591), np.array([(0, 1)])
     solver = ContactSolver(size, size, model='exact')
     forces = PatchForces([Body(mass=20000.0, inertia=(1e12, 1e12, 1e12)),
-                          Body(mass=0.0, inertia=np.zeros(3))])
+                          Body.fixed()])
     poses = np.array([[0.3, 0.1, 2.601, 0.001, 0.002, 0.003, 1.0], [0, 0, 0, 0, 0, 0, 1.0]])
     velocities, outside = np.zeros((2, 6)), np.zeros((2, 6))
     outside[0, 2] = -9.81 * 20000.0

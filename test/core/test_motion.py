@@ -14,7 +14,7 @@ import numpy as np
 import poses
 import pytest
 
-from box_contact_ros import Approach, Approaches, ContactSolver
+from box_contact_ros import Approach, Approaches, ContactSolver, Sweep
 from box_contact_ros.core import instruction_sets
 
 motions = pytest.importorskip('benchmarks.motions')
@@ -40,8 +40,7 @@ def ask(found, name='time_of_impact', rows=slice(None), **options):
     """Return the approaches of motions with one clearance, 0 unless it is given."""
     found = found.rows(rows)
     return getattr(ContactSolver(), f'{name}_batch')(
-        *found[:4], size_a=found.size_a, size_b=found.size_b, centre_a=found.centre_a,
-        centre_b=found.centre_b, **options)
+        *found.sweeps(), size_a=found.size_a, size_b=found.size_b, **options)
 
 
 def nearest_at(found, s):
@@ -64,7 +63,8 @@ def least_tolerance(found):
 def test_a_box_falls_onto_a_floor():
     """From 10 m to −10 m, a cube of 1 m above a plate whose top is at 0: at (10 − .5) / 20."""
     solver = ContactSolver(UNIT, (4, 4, 2))
-    hit = solver.time_of_impact(at(0, 0, 10), at(0, 0, -10), at(0, 0, -1), at(0, 0, -1))
+    hit = solver.time_of_impact(Sweep(at(0, 0, 10), at(0, 0, -10)),
+                                Sweep(at(0, 0, -1), at(0, 0, -1)))
     assert isinstance(hit, Approach) and hit.time <= 0.475
     assert hit.time == pytest.approx(0.475, abs=TOLERANCE / 20)
     assert hit.closing_speed == pytest.approx(20.0)
@@ -76,9 +76,10 @@ def test_a_box_falls_onto_a_floor():
 def test_a_bullet_is_not_through_a_plate():
     """Both poses are free; a cube of .04 m meets a plate of .04 m before half of the way."""
     solver = ContactSolver((0.04,) * 3, (4, 4, 0.04))
-    hit = solver.time_of_impact(at(2, 2, 5), at(2, 2, -5), at(2, 2, 0), at(2, 2, 0))
+    bullet = Sweep(at(2, 2, 5), at(2, 2, -5))
+    hit = solver.time_of_impact(bullet, Sweep(at(2, 2, 0), at(2, 2, 0)))
     assert hit.time == pytest.approx(0.496, abs=1e-7) and hit.time <= 0.496
-    upper = solver.time_of_impact(at(2, 2, 5), at(2, 2, -5), at(2, 2, 0.02 - 0.03), at(2, 2, -0.01))
+    upper = solver.time_of_impact(bullet, Sweep(at(2, 2, 0.02 - 0.03), at(2, 2, -0.01)))
     assert upper.time == pytest.approx(0.497, abs=1e-7) and upper.time <= 0.497
 
 
@@ -86,7 +87,8 @@ def test_a_bar_turns_onto_an_edge():
     """A bar of half length 2 turns down about its middle, onto the upper edge of a wall behind."""
     solver = ContactSolver((4.0, 0.2, 0.2), (0.2, 1.0, 1.0))
     edge, wall = np.array([1.7, -1.0]), at(1.6, 0, -1.5)
-    hit = solver.time_of_impact(at(0, 0, 0), at(0, 0, 0, turn=about((0, 1, 0), 1.0)), wall, wall)
+    turning = Sweep(at(0, 0, 0), at(0, 0, 0, turn=about((0, 1, 0), 1.0)))
+    hit = solver.time_of_impact(turning, Sweep(wall, wall))
     # The lower face is 0.1 below the axis of the turn.
     angle = math.atan2(-edge[1], edge[0]) - math.asin(0.1 / np.hypot(*edge))
     assert hit.time <= angle and hit.time == pytest.approx(angle, abs=1e-6)
@@ -97,15 +99,15 @@ def test_a_bar_turns_onto_an_edge():
 def test_a_corner_that_turns_by_touches_or_not(gap):
     """A square turns over a floor: its corner comes to √½ of its edge, half way."""
     solver = ContactSolver(UNIT, (4, 4, 1))
-    ways = at(0, 0, 0), at(0, 0, 0, turn=about((0, 1, 0), math.pi / 2))
+    turning = Sweep(at(0, 0, 0), at(0, 0, 0, turn=about((0, 1, 0), math.pi / 2)))
     touch = math.sqrt(0.5) + 0.5
     floor = at(0, 0, -touch - gap)
-    low = solver.least_distance(*ways, floor, floor, tolerance=1e-10)
+    low = solver.least_distance(turning, Sweep(floor, floor), tolerance=1e-10)
     assert low.time == pytest.approx(0.5, abs=1e-4)
     assert low.nearest.distance == pytest.approx(gap, abs=1e-10)
-    assert math.isnan(solver.time_of_impact(*ways, floor, floor, tolerance=1e-10).time)
+    assert math.isnan(solver.time_of_impact(turning, Sweep(floor, floor), tolerance=1e-10).time)
     floor = at(0, 0, -touch + gap)
-    first = solver.time_of_impact(*ways, floor, floor, tolerance=1e-10)
+    first = solver.time_of_impact(turning, Sweep(floor, floor), tolerance=1e-10)
     # √½ cos(θ) = √½ − gap, θ before half of the turn.
     assert first.time == pytest.approx(0.5 - math.acos(1 - gap / math.sqrt(0.5)) / (math.pi / 2),
                                        abs=1e-5)
@@ -116,21 +118,22 @@ def test_a_box_of_a_body_goes_on_an_arc():
     solver = ContactSolver((0.2, 0.2, 0.2), (0.2, 10, 10))
     centre = np.array([-3.0, 0.0, 0.0])
     end = np.r_[-3.0 + 3.0 * math.cos(1.0), 3.0 * math.sin(1.0), 0.0, about((0, 0, 1), 1.0)]
-    options = {'centre_a': centre}
+    arc = Sweep(at(0, 0, 0), end, centre)
     wall = at(0.5, 0, 0)
-    free = solver.least_distance(at(0, 0, 0), end, wall, wall, **options)
+    free = solver.least_distance(arc, Sweep(wall, wall))
     assert free.nearest.distance <= 0.3 + TOLERANCE
     # The chord is straight without a centre.
-    straight = solver.time_of_impact(at(0, 0, 0), end, at(-0.8, 1.9, 0), at(-0.8, 1.9, 0))
+    straight = solver.time_of_impact(
+        Sweep(at(0, 0, 0), end), Sweep(at(-0.8, 1.9, 0), at(-0.8, 1.9, 0)))
     assert not math.isnan(straight.time)
     behind = at(-3.2, 0, 0)  # the wall cuts the circle of 3 m only beyond the half turn
-    assert math.isnan(solver.time_of_impact(at(0, 0, 0), end, behind, behind, **options).time)
+    assert math.isnan(solver.time_of_impact(arc, Sweep(behind, behind)).time)
 
 
 def test_a_clearance_and_the_start():
     """Within the clearance at the start is time 0; NaN is never."""
     solver = ContactSolver(UNIT, UNIT)
-    ways = at(0, 0, 3), at(0, 0, 1.5), at(0, 0, 0), at(0, 0, 0)
+    ways = Sweep(at(0, 0, 3), at(0, 0, 1.5)), Sweep(at(0, 0, 0), at(0, 0, 0))
     assert math.isnan(solver.time_of_impact(*ways).time)
     hit = solver.time_of_impact(*ways, clearance=1.0)
     assert hit.time == pytest.approx(2 / 3, abs=1e-6) and hit.time <= 2 / 3
@@ -138,11 +141,11 @@ def test_a_clearance_and_the_start():
     never = solver.time_of_impact(*ways, clearance=0.5 - 2e-6)
     assert math.isnan(never.closing_speed) and math.isnan(never.nearest.distance)
     assert not never.nearest.colliding
-    away = solver.time_of_impact(at(0, 0, 1), at(0, 0, 2), at(0, 0, 0), at(0, 0, 0))
+    away = solver.time_of_impact(Sweep(at(0, 0, 1), at(0, 0, 2)), Sweep(at(0, 0, 0), at(0, 0, 0)))
     assert away.time == 0.0 and away.closing_speed == pytest.approx(-1.0)
     low = solver.least_distance(*ways)
     assert low.time == 1.0 and low.nearest.distance == pytest.approx(0.5)
-    still = solver.least_distance(ways[0], ways[0], *ways[2:])
+    still = solver.least_distance(Sweep(at(0, 0, 3), at(0, 0, 3)), ways[1])
     assert still.nearest.distance == 2.0 and still.closing_speed == 0.0
 
 
@@ -292,7 +295,7 @@ def test_the_least_tolerance_is_kept(kind):
 # --- refusals -------------------------------------------------------------------------------------
 
 WAYS = (at(0, 0, 3), at(0, 0, 1), at(0, 0, 0), at(0, 0, 0))
-NAMES = ('start_a', 'end_a', 'start_b', 'end_b')
+NAMES = ('start_a', 'end_a', 'start_b', 'end_b', 'centre_a', 'centre_b')
 REFUSED = {
     'a turn by 180 degrees': ({'end_a': at(0, 0, 1, turn=(0, 0, 1, 0))},
                               'the turn from start_a to end_a by 180 degrees has two ways: give a '
@@ -312,40 +315,54 @@ BY_ROW = ('a turn by 180 degrees', 'nearly', 'a fine tolerance', 'a bad start', 
           'a bad centre')
 
 
+def sweeps(parts):
+    """Return the sweeps of A and B, by the names of their parts."""
+    return [Sweep(*(parts[f'{part}_{side}'] for part in ('start', 'end', 'centre')))
+            for side in 'ab']
+
+
 @pytest.mark.parametrize('name', REFUSED)
 def test_what_is_refused(name):
     """The same words for one pair and, with the row, for a batch of two."""
     changed, words = REFUSED[name]
-    ways = {**dict(zip(NAMES, WAYS)), **changed}
+    usual = dict(zip(NAMES, (*WAYS, (0, 0, 0), (0, 0, 0))))
+    parts = {name: changed.get(name, part) for name, part in usual.items()}
+    rest = {name: value for name, value in changed.items() if name not in NAMES}
     solver = ContactSolver(UNIT, UNIT)
     calls = [solver.time_of_impact, *(() if 'clearance' in changed else (solver.least_distance,))]
     for call in calls:
         with pytest.raises(ValueError, match=f'^{words}'):
-            call(**ways)
+            call(*sweeps(parts), **rest)
     if name in BY_ROW:
-        rows = [[way, ways[part]] for part, way in zip(NAMES, WAYS)]
-        rest = {key: [(0, 0, 0), value] if 'centre' in key else value
-                for key, value in changed.items() if key not in NAMES}
+        rows = {name: [part, parts[name]] for name, part in usual.items()}
         with pytest.raises(ValueError, match=f'^row {int(name != "a fine tolerance")}: {words}'):
-            solver.time_of_impact_batch(*rows, **rest)
+            solver.time_of_impact_batch(*sweeps(rows), **rest)
 
 
 def test_arguments_that_do_not_go_together():
     solver, rows = ContactSolver(), np.tile(at(0, 0, 0), (3, 1))
-    pairs = [(0, 1)]
+    still, cut = Sweep(rows, rows), Sweep(rows, rows[:2])
+    pairs, one = [(0, 1)], 'one Sweep.*not'
+    two = r'motions are two sweeps, Sweep\(start_a, end_a\), '
     for arguments, options, words in (
-            ((rows, rows), {'sizes': UNIT}, 'a batch takes'),
-            ((rows, rows, rows), {'size_a': UNIT, 'size_b': UNIT}, 'a batch takes'),
-            ((rows, rows, rows, rows), {'sizes': UNIT, 'pairs': pairs}, 'pairs are places'),
-            ((rows, rows), {'sizes': UNIT, 'pairs': pairs, 'centre_a': UNIT}, 'pairs are places'),
-            ((rows, rows[:2], rows, rows), {'size_a': UNIT, 'size_b': UNIT}, 'ends_a must be'),
-            ((rows, rows[:2]), {'sizes': UNIT, 'pairs': pairs}, 'ends must be poses'),
-            ((rows, rows), {'sizes': UNIT, 'pairs': [(0, 3)]}, r'pairs\[0\] is \(0, 3\)'),
-            ((rows, rows), {'sizes': UNIT, 'pairs': pairs, 'threads': 0}, 'threads must be')):
+            ((still,), {'size_a': UNIT, 'size_b': UNIT}, f'{two}.*not Sweep.*, None'),
+            ((rows, rows, rows, rows), {'size_a': UNIT, 'size_b': UNIT}, f'{two}.*not four poses'),
+            ((still, still), {'sizes': UNIT, 'pairs': pairs}, one),
+            ((rows, rows), {'sizes': UNIT, 'pairs': pairs}, one),
+            ((still,), {'sizes': UNIT, 'pairs': pairs, 'size_a': UNIT}, 'pairs are places'),
+            ((cut, still), {'size_a': UNIT, 'size_b': UNIT}, 'ends_a and starts_b and ends_b must'),
+            ((cut,), {'sizes': UNIT, 'pairs': pairs}, 'starts and ends must be equally many'),
+            ((still,), {'sizes': UNIT, 'pairs': [(0, 3)]}, r'pairs\[0\] is \(0, 3\)'),
+            ((still,), {'sizes': UNIT, 'pairs': pairs, 'threads': 0}, 'threads must be')):
         with pytest.raises(ValueError, match=words):
             solver.time_of_impact_batch(*arguments, **options)
     with pytest.raises(ValueError, match='size_a is missing'):
-        solver.least_distance(*WAYS)
+        solver.least_distance(Sweep(*WAYS[:2]), Sweep(*WAYS[2:]))
+    for call in (solver.time_of_impact, solver.least_distance):
+        with pytest.raises(ValueError, match=two):
+            call(*WAYS)
+        with pytest.raises(ValueError, match=two):
+            call(**dict(zip(NAMES, WAYS)))
 
 
 # --- bits -----------------------------------------------------------------------------------------
@@ -371,11 +388,10 @@ def test_a_batch_is_its_single_calls(name):
     assert isinstance(many, Approaches) and len(many) == len(drawn.clearance)
     for row in range(0, len(many), 7):
         solver = ContactSolver(drawn.size_a[row], drawn.size_b[row])
-        ways = [part[row] for part in drawn[:4]]
-        options = {'centre_a': drawn.centre_a[row], 'centre_b': drawn.centre_b[row]}
-        plain = getattr(solver, name)(*ways, **options)
-        listed = getattr(solver, name)(*map(list, ways), **{
-            key: list(map(np.longdouble, value)) for key, value in options.items()})
+        parts = {part: getattr(drawn, part)[row] for part in NAMES}
+        plain = getattr(solver, name)(*sweeps(parts))
+        listed = getattr(solver, name)(*sweeps({
+            part: list(map(np.longdouble, value)) for part, value in parts.items()}))
         for one, other in itertools.product((plain, listed), (many[row],)):
             assert np.array_equal([one.time, one.closing_speed], [other.time, other.closing_speed],
                                   equal_nan=True)
@@ -388,7 +404,7 @@ def test_a_batch_is_its_single_calls(name):
         (drawn.centre_a, drawn.centre_b))]
     order = np.random.default_rng(0).permutation(n)
     by_place = getattr(ContactSolver(), f'{name}_batch')(
-        *joined[:2], sizes=joined[2], centres=joined[3], threads=3,
+        Sweep(joined[0], joined[1], joined[3]), sizes=joined[2], threads=3,
         pairs=np.column_stack([order, order + n]))
     assert_same_approaches(many, by_place, order)
 
@@ -419,10 +435,12 @@ def test_bits_are_those_of_every_instruction_set():
 
 def test_answers_are_plain_values():
     solver = ContactSolver(UNIT, UNIT)
-    hit = solver.time_of_impact(*WAYS)
+    hit = solver.time_of_impact(Sweep(*WAYS[:2]), Sweep(*WAYS[2:]))
     assert repr(hit).startswith('Approach(time=') and isinstance(hit.time, float)
     with pytest.raises(AttributeError):
         hit.time = 0.0
-    many = solver.time_of_impact_batch(*([way] * 3 for way in WAYS))
+    way_a, *others = ([way] * 3 for way in WAYS)
+    many = solver.time_of_impact_batch(Sweep(way_a, others[0]), Sweep(*others[1:]))
     assert len(many[1:]) == 2 and many[np.array([True, False, False])].time[0] == hit.time
-    assert len(solver.time_of_impact_batch(*np.zeros((4, 0, 7)))) == 0
+    none = Sweep(*np.zeros((2, 0, 7)))
+    assert len(solver.time_of_impact_batch(none, none)) == 0

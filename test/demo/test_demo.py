@@ -83,7 +83,7 @@ def is_running(pid):
 @pytest.fixture
 def programs(monkeypatch, signal_handlers):
     """Return what stands for the programs: Python code by module, with `values` for parameters."""
-    codes = {'node.contact_node': 'import time; time.sleep(1000)'}
+    codes = {'node.run_contact_node': 'import time; time.sleep(1000)'}
     monkeypatch.setattr(
         demo, 'program', lambda name, **values: ['-c', f'values = {values}\n{codes[name]}'])
     return codes
@@ -91,7 +91,7 @@ def programs(monkeypatch, signal_handlers):
 
 @pytest.mark.parametrize('status', [0, 3])
 def test_its_status_is_that_of_the_crane(status, programs, capfd):
-    programs['demo.crane_node'] = f'import sys, time; time.sleep(1.0); sys.exit({status})'
+    programs['demo.run_crane'] = f'import sys, time; time.sleep(1.0); sys.exit({status})'
     assert demo.main([]) == status
     assert ('Next: ' in capfd.readouterr().out) is (status == 0)
 
@@ -100,7 +100,7 @@ def test_its_status_is_that_of_the_crane(status, programs, capfd):
     ([], True, True), (['--real-time'], False, True), (['--model', 'mlp'], True, False)])
 def test_the_crane_waits_and_judges_as_it_is_told(arguments, waits, judges, programs, capfd):
     """Time waits unless it is real; the force must equal the weight by model exact alone."""
-    programs['demo.crane_node'] = 'print(values)'
+    programs['demo.run_crane'] = 'print(values)'
     assert demo.main(arguments) == 0
     assert str({'lockstep': waits, 'paced': waits, 'judge_force': judges}) in capfd.readouterr().out
 
@@ -108,7 +108,7 @@ def test_the_crane_waits_and_judges_as_it_is_told(arguments, waits, judges, prog
 def test_a_view_that_is_ended_as_a_landing_ends_names_nothing_next(programs, monkeypatch, capfd):
     """Its status is that of the signal, as in the middle of a landing."""
     monkeypatch.setattr(demo, 'LOOK_PERIOD', 1.0)
-    programs |= {'view.view': 'import time; time.sleep(1000)', 'demo.crane_node': (
+    programs |= {'view.view': 'import time; time.sleep(1000)', 'demo.run_crane': (
         'import os, signal; print("PASS"); os.kill(os.getppid(), signal.SIGINT)')}
     assert demo.main(['--view']) == 130
     output = capfd.readouterr().out
@@ -117,8 +117,8 @@ def test_a_view_that_is_ended_as_a_landing_ends_names_nothing_next(programs, mon
 
 def test_an_early_end_of_the_node_ends_the_demo(programs, capfd):
     """In the node's own words."""
-    programs |= {'node.contact_node': 'import sys; sys.exit("no room")',
-                 'demo.crane_node': 'import time; time.sleep(1000)'}
+    programs |= {'node.run_contact_node': 'import sys; sys.exit("no room")',
+                 'demo.run_crane': 'import time; time.sleep(1000)'}
     assert demo.main([]) == 1
     error = capfd.readouterr().err
     assert 'no room' in error and 'demo: contact_node ended early, status 1' in error
@@ -126,7 +126,7 @@ def test_an_early_end_of_the_node_ends_the_demo(programs, capfd):
 
 def test_with_a_view_it_lands_until_something_ends(programs, monkeypatch, capfd):
     monkeypatch.setattr(demo, 'PAUSE', 0.0)
-    programs |= {'view.view': 'import time; time.sleep(5.0)', 'demo.crane_node': 'print("PASS")'}
+    programs |= {'view.view': 'import time; time.sleep(5.0)', 'demo.run_crane': 'print("PASS")'}
     assert demo.main(['--view']) == 1
     shown = capfd.readouterr()
     assert shown.out.count('PASS') > 1 and 'view ended early, status 0' in shown.err

@@ -32,7 +32,7 @@ def land(size, mass, off, step, *, own=True, degrees=1.0, down=(0, 0, -1)):
     """Drop a load, its centre of mass off by shares of its half edges. Return loads, and poses."""
     sizes = np.array([(50, 50, 1), size], float)
     centre = np.array((*off, 0)) * size / 2
-    forces = PatchForces([Body(mass=0, inertia=np.zeros(3)), Body(
+    forces = PatchForces([Body.fixed(), Body(
         mass=mass, inertia=Body.of_box(size, mass).inertia, centre=centre)])
     forces.set_boxes(sizes)
     drop = 0.05 + np.sin(np.radians(degrees)) * (size[0] + size[1]) / 2 if degrees else 0.0
@@ -119,7 +119,7 @@ def test_a_stack_that_has_landed_weighs_on_each_of_its_boxes_as_statics_say(own)
             0.05, n))) for n in range(count))])
     weights = np.zeros((count + 1, 6))
     weights[1:, 2] = -G * mass
-    forces = PatchForces([Body(mass=0, inertia=np.zeros(3)), *[Body.of_box(FORTY, mass)] * count])
+    forces = PatchForces([Body.fixed(), *[Body.of_box(FORTY, mass)] * count])
     forces.set_boxes(sizes)
     poses = settled(forces, sizes, poses, weights, 1e-3, own=own)
     found = inspect_plan(Plan(sizes, poses, ground=0))
@@ -140,7 +140,7 @@ def test_a_stack_that_has_landed_weighs_on_each_of_its_boxes_as_statics_say(own)
 
 def test_corners_without_sizes_are_those_of_the_moments():
     """Contacts of others and no boxes: the rectangle of the overlap, whose loads sum up too."""
-    forces = PatchForces([Body(mass=0, inertia=np.zeros(3)), Body.of_box(CUBE, 10)])
+    forces = PatchForces([Body.fixed(), Body.of_box(CUBE, 10)])
     poses = np.array([GROUND, (0, 0, 0.5 - 1e-5, 0, 0, 0, 1)])
     sizes = np.array([(5, 5, 1), CUBE])
     forces.hold(*contacts_of(sizes, poses), poses)

@@ -33,7 +33,7 @@ def ahead(pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
 def deepest(tilt: float, phase: int, *, asks_ahead: bool) -> float:
     """Return how deep [mm] a container goes that lands at 1 m/s, tilted about its width [°]."""
     solver = ContactSolver(SIZE, SIZE)
-    forces = PatchForces([Body.of_box(SIZE, MASS), Body(mass=0.0, inertia=np.zeros(3))])
+    forces = PatchForces([Body.of_box(SIZE, MASS), Body.fixed()])
     turn = poses.small_rotations(np.array([[0.0, 1.0, 0.0]]), np.radians([tilt]))
     low = poses.rotate(np.tile(turn, (8, 1)), CORNERS)[:, 2].min()
     place = np.array([np.append([0, 0, 0.5 * SIZE[2] - low + 0.03 + 1e-3 * phase], turn),

@@ -15,7 +15,7 @@ from box_contact_ros.forces.patch_forces import GRAVITY
 from box_contact_ros.solver.pose import rotation_matrix
 
 STEP = 0.001  # [s]
-FIXED = Body(mass=0.0, inertia=np.zeros(3))
+FIXED = Body.fixed()
 FLOOR = (60.0, 60.0, 1.0), 0.0, (0.0, 0.0, -0.5)
 """A row of `World`, its top at z = 0."""
 CONTAINER = (12.192, 2.438, 2.591)

@@ -26,10 +26,11 @@ from typed_messages import TOLD, contacts_by_pair
 
 from box_contact_msgs.msg import Contacts
 from box_contact_ros import ContactSolver
-from box_contact_ros.node.contact_node import LIVE, PARAMETERS, ContactNode
+from box_contact_ros.node.contact_node import LIVE, ContactNode
+from box_contact_ros.node.parameters import CONTACT_PARAMETERS
 
 PAIR = 'box_a_box_b'
-SIZE = list(PARAMETERS['size_a'].default)
+SIZE = list(CONTACT_PARAMETERS['size_a'].default)
 
 
 @pytest.fixture
@@ -160,7 +161,7 @@ def set_to(node, **values):
 
 def test_parameters_are_read_only_but_three(node, client):
     """A bad value is refused with its reason and changes nothing; a good one takes effect."""
-    for name in PARAMETERS:
+    for name in CONTACT_PARAMETERS:
         descriptor = node.describe_parameter(name)
         assert descriptor.description and descriptor.read_only == (name not in LIVE)
     for name, value in (('size_a', [1.0, 1.0, 1.0]), ('scene', 'config/scenes/two_boxes.yaml'),
@@ -240,7 +241,7 @@ def long_topics(folder):
 
 STARTS = """
 import json, sys
-from box_contact_ros.node.contact_node import main
+from box_contact_ros.node.run_contact_node import main
 for arguments in json.loads(sys.argv[1]):
     try:
         print('status', main(arguments), flush=True)
@@ -295,7 +296,7 @@ class Node(ContactNode):
     def destroy_node(self):
         print('destroyed', self.context.ok(), flush=True)
         super().destroy_node()
-print(run(Node, None, ['--ros-args', '-p', 'size_a:=[0.0, 1.0, 1.0]']))
+print(run(Node, ['--ros-args', '-p', 'size_a:=[0.0, 1.0, 1.0]']))
 """], capture_output=True, text=True)
     assert done.stdout.split('\n') == ['destroyed True', '1', ''], done.stderr
 
@@ -312,7 +313,7 @@ class Node(ContactNode):
         while self.context.ok():
             time.sleep(0.01)
         return super()._make_solver(values, scene)
-print(run(Node, None, {arguments(**CUBES)}))
+print(run(Node, {arguments(**CUBES)}))
 """], capture_output=True, text=True, timeout=PATIENCE)
     assert (done.stdout, done.stderr) == ('0\n', '')
 

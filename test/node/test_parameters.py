@@ -11,7 +11,8 @@ from rclpy.parameter import Parameter
 from ros_client import serving
 
 from box_contact_ros import arguments
-from box_contact_ros.node import contact_node, parameters
+from box_contact_ros.models.make_model import MOST_SOUP_DIVISIONS
+from box_contact_ros.node import parameters, run_contact_node
 from box_contact_ros.node.contact_node import ContactNode
 
 SETTINGS = {'model': parameters.Setting('mlp', 'a test', parameters.text),
@@ -61,10 +62,10 @@ def test_an_unknown_name_is_logged_with_the_nearest_one(capfd):
 
 def test_help_lists_all_parameters_with_their_defaults(capsys):
     with pytest.raises(SystemExit) as ended:
-        contact_node.main(['--help'])
+        run_contact_node.main(['--help'])
     assert ended.value.code == 0
     printed = capsys.readouterr().out
-    for name in contact_node.PARAMETERS:
+    for name in parameters.CONTACT_PARAMETERS:
         assert f'\n  {name} ' in printed
     assert '[12.192,2.438,2.591]' in printed and 'default: none' in printed
 
@@ -83,7 +84,7 @@ def test_options_outside_ros_args_are_refused(args, words, capsys):
 def test_a_word_that_ros_does_not_know_ends_the_program(capsys, signal_handlers):
     """With one line and status 1: -p is easily forgotten."""
     arguments.parse_command_line('node', 'Test.', SETTINGS, ['--ros-args', '-p', 'model:=exact'])
-    assert contact_node.main(['--ros-args', 'model:=exact']) == 1
+    assert run_contact_node.main(['--ros-args', 'model:=exact']) == 1
     assert capsys.readouterr().err == (
         "error: after --ros-args, ROS does not know ['model:=exact']: a parameter is "
         '-p NAME:=VALUE, a name is remapped by -r FROM:=TO\n')
@@ -92,7 +93,7 @@ def test_a_word_that_ros_does_not_know_ends_the_program(capsys, signal_handlers)
 def test_ranges_and_choices_are_described():
     """As `ros2 param describe` shows them; what is outside is refused in the node's words."""
     with serving(ContactNode) as node:
-        told = {name: node.describe_parameter(name) for name in contact_node.PARAMETERS}
+        told = {name: node.describe_parameter(name) for name in parameters.CONTACT_PARAMETERS}
         refused, = node.set_parameters([Parameter('tolerance', value=-1.0)])
         assert 'tolerance' in refused.reason and not refused.successful
         assert node.set_parameters([Parameter('max_age', value=2)])[0].successful
@@ -101,4 +102,6 @@ def test_ranges_and_choices_are_described():
     assert told['pairing'].additional_constraints == 'one of: stamp, latest'
     assert told['model'].additional_constraints.startswith('one of: exact, mlp')
     assert told['size_a'].additional_constraints == 'three numbers > 0'
-    assert vars(parameters.whole_number(1, 9))['limits']['integer_range'][0].to_value == 9
+    divisions, = parameters.describe(
+        parameters.SOUP_PARAMETERS['divisions'], read_only=True).integer_range
+    assert (divisions.from_value, divisions.to_value, divisions.step) == (1, MOST_SOUP_DIVISIONS, 1)

@@ -27,7 +27,7 @@ from rclpy.signals import SignalHandlerOptions
 from ros_client import Client, serving
 from std_srvs.srv import Trigger
 
-from box_contact_ros.node import contact_node, runtime
+from box_contact_ros.node import contact_node, run_contact_node, runtime
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.rclpy_workarounds import RCLError, shut_down, with_info
 from box_contact_ros.stream.pairing import RESETS
@@ -103,7 +103,7 @@ def test_an_end_that_hangs_is_ended():
 def test_a_home_that_cannot_be_written_to(tmp_path):
     """One line names the variable."""
     (tmp_path / 'file').touch()
-    done = subprocess.run([sys.executable, '-m', 'box_contact_ros.node.contact_node'],
+    done = subprocess.run([sys.executable, '-m', 'box_contact_ros.node.run_contact_node'],
                           capture_output=True, text=True, timeout=PATIENCE,
                           env={**os.environ, 'ROS_LOG_DIR': str(tmp_path / 'file' / 'log')})
     assert done.returncode == 1 and 'Traceback' not in done.stderr
@@ -271,7 +271,7 @@ def test_main_serves_its_node(monkeypatch):
     """With the arguments that it was given."""
     calls = []
     monkeypatch.setattr(contact_node, 'run_node', lambda *call: calls.append(call) or 0)
-    assert contact_node.main(['--ros-args']) == 0
+    assert run_contact_node.main(['--ros-args']) == 0
     (_, args), = calls
     assert args == ['--ros-args']
 

@@ -3,7 +3,8 @@
 # SPDX-License-Identifier: Apache-2.0
 
 # Build the source distribution and the wheel into dist/, and use both as a stranger would: the wheel
-# without a compiler. The wheel is for this Python, and for Linux as old as auditwheel finds.
+# without a compiler, for the tests of solver and plans, too. The wheel is for this Python, and for
+# Linux as old as auditwheel finds.
 #
 # usage: dist.sh [PYTHON]     (one with the extra `dist`; default: .venv/bin/python)
 set -euo pipefail
@@ -15,6 +16,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 # pip splits the variable at blanks, and the path of this checkout may have some.
 cp constraints.txt "$work/"
+unset PYTHONPATH  # of a sourced ROS, or of another checkout
 export PIP_CONSTRAINT=$work/constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1
 
 # From the last commit: what lies about in the checkout is in neither.
@@ -57,6 +59,12 @@ print(f'Python {platform.python_version()}: separation {contact.separation:.6f} 
 CONTACT
 }
 mkdir "$work/bin"  # nothing to compile with
-first_contact "$(ls "$root"/dist/*.whl)" wheel env PATH="$work/bin"
+wheel=$(ls "$root"/dist/*.whl)
+first_contact "$wheel" wheel env PATH="$work/bin"
+# All that the core and the plans answer, by the wheel; programs that tests start find no compiler.
+tried=$work/venv-wheel/bin/python
+"$tried" -m pip install --quiet "$wheel[plans]" pytest
+(cd "$work/checkout" && env PATH="$work/bin" "$tried" -P -m pytest -q -p no:cacheprovider \
+    test/solver test/plans)
 first_contact "$(ls "$root"/dist/*.tar.gz)" sdist env
 ls -l dist

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import pytest
 from patience import PATIENCE
+from test_help import alone
 
 pytestmark = pytest.mark.reports
 
@@ -74,6 +75,25 @@ def test_example(name: str, model: str, program, tmp_path: Path) -> None:
         printed, expected = ([re.sub(r'[-\d.,]+', '#', line) for line in lines]
                              for lines in (printed, expected))
     assert printed == expected
+
+
+@pytest.mark.parametrize('name', sorted(
+    path.name for path in EXAMPLES.glob('*.py') if 'require(' in path.read_text('utf-8')))
+def test_an_example_without_its_extra_names_it(name: str) -> None:
+    """In one line, as programs do; also where it would wait for a node."""
+    done = alone(f'docs/examples/{name}')
+    assert (done.returncode, done.stderr.count('\n')) == (1, 1), done.stderr
+    assert "pip install -c constraints.txt -e '.[" in done.stderr
+
+
+@pytest.mark.parametrize('name', ['record.py', 'save_yard.py'])
+def test_arguments_come_before_the_wait(name: str) -> None:
+    """Without its argument, and with --help."""
+    pytest.importorskip('rosbags' if name == 'record.py' else 'rclpy')
+    for words, status in (([], 2), (['--help'], 0)):
+        done = subprocess.run([sys.executable, EXAMPLES / name, *words], capture_output=True,
+                              text=True, timeout=PATIENCE)
+        assert done.returncode == status and f'usage: {name}' in done.stdout + done.stderr
 
 
 def refused(client: Sequence[str | Path], program) -> bool:

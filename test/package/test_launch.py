@@ -12,7 +12,7 @@ from unittest.mock import Mock
 
 import pytest
 
-from box_contact_ros.node.contact_node import PARAMETERS
+from box_contact_ros.node.parameters import CONTACT_PARAMETERS
 
 LAUNCH = Path(__file__).resolve().parents[2] / 'launch'
 
@@ -36,7 +36,7 @@ def test_an_argument_that_nobody_gives_leaves_the_file_alone(
         defaults.update({name: default_value}))
     names = runpy.run_path(str(LAUNCH / 'contact_node.launch.py'))
     names['generate_launch_description']()
-    assert {'use_sim_time', *PARAMETERS} <= defaults.keys()
+    assert {'use_sim_time', *CONTACT_PARAMETERS} <= defaults.keys()
     names['contact_node'](defaults | given)
     _, values = names['Node'].call_args.kwargs['parameters']
     assert values == kinds

@@ -12,15 +12,16 @@ import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
-from importlib import import_module
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
-from conftest import EXTRAS, PROGRAMS
+from conftest import PROGRAMS
 from patience import PATIENCE
 
 import box_contact_ros
-from box_contact_ros import resources
+from box_contact_ros import extras, resources
 from box_contact_ros.arguments import program_parser
 from box_contact_ros.resources import resource_path
 
@@ -125,25 +126,13 @@ def test_a_missing_extra_is_one_line_that_names_it() -> None:
 @pytest.mark.parametrize('module', PROGRAMS.values())
 def test_a_program_without_extras_ends_in_one_line(module: str) -> None:
     """Before it imports what it misses. Of a plan, only some files need an extra."""
-    absent = [name for modules in EXTRAS.values() for name in modules if name != 'safetensors']
     arguments = ['docs/examples/files/ship.edi'] if module == 'plans.inspect_files' else []
-    done = _run('-c', f'import sys; sys.modules.update(dict.fromkeys({absent}))\n'
+    done = _run('-c', f'import sys; sys.modules.update(dict.fromkeys({[*extras.EXTRA_OF]}))\n'
                       f'import box_contact_ros.{module} as program\n'
                       f'sys.exit(program.main({arguments}))')
     status = 2 if module == 'plans.inspect_files' else 1  # there 1 is a plan that is not sound
     assert (done.returncode, done.stderr.count('\n')) == (status, 1), done.stderr
     assert 'pip install' in done.stderr
-
-
-@pytest.mark.parametrize('program, module', PROGRAMS.items())
-def test_help_of_each_program(program: str, module: str, capsys: pytest.CaptureFixture[str],
-                              monkeypatch: pytest.MonkeyPatch) -> None:
-    """As entry points call it: without arguments, by the name that the shell gave."""
-    main = import_module(f'box_contact_ros.{module}').main
-    monkeypatch.setattr(sys, 'argv', [f'bin/box_contact_{program}', '--help'])
-    with pytest.raises(SystemExit, match='0'):
-        main()
-    assert capsys.readouterr().out.startswith(f'usage: box_contact_{program}')
 
 
 # --- metadata -------------------------------------------------------------------------------------
@@ -238,6 +227,33 @@ def test_exported_names_are_what_dir_lists() -> None:
     assert set(box_contact_ros.__all__) <= set(dir(box_contact_ros))
     with pytest.raises(AttributeError, match='SceneSolvr'):
         _ = box_contact_ros.SceneSolvr
+
+
+def _documented() -> Iterator[Any]:
+    """Yield what the reference of the Python API documents, and members that it names."""
+    page = (ROOT / 'docs' / 'reference' / 'python_api.md').read_text('utf-8')
+    for name, options in re.findall(r':: box_contact_ros\.(\w+)\n((?:   :.*\n)*)', page):
+        yield (thing := getattr(box_contact_ros, name))
+        names = re.findall(r'\w+', options.replace(':members:\n', ' '.join(vars(thing))))
+        members = [vars(thing).get(name) for name in names
+                   if name == '__call__' or not name.startswith('_')]
+        yield from (getattr(part, '__func__', getattr(part, 'fget', part)) for part in members)
+
+
+def test_what_is_returned_or_raised_can_be_imported() -> None:
+    """Each class of ours in an annotation of a documented result or field, or behind `Raises`."""
+    ours = {name for path in ROOT.glob('box_contact_ros/**/*.py')
+            for name in re.findall(r'^class (\w+)', path.read_text('utf-8'), re.MULTILINE)}
+    told: set[str] = set()
+    for thing in _documented():
+        hints = dict(getattr(thing, '__annotations__', {}))
+        if not isinstance(thing, type):
+            hints = {'return': hints.get('return')}
+        words = [*(hint for hint in map(str, hints.values()) if 'ClassVar' not in hint),
+                 *re.findall(r'[Rr]aises? `?\w+', getattr(thing, '__doc__', None) or '')]
+        told |= ours.intersection(re.findall(r'\w+', ' '.join(words)))
+    assert told >= {'Answer', 'Assembly', 'Loads', 'Motion', 'SceneError', 'TooManyNear'}
+    assert told <= {*dir(box_contact_ros)}
 
 
 def test_a_build_without_a_compiler_names_it() -> None:

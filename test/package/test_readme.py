@@ -41,9 +41,9 @@ from box_contact_ros import PatchForces
 from box_contact_ros.core import DEPTH_FLOOR
 from box_contact_ros.models.make_model import most_near
 from box_contact_ros.models.weights_file import load_weights
-from box_contact_ros.node import check, diagnostics, topics
+from box_contact_ros.node import check, check_path, diagnostics, topics
 from box_contact_ros.node.check import CheckAnswerer
-from box_contact_ros.node.contact_node import PARAMETERS
+from box_contact_ros.node.parameters import CONTACT_PARAMETERS
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene import scene_check, scene_file
 from box_contact_ros.scene.scene import two_boxes
@@ -194,7 +194,7 @@ def parameter(words: list[str], **_) -> None:
     """`ros2 param set NODE NAME VALUE`: the node has it, and takes the value."""
     node, name, value = words[3:]
     assert node == '/contact_node'
-    PARAMETERS[name].validate(name, yaml.safe_load(value))
+    CONTACT_PARAMETERS[name].validate(name, yaml.safe_load(value))
 
 
 def pip(words: list[str], setup_arguments, **_) -> None:
@@ -228,7 +228,8 @@ def launch(words: list[str], **_) -> None:
     assert words[2] == 'box_contact_ros'
     text = (ROOT / 'launch' / words[3]).read_text('utf-8')
     names = [word.partition(':=')[0] for word in words[4:]]
-    assert all(f"'{name}'" in text or 'PARAMETERS' in text and name in PARAMETERS for name in names)
+    assert all(f"'{name}'" in text or 'PARAMETERS' in text and name in CONTACT_PARAMETERS
+               for name in names)
 
 
 def elsewhere(words: list[str], **_) -> None:
@@ -446,8 +447,11 @@ LIMITS = {
     'explanation/separating_axis.md': (
         f'shorter than {PARALLEL} are skipped',),
     'how-to/security.md': (
-        f'at most {scene_check.MOST_BOXES} boxes and {scene_check.MOST_PAIRS:,} pairs, and a '
-        f'response {check.MOST_CONTACTS:,} contacts',),
+        f'{scene_check.MOST_BOXES} boxes, {scene_check.MOST_PAIRS:,} listed pairs, '
+        f'{most_near("exact"):,} near, {check.MOST_CONTACTS:,} contacts',
+        f'{check_path.MOST_WAYPOINTS:,} times, {check_path.MOST_POSES:,} transforms, '
+        f'{scene_check.MOST_ON_PATH:,} boxes at times; {scene_check.MOST_PAIRS:,} pairs',
+        f'{scene_check.MOST_LOOKS:,} looks at pairs'),
     'reference/conventions.md': (
         f'more than {most_near("exact"):,} pairs near each other, of a soup {most_near("soup-8")}',
         f'δ = 1e{math.log10(DEPTH_FLOOR):.0f} · size',

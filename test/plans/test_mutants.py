@@ -20,7 +20,7 @@ from pathlib import Path
 import pytest
 
 from box_contact_ros.plans import inspect_files
-from box_contact_ros.plans.packing import GROUND
+from box_contact_ros.plans.plan import GROUND
 from box_contact_ros.plans.read_plan import read_plan
 
 pytest.importorskip('clarabel')

@@ -106,7 +106,7 @@ def test_unique_loads_are_those_of_a_simulation(order, count):
               for pair, ends in independent.ranges(boxes).items()}
     assert all(low - 0.01 <= loads[pair] <= high + 0.01 for pair, (low, high) in ranges.items())
 
-    forces = PatchForces([Body(mass=0, inertia=np.zeros(3)), *(
+    forces = PatchForces([Body.fixed(), *(
         Body.of_box(size, mass) for size, mass in zip(plan.sizes[1:], plan.masses[1:]))])
     forces.set_boxes(plan.sizes)
     forces.hold(found.carried_by)

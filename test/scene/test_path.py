@@ -10,7 +10,7 @@ import numpy as np
 import poses
 import pytest
 
-from box_contact_ros import Box, ContactSolver, Frame, Pair, PathCheck, Scene, SceneSolver
+from box_contact_ros import Box, ContactSolver, Frame, Pair, PathCheck, Scene, SceneSolver, Sweep
 
 TOLERANCE = 1e-6
 LOOKS = 50
@@ -68,10 +68,10 @@ class Wanted:
             lambda way: np.tile(way[1], (segments, 1)))] for side in (0, 1))
         sizes = [np.repeat(self.scene.sizes[[pair[side] for pair in pairs]], segments, axis=0)
                  for side in (0, 1)]
-        asked = {'size_a': sizes[0], 'size_b': sizes[1], 'centre_a': a[2], 'centre_b': b[2]}
+        sweeps, asked = (Sweep(*a), Sweep(*b)), {'size_a': sizes[0], 'size_b': sizes[1]}
         solver = ContactSolver()
-        first = solver.time_of_impact_batch(*a[:2], *b[:2], clearance=self.clearance, **asked)
-        least = solver.least_distance_batch(*a[:2], *b[:2], **asked)
+        first = solver.time_of_impact_batch(*sweeps, clearance=self.clearance, **asked)
+        least = solver.least_distance_batch(*sweeps, **asked)
         begin = solver.distance_batch(a[0], b[0], size_a=sizes[0], size_b=sizes[1])
         for row, pair in enumerate(pairs):
             rows = slice(row * segments, (row + 1) * segments)
@@ -99,8 +99,8 @@ class Wanted:
             (start_a, end_a), (start_b, end_b) = (
                 (place[row] if share else way[k], way[k + 1])
                 for (way, _), place in zip((a, b), seen))
-            impact = solver.time_of_impact(start_a, end_a, start_b, end_b, centre_a=a[1],
-                                           centre_b=b[1], clearance=self.clearance)
+            impact = solver.time_of_impact(Sweep(start_a, end_a, a[1]), Sweep(start_b, end_b, b[1]),
+                                           clearance=self.clearance)
             if np.isfinite(impact.time) and share < 1.0:
                 self.first[pair] = (k + share + (1 - share) * impact.time,
                                     impact.closing_speed / (1 - share))
@@ -115,8 +115,8 @@ class Wanted:
         depth = max(0.0, -ContactSolver(*sizes)(a[0][0], b[0][0]).separation)
         solver = ContactSolver(*np.maximum(sizes - depth - 1e-4, 1e-3 * sizes))
         for k in range(len(self.path) - 1):
-            impact = solver.time_of_impact(a[0][k], a[0][k + 1], b[0][k], b[0][k + 1],
-                                           centre_a=a[1], centre_b=b[1])
+            impact = solver.time_of_impact(*(Sweep(way[k], way[k + 1], centre)
+                                             for way, centre in (a, b)))
             if k + impact.time == 0.0:
                 return
             if np.isfinite(impact.time):

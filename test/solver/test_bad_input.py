@@ -114,7 +114,8 @@ def test_the_limits_of_a_quaternion_are_one(norm):
             else:
                 with pytest.raises(ValueError) as refusal:
                     ask(pose)
-                assert str(refusal.value) == f'{name} {fault}; a pose is x y z qx qy qz qw'
+                assert str(refusal.value) == (
+                    f'{name} {fault}; a pose is x y z qx qy qz qw, not wxyz')
     assert verdicts == {True, False}
 
 

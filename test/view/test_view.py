@@ -39,6 +39,7 @@ from websockets.sync.client import connect
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
+from box_contact_ros.node.parameters import SCENE_PARAMETERS
 from box_contact_ros.node.topics import contact_qos
 from box_contact_ros.scene.scene import Box, Pair, Scene, two_boxes
 from box_contact_ros.solver.nearest import Nearest
@@ -48,7 +49,6 @@ from box_contact_ros.view.drawing import CUBE as CUBE_CORNERS
 from box_contact_ros.view.drawing import camera_position
 from box_contact_ros.view.live import listener
 from box_contact_ros.view.live.listener import (
-    SCENE_PARAMETERS,
     DrawnTick,
     Listener,
     SceneRows,

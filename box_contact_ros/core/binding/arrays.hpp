@@ -219,10 +219,10 @@ inline void check(bc_status status) {
          bc_error_text());
 }
 
-// What asks an answer for its truth is refused: boxes apart have an answer, too.
+// What asks an answer for its truth is refused: boxes apart have one, too. The type is one of a package.
 [[noreturn]] inline int refuse_truth(PyObject* self) {
-  PyErr_Format(PyExc_TypeError, "the truth value of a %s is ambiguous: ask .colliding",
-               Py_TYPE(self)->tp_name);
+  PyErr_Format(PyExc_TypeError, "%s has no truth value: ask .colliding",
+               std::strrchr(Py_TYPE(self)->tp_name, '.') + 1);
   throw PythonError{};
 }
 

@@ -2,7 +2,3 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """What shows running nodes: the page in the browser, and markers for RViz."""
-
-from ...extras import require
-
-require('ros')

@@ -22,7 +22,6 @@ from rclpy.qos import QoSProfile
 
 from box_contact_msgs.msg import Contacts as ContactsMessage
 
-from ...node.contact_node import PARAMETERS as CONTACT_PARAMETERS
 from ...node.contact_node import scene_of
 from ...node.diagnostics import REMINDER_SECONDS
 from ...node.parameters import Setting, declare, warn_of_unknown
@@ -43,7 +42,6 @@ LOOK_PERIOD = 1.0  # time [s] between looks whether the drawn yard is that of th
 UNANSWERED = 0.5
 """Time [s] that poses may come without contacts; then nobody answers, and none are drawn."""
 QUIET = 1.0  # time [s] without a pose, after which nobody moves the boxes any more
-SCENE_PARAMETERS = {name: CONTACT_PARAMETERS[name] for name in ('size_a', 'size_b', 'scene')}
 
 
 class SceneRows:

@@ -1,18 +1,9 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Markers for RViz and Foxglove: all boxes of a scene, contacts, and distances.
-
-A contact has its point, normal, patch and depth. Boxes that are near have a dashed line between
-their nearest points, with the distance.
-Subscribes to the poses of all that moves and to the contact node's contacts. Publishes markers
-(visualization_msgs/MarkerArray) 30 times a second while poses come, and fixed boxes once a second
-and as they change. RViz with config/contact.rviz
-shows them, Foxglove with config/contact.foxglove.json. A patch is the rectangle of its covariance.
-"""
+"""Markers for RViz and Foxglove: what a listener has heard, as visualization messages."""
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -23,14 +14,13 @@ from rclpy.context import Context
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ...arguments import parse_command_line, program_main
 from ...node.messages import make_header, set_pose
-from ...node.runtime import run_node
+from ...node.parameters import SCENE_PARAMETERS
 from ...node.topics import contact_qos
 from ...solver.contact import Contacts
 from ...solver.nearest import Nearests
 from .. import style
-from .listener import SCENE_PARAMETERS, DrawnTick, Listener, SceneRows
+from .listener import DrawnTick, Listener, SceneRows
 
 PERIOD = 1 / 30  # time [s] between marker arrays
 FIXED_PERIOD = 1.0  # time [s] between those that have the fixed boxes, for viewers that start later
@@ -172,14 +162,3 @@ class MarkersNode(Listener):
         gone = [Marker(header=header, ns=name, id=number, action=Marker.DELETE)
                 for name, number in sorted(self._gone)]
         self._markers.publish(MarkerArray(markers=markers + gone))
-
-
-@program_main
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node until SIGINT or SIGTERM."""
-    parse_command_line('markers', __doc__, SCENE_PARAMETERS, args)
-    return run_node(MarkersNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

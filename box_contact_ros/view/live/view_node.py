@@ -1,21 +1,11 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""A live page in the browser: boxes, contacts, depth and force over time.
-
-It draws the boxes of a scene as the running nodes publish them, and the contacts that answer them.
-It also shows which model the contact node runs, and the force on a crane's load. It prints the
-page's address.
-
-`view FILE` shows the plan of a file instead, and what is wrong with it. It needs no ROS:
-`view FILE --help`.
-"""
+"""The live page as a node: draws what a listener has heard, contacts and the force of a crane."""
 from __future__ import annotations
 
 import math
-import sys
 import time
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -25,19 +15,11 @@ from rclpy.context import Context
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from visualization_msgs.msg import Marker
 
-from ...arguments import parse_command_line, program_main
 from ...demo import CRANE_ROPES, CRANE_WRENCH
-from ...extras import require
 from ...node.messages import stamp_of
-from ...node.parameters import Setting, text, whole_number
-from ...node.runtime import run_node
-from .listener import SCENE_PARAMETERS, Listener
+from ..view import PARAMETERS
+from .listener import Listener
 
-PARAMETERS = SCENE_PARAMETERS | {
-    'host': Setting('127.0.0.1', 'address to serve at; everybody who reaches it sees the page',
-                    text),
-    'port': Setting(8080, 'port to serve at, or the next that is free', whole_number(1, 65535)),
-}
 FRAME_PERIOD = 1 / 30
 FIGURES_PERIOD = 0.1  # time [s] between new figures: faster, nobody can read them
 FORCE_AGE = 100_000_000  # [ns] between a force and a tick: the crane publishes every 33 ms
@@ -100,16 +82,3 @@ class ViewNode(Listener):
 
     def _on_force(self, message: WrenchStamped) -> None:
         self._force = stamp_of(message.header), message.wrench.force.z
-
-
-@program_main
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node until SIGINT or SIGTERM."""
-    parse_command_line('view', __doc__, PARAMETERS, args)
-    require('view')
-    # The page is served by another thread, which must not wait until this one is idle.
-    return run_node(ViewNode, args, undisturbed=False)
-
-
-if __name__ == '__main__':
-    sys.exit(main())
