@@ -5,9 +5,11 @@
 from __future__ import annotations
 
 import time
+from bisect import insort
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 from rclpy.clock import Clock
@@ -31,6 +33,8 @@ GAP = 1e-3
 """Least time [s] for the ticks that wait: a timer that is due again at once comes before them."""
 REST = 3.0
 """Time for ticks after some steps, divided by that of these: three quarters of the node's."""
+HEAD_START = 0.01
+"""Time [s] by which a request overtakes a waiting one that is larger by 1."""
 MOST_WAITING = 16
 """Costly requests that wait for the end of a pause."""
 KEPT_TIMES = 4096  # of requests, for a report
@@ -71,7 +75,7 @@ class PacedService:
     After steps that took T in all, costly requests wait for PAUSE · T. A client that waits asks
     nothing: a refusal would bring its request again, and ROS takes a millisecond to read it.
     Whether a request is costly is judged by its kind, and by its size. Costly ones are answered in
-    turns of a SLICE each, so that a small one never waits for the end of a long one.
+    turns of a SLICE each, small ones first, so that these never wait for the end of a long one.
     """
 
     def __init__(self, node: GuardedNode, counts: Counter[str], what: str, service: tuple[Any, str],
@@ -92,7 +96,7 @@ class PacedService:
         self._gap = GAP  # after the last steps [s]
         self._cheap: dict[Kind, int] = {}
         """Size up to which requests are not costly, of the kinds that came last."""
-        self._asked: deque[Asked] = deque()
+        self._asked: list[Asked] = []
         """Requests that wait for their turn, the next one first."""
         self._now: Asked | None = None  # whose turn it is
         # From taking to answering [s].
@@ -112,14 +116,15 @@ class PacedService:
 
     def _take(self, request: Any, response: Any, send: Send) -> None:
         """Answer a request now or, if it is costly in a pause, later."""
-        asked = Asked(time.monotonic(), request, response, send)
         kind, size = self._kind_and_size(request)
+        asked = Asked(time.monotonic(), request, response, send)
+        asked.turn = asked.came + HEAD_START * size
         is_costly = size > self._cheap.get(kind, 0) or (self._in_turn and self._asked)
         waiting = len(self._asked)
         if not is_costly or not (waiting or asked.came < self._until):
             self._run(asked)
         elif len(self._asked) < MOST_WAITING:
-            self._asked.append(asked)
+            self._queue(asked)
         else:
             self._counts[f'{self._what} refused'] += 1
             response.code.value = Code.BUSY
@@ -138,8 +143,15 @@ class PacedService:
             return
         self._timer.cancel()
         if self._asked:
-            self._run(self._asked.popleft())
+            self._run(self._asked.pop(0))
         self._wait()
+
+    def _queue(self, asked: Asked) -> None:
+        """Let a request wait for its turn; with `in_turn`, before none but itself."""
+        if self._in_turn:
+            self._asked.insert(0 if asked.steps else len(self._asked), asked)
+        else:
+            insort(self._asked, asked, key=attrgetter('turn'))
 
     def _wait(self) -> None:
         """Let the timer end after ticks that wait now; or with the pause."""
@@ -165,7 +177,8 @@ class PacedService:
         self._gap = max(GAP, REST * (ended - began))
         asked.cost += time.thread_time() - used
         if response is None:
-            self._asked.insert(0 if self._in_turn else len(self._asked), asked)
+            asked.turn = ended
+            self._queue(asked)
             return
         self._counts[f'{self._what} {"answered" if response.success else "refused"}'] += 1
         self._times.append(ended - asked.came)
@@ -202,5 +215,6 @@ class Asked:
     request: Any
     response: Any
     send: Send
+    turn: float = 0.0  # requests come by this time [s]
     steps: Iterator[None] | None = None  # those that are left
     cost: float = 0.0  # processor time of those so far [s]

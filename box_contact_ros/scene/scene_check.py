@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
 from functools import cached_property, lru_cache
-from itertools import count, islice, product
+from itertools import chain, count, islice, product
 from typing import NamedTuple
 
 import numpy as np
@@ -35,12 +35,15 @@ from .scene_solver import SceneSolver
 MOST_BOXES = 256
 MOST_PAIRS = 4096
 """Pairs that a question may list."""
-MOST_ON_PATH = 1 << 17
+MOST_ON_PATH = 1 << 15
 """Boxes, also those of bodies, at all poses of a path."""
 MOST_LOOKS = 1 << 20
 """At pairs that are near each other on a path: some seconds of work."""
 MOST_LEFT_OUT = 64  # names that an answer tells
+KEPT_SOLVERS = 8  # by margins
 LISTED = 4  # is added to the side of a listed pair
+MOST_FOUND = 1 << 17
+"""Boxes whose bounds are near those of a question: some milliseconds, and megabytes."""
 SOLVED = 2048
 """Pairs that one step solves: in a millisecond."""
 Row = tuple[float, ...]  # numbers of one box
@@ -70,6 +73,8 @@ class SceneCheck:
         """Take scene and model; most_near: pairs that one question may leave to the model."""
         self.solver, self._scene, self.most_near = solver, solver.scene, most_near
         self._fixed = self._scene.fixed_poses()
+        self._solver_of = lru_cache(KEPT_SOLVERS)(
+            lambda margin: ContactSolver(model=solver.model, margin=margin))
         self._label_of = lru_cache(MOST_PAIRS)(lambda a, b: self._scene.pair_of(a, b).label)
 
     def __call__(self, names: Sequence[str], poses: Sequence[Row], sizes: Sequence[Row],
@@ -92,48 +97,63 @@ class SceneCheck:
         standing, beside = self._standing(asked, last or {})
         box_poses = moved_boxes(scene, asked.numbers, asked.of, asked.poses[None])[0][0]
         if pairs:
-            places = self._places(asked, pairs, last or {})
+            rows, others = self._rows_of(asked, self._places(asked, pairs, last or {}))
         else:
-            places = self._near(asked, box_poses, beside, margin)
-        if len(places) > self.most_near:
+            rows, others = self._near(asked, box_poses, beside, margin)
+        if len(rows) > self.most_near:
             raise TooMuch(f'pairs: more than {self.most_near} are asked for and near, and '
                           "the node's model answers no more per request: name those that "
                           'matter')
-        return (yield from self._solved(asked, box_poses, standing, places, margin))
+        found, areas = yield from self._solved(
+            np.concatenate((asked.sizes, scene.sizes[others])),
+            np.concatenate((box_poses, standing[others])), rows, margin)
+        number = np.concatenate((asked.numbers, others))
+        return found._replace(pairs=number[found.pairs],
+                              near_pairs=number[found.near_pairs]), areas
 
     def _near(self, asked: Question, poses: np.ndarray, beside: native.Index | None,
-              margin: float) -> np.ndarray:
-        """Return the scene's pairs (l, 2) of a question that may be within a margin, by number."""
-        scene, numbers, most = self._scene, asked.numbers, self.most_near
-        own = native.Index(asked.sizes, poses).near(asked.sizes, poses, margin, most)
-        parts = [numbers[own[own[:, 0] < own[:, 1]]]]
-        for index in filter(None, (self.solver.index, beside)):
-            found = index.near(asked.sizes, poses, margin, most)
-            found[:, 0] = numbers[found[:, 0]]
-            parts.append(found)
-        pairs = np.concatenate(parts)
-        sides = scene.filter.sides(pairs)
-        pairs, sides = pairs[sides > 0], sides[sides > 0]
-        pairs = np.where((sides & 2 > 0)[:, None], pairs[:, ::-1], pairs)
-        # Listed ones first, then guests in their order, then by the lower and the higher number.
-        rank = np.arange(len(scene.boxes) + len(asked.guests))
-        rank[list(asked.guests.values())] = np.arange(-len(asked.guests), 0)
-        ranks = rank[pairs]
-        return pairs[np.lexsort((ranks.max(axis=1), ranks.min(axis=1), sides < LISTED))]
+              margin: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the scene's pairs (l, 2) that may be within a margin, and other boxes (m,).
 
-    def _solved(self, asked: Question, box_poses: np.ndarray, standing: np.ndarray,
-                places: np.ndarray, margin: float,
-                ) -> Generator[None, None, tuple[Found, np.ndarray]]:
-        """Return what pairs (l, 2) of numbers find, and the areas of what touches, in steps."""
-        scene, own = self._scene, len(asked.numbers)
-        row = np.full(len(scene.boxes) + len(asked.guests), -1)
+        A pair has rows: those of the question's boxes, and behind them of the others.
+        """
+        scene, numbers = self._scene, asked.numbers
+        own = native.Index(asked.sizes, poses).near(asked.sizes, poses, margin, MOST_FOUND)
+        parts, others = [own[own[:, 0] < own[:, 1]]], [numbers]
+        for index in filter(None, (self.solver.index, beside)):
+            found = index.near(asked.sizes, poses, margin, MOST_FOUND)
+            others.append(found[:, 1].copy())
+            first = sum(map(len, others[:-1]))
+            found[:, 1] = np.arange(first, first + len(found))
+            parts.append(found)
+        if len(own) > MOST_FOUND or max(map(len, parts)) > MOST_FOUND:
+            raise TooMuch(f'margin: more than {MOST_FOUND} boxes are within {margin:g} m of those '
+                          'of the request: ask for fewer boxes, or a smaller margin')
+        rows, number = np.concatenate(parts), np.concatenate(others)
+        sides = scene.filter.sides(number[rows])
+        rows, sides = rows[sides > 0], sides[sides > 0]
+        rows = np.where((sides & 2 > 0)[:, None], rows[:, ::-1], rows)
+        # Listed ones first, then guests in their order, then by the lower and the higher number.
+        rank = number.copy()
+        if asked.guests:
+            rank[rank >= len(scene.boxes)] = np.arange(-len(asked.guests), 0)
+        rank_a, rank_b = rank[rows].T
+        order = np.lexsort((np.maximum(rank_a, rank_b), np.minimum(rank_a, rank_b), sides < LISTED))
+        return rows[order], number[len(numbers):]
+
+    def _rows_of(self, asked: Question, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the rows (l, 2) of pairs of numbers (l, 2), as `_near` has them, and others."""
+        own = len(asked.numbers)
+        row = np.full(len(self._scene.boxes) + len(asked.guests), -1)
         row[asked.numbers] = np.arange(own)
-        others = np.unique(places[row[places] < 0])
+        others = np.unique(pairs[row[pairs] < 0])
         row[others] = own + np.arange(len(others))
-        sizes = np.concatenate((asked.sizes, scene.sizes[others]))
-        poses = np.concatenate((box_poses, standing[others]))
-        solver = ContactSolver(model=self.solver.model, margin=margin)
-        parts, rows = [], row[places]
+        return row[pairs], others
+
+    def _solved(self, sizes: np.ndarray, poses: np.ndarray, rows: np.ndarray, margin: float,
+                ) -> Generator[None, None, tuple[Found, np.ndarray]]:
+        """Return what pairs (l, 2) of boxes find, and the areas of what touches, in steps."""
+        solver, parts = self._solver_of(margin), []
         for first in range(0, max(1, len(rows)), SOLVED):
             some = rows[first:first + SOLVED]
             contacts = solver.batch(poses, sizes=sizes, pairs=some)
@@ -141,10 +161,7 @@ class SceneCheck:
             parts.append((found, native.face_areas(sizes, poses, found.pairs)))
             if first + SOLVED < len(rows):
                 yield
-        number = np.concatenate((asked.numbers, others))
-        found = joined([part for part, _ in parts])
-        return (found._replace(pairs=number[found.pairs], near_pairs=number[found.near_pairs]),
-                np.concatenate([areas for _, areas in parts]))
+        return joined([found for found, _ in parts]), np.concatenate([areas for _, areas in parts])
 
     def path(self, names: Sequence[str], path: np.ndarray, sizes: Sequence[Row],
              pairs: Sequence[tuple[str, str]] = (), clearance: float = 0.0,
@@ -311,7 +328,7 @@ class SceneCheck:
                                      f'the request: add {short_repr(mover)} to boxes')
                 raise ValueError(
                     f'{field}: {short_repr(name)} is neither a box of the request nor of the scene'
-                    f'{nearest_name(name, {*asked.movers, *scene.row_of})}')
+                    f'{nearest_name(name, chain(asked.movers, scene.row_of))}')
             return self._boxes_of(name)
 
         places: list[tuple[int, int]] = []

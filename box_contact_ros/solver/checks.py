@@ -15,6 +15,7 @@ import reprlib
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from difflib import get_close_matches
+from itertools import islice
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -22,6 +23,8 @@ from numpy.typing import ArrayLike
 
 from ..core import LENGTH_MAX, LENGTH_MIN, QUATERNION_MAX, native
 
+MOST_LOOKED_AT = 5000
+"""Names, for the one that was meant: in some milliseconds."""
 SHOWN = 200  # characters of a refused value that an error shows
 MOST_NAME_BYTES = 255
 """Of the name of a box or pair, and of a frame_id, in UTF-8; ROS's own names have no more. A
@@ -55,9 +58,9 @@ def short_repr(value: Any) -> str:
 def nearest_name(name: object, known: Iterable[str]) -> str:
     """Return the end of a refusal that asks for the nearest of the known names; '' if none is near.
 
-    Capitals make no difference.
+    Capitals make no difference. Of many names, the first MOST_LOOKED_AT are looked at.
     """
-    spelled = {name.lower(): name for name in known}
+    spelled = {name.lower(): name for name in islice(known, MOST_LOOKED_AT)}
     nearest = ''.join(get_close_matches(str(name)[:SHOWN].lower(), spelled, n=1))
     return nearest and f' (did you mean {spelled[nearest]}?)'
 

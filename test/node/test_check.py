@@ -583,6 +583,19 @@ def test_an_answer_is_made_in_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     assert bench.sent == ['first', 'second'] and bench.counts == {'checks answered': 2}
 
 
+def test_a_small_request_comes_between_the_turns_of_a_long_one(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another client would wait for seconds, and for the pause; where the order matters, it does."""
+    for in_turn, order in ((False, ['small', 'long']), (True, ['long', 'small'])):
+        bench = Bench(monkeypatch, steps=9, in_turn=in_turn)
+        bench.ask('long', 80, 0.01)
+        bench.steps = 1
+        bench.ask('small', 1, 0.001)
+        for _ in range(10):
+            bench.end_of_pause()
+        assert bench.sent == order
+
+
 @pytest.mark.parametrize('executor_type', [SingleThreadedExecutor, EventsExecutor])
 def test_what_comes_in_a_step_is_served_before_the_next(client: Client, executor_type: Any) -> None:
     """Each step sends a message to the node itself, and takes 5 ms of the processor."""

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import gc
+import math
 import time
 from contextlib import closing
 from functools import partial
@@ -22,6 +23,7 @@ from box_contact_ros import Box, Frame, Pair, PathCheck, Scene, SceneSolver
 from box_contact_ros.node import check_path
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.scene.scene_check import SceneCheck
+from box_contact_ros.solver.checks import TooMuch
 
 CUBE = (2.0, 2.0, 2.0)
 EPOCH = 7
@@ -218,3 +220,45 @@ def test_a_node_that_is_not_configured_refuses() -> None:
     with serving(ContactNode, autostart=False, **CUBES), closing(Client()) as client:
         answer = client.call(CheckPath, 'contact_node/check_path', CheckPath.Request())
         assert answer.message == 'the node is not configured'
+
+
+def a_long_way(guests: int, times: int, turn: float = 0.0) -> list[dict[str, tuple[float, ...]]]:
+    """Return waypoints of guests side by side over the yard, which turn by an angle each time."""
+    return [{f'g{guest}': (300.0 * k / times, 20.0 * guest, 5.0, 0.0, 0.0, math.sin(0.5 * turn * k),
+                           math.cos(0.5 * turn * k)) for guest in range(guests)}
+            for k in range(times)]
+
+
+@pytest.mark.parametrize('guests, times, turn, clearance, words', [
+    (4, 1000, 0.0, 1000.0, 'more than 4096 pairs come within the clearance of 1000 m'),
+    (1, 1000, 0.0, 60.0, ''),
+    (4, 1000, 3.0, 15.0, 'looks at pairs within the clearance of 15 m are more than 1048576'),
+    (4, 1000, 3.0, 0.0, ''),
+    (256, 16, 0.0, 50.0, 'more than 4096 pairs come within the clearance of 50 m')])
+def test_what_asks_for_too_much_is_refused_before_the_work(
+        guests: int, times: int, turn: float, clearance: float, words: str) -> None:
+    """Clearances, waypoints, turns, guests: no step takes 50 ms of the processor."""
+    size = (12.192, 2.438, 2.591)
+    boxes = {f'c{n}': Box(size, (13.0 * (n % 50), 3.0 * (n // 50), 1.3, 0, 0, 0, 1))
+             for n in range(2000)}
+    scene = Scene({'load': Box(size), **boxes}, patterns=(('load', '*'),), frame_id='yard',
+                  poses='named')
+    checker = SceneCheck(SceneSolver(scene), most_near=2**15)
+    waypoints = a_long_way(guests, times, turn)
+    request = a_request(waypoints, dict.fromkeys(waypoints[0], CUBE), clearance=clearance)
+    steps = check_path.answer(checker, EPOCH, request, CheckPath.Response())
+    longest, used, said = 0.0, 0.0, ''
+    gc.freeze()
+    while True:
+        begin = time.thread_time()
+        try:
+            next(steps)
+        except (StopIteration, TooMuch) as end:
+            said = str(end)
+            break
+        finally:
+            took = time.thread_time() - begin
+            longest, used = max(longest, took), used + took
+    gc.unfreeze()
+    assert words in said and bool(words) == bool(said), said
+    assert longest < 0.05 and used < 3.0

@@ -130,7 +130,7 @@ inline PyObject* index_near(PyObject* self, PyObject* const* args, Py_ssize_t co
   };
   auto pairs = search(room);
   while (found > capacity && capacity <= most) {
-    capacity *= 8;
+    capacity = std::min(8 * capacity, most + 1);
     more.reset(new int64_t[size_t(2 * capacity)]);
     pairs = search(more.get());
   }
@@ -141,7 +141,7 @@ inline PyMethodDef index_methods[] = {
     {"near", method<index_near>(), METH_FASTCALL,
      "near(sizes, poses, margin, most)\n--\n\n"
      "Return the pairs (n, 2) of boxes and those of the index whose bounds are within a margin.\n\n"
-     "sizes (k, 3), poses (k, 7). The search ends with more than `most` pairs, some more."},
+     "sizes (k, 3), poses (k, 7). The search ends with more than `most` pairs."},
     {nullptr, nullptr, 0, nullptr}};
 inline PyType_Slot index_slots[] = {
     {Py_tp_doc, const_cast<char*>("Index(sizes, poses, former=None, kept=None)\n--\n\n"

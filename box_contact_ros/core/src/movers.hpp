@@ -38,6 +38,7 @@ class Movers {
         is_settled_(half_.size(), 0),
         is_changed_(half_.size(), 0) {
     for (int32_t box = 0; box < int32_t(count()); ++box) {
+      for (int k = 0; k < 3; ++k) half_[size_t(box)][k] += reach_;
       meets_[size_t(box)] = filter_.meets(box);
       if (is_fixed(box)) bounds_[size_t(box)] = index_->bounds(box).grown(reach_);
       else to_read_.push_back(box);
@@ -109,7 +110,7 @@ class Movers {
       is_any_moved_ = true;
       Pose<double> pose{{p[0], p[1], p[2]}, {p[3], p[4], p[5], p[6]}};
       if (!pose_valid(triple(pose.position), squared_norm(pose.quaternion))) return box;
-      bounds = bounds_of(pose, half_[size_t(box)]).grown(reach_);
+      bounds = bounds_of(pose, half_[size_t(box)]);
       searched_count_ += is_searched(box);
       if (is_searched(box) && !bounds.is_within(fat_[size_t(box)])) {
         changed_.push_back(box);
@@ -244,8 +245,8 @@ class Movers {
     }
   }
 
-  std::vector<Vec<double>> half_;
-  double reach_;  // half the margin, by which all bounds are grown [m]
+  std::vector<Vec<double>> half_;  // larger by `reach_`
+  double reach_;                   // half the margin, by which all bounds are grown [m]
   const Filter& filter_;
   const Index* index_;
   std::vector<uint8_t> meets_;    // boxes that some group lets meet
