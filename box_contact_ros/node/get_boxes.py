@@ -12,7 +12,8 @@ from std_msgs.msg import Header
 from box_contact_msgs.msg import Body, BoxPair, BoxState
 from box_contact_msgs.srv import GetBoxes
 
-from ..scene.scene import Frame, Scene
+from ..scene.boxes import Frame
+from ..scene.scene import Scene
 from ..scene.scene_solver import SceneSolver
 from ..stream.streams import topics_of
 from .messages import set_pose

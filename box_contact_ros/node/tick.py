@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ..scene.scene import NOWHERE
+from ..scene.boxes import NOWHERE
 from ..scene.scene_check import Row
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import absent_poses, are_poses, pose_fault

@@ -24,9 +24,10 @@ from ..solver.contacts_of import find_contacts, touching_and_near
 from ..solver.model import Model
 from ..solver.nearest import Nearest, Nearests
 from ..solver.poses import as_pose
+from .boxes import NOWHERE, Box, Frame
 from .changes import checked_changes
 from .path import PathCheck, as_path, boxes_of, moved_boxes, start
-from .scene import NOWHERE, Box, Frame, Pair, Scene
+from .scene import Pair, Scene
 
 NO_BODIES = np.zeros(0, np.int64)
 """The bodies of boxes, where a scene has none."""

@@ -13,7 +13,8 @@ import pytest
 
 from box_contact_ros import Body, PatchForces
 from box_contact_ros.core import native
-from box_contact_ros.scene.scene import ALONE, EVERY_PAIR, Box, Frame, Pair, Scene
+from box_contact_ros.scene.boxes import Box, Frame
+from box_contact_ros.scene.scene import ALONE, EVERY_PAIR, Pair, Scene
 from box_contact_ros.scene.scene_solver import SceneSolver
 
 UNIT = (1.0, 1.0, 1.0)

@@ -15,7 +15,8 @@ import pytest
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import native
-from box_contact_ros.scene.scene import ALONE, EVERY_PAIR, Box, Pair, Scene
+from box_contact_ros.scene.boxes import Box
+from box_contact_ros.scene.scene import ALONE, EVERY_PAIR, Pair, Scene
 from box_contact_ros.scene.scene_solver import SceneSolver
 from box_contact_ros.solver.contacts_of import TooManyNear
 from box_contact_ros.stream.streams import partners_of
@@ -374,7 +375,8 @@ import resource
 import numpy as np
 from box_contact_ros.core import native
 from box_contact_ros.solver.contacts_of import TooManyNear
-from box_contact_ros.scene.scene import EVERY_PAIR, Box, Scene
+from box_contact_ros.scene.boxes import Box
+from box_contact_ros.scene.scene import EVERY_PAIR, Scene
 from box_contact_ros.scene.scene_solver import SceneSolver
 
 def memory():

@@ -16,7 +16,8 @@ import pytest
 
 from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.core import native
-from box_contact_ros.scene.scene import EVERY_PAIR, Box, Pair, Scene, SceneError, two_boxes
+from box_contact_ros.scene.boxes import Box, SceneError
+from box_contact_ros.scene.scene import EVERY_PAIR, Pair, Scene, two_boxes
 from box_contact_ros.scene.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import SceneSolver
 

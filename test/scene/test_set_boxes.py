@@ -13,7 +13,8 @@ from poses import CUBE, IDENTITY
 
 from box_contact_ros import SceneSolver
 from box_contact_ros.scene import changes
-from box_contact_ros.scene.scene import Box, Frame, Pair, Scene, SceneError
+from box_contact_ros.scene.boxes import Box, Frame, SceneError
+from box_contact_ros.scene.scene import Pair, Scene
 from box_contact_ros.scene.scene_solver import Answer
 
 FIELDS = ('colliding', 'separation', 'normal', 'point', 'volume', 'covariance', 'axis')

@@ -36,16 +36,8 @@ from box_contact_ros import ContactSolver, face_patches
 from box_contact_ros.core import native
 from box_contact_ros.models.make_model import make_model
 from box_contact_ros.node.messages import KeptMessages, make_header
-from box_contact_ros.scene.scene import (
-    EVERY_PAIR,
-    NOWHERE,
-    POSES,
-    Box,
-    Frame,
-    Pair,
-    Scene,
-    two_boxes,
-)
+from box_contact_ros.scene.boxes import NOWHERE, Box, Frame
+from box_contact_ros.scene.scene import EVERY_PAIR, POSES, Pair, Scene, two_boxes
 from box_contact_ros.scene.scene_solver import SceneSolver
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contacts_of import TooManyNear
