@@ -245,7 +245,8 @@ class Judge(GuardedNode):
         for field in ('separation', 'point', 'normal', 'volume', 'covariance'):
             if not np.array_equal(getattr(told.contacts, field), getattr(answer.contacts, field)):
                 return f'another {field}'
-        stale = [pair.label if pair.a != pair.b else pair.a for pair in answer.named_stale()]
+        pairs = [answer.scene.pair_of(*boxes) for boxes in answer.stale.tolist()]
+        stale = [pair.label if pair.a != pair.b else pair.a for pair in pairs]
         return '' if told.stale == stale else f'stale {told.stale} instead of {stale}'
 
 

@@ -4,9 +4,10 @@
 """Boxes, and bodies of several of them that are fixed to each other."""
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -117,3 +118,67 @@ class Frame:
         if self.pose_topic and self.pose is not None:
             raise SceneError(('pose_topic',), f'{short_repr(self.pose_topic)}: a body with a pose '
                                               'never moves')
+
+
+@dataclass(frozen=True, eq=False)
+class Boxes:
+    """Boxes as arrays, by their index; a change makes the next ones."""
+
+    names: tuple[str, ...]
+    index_of: Mapping[str, int]  # by name
+    sizes: np.ndarray  # (n, 3) full extents [m]
+    poses: np.ndarray  # (n, 7) that boxes have in the scene, or in their bodies; NaN: none
+    body_of: np.ndarray  # (n,) the index of the body that each box is a part of, or -1
+    is_fixed: np.ndarray  # (n,) which boxes never move
+
+    @classmethod
+    def of(cls, boxes: Mapping[str, Box], bodies: Mapping[str, Frame]) -> Boxes:
+        """Return the arrays of boxes and bodies by name."""
+        body = {name: number for number, name in enumerate(bodies)}
+        sizes = np.array([box.size for box in boxes.values()]).reshape(-1, 3)
+        body_of = np.array([body.get(box.body, -1) for box in boxes.values()], np.int32)
+        poses = poses_of(boxes)
+        return cls(tuple(boxes), {name: index for index, name in enumerate(boxes)}, sizes, poses,
+                   body_of, _are_fixed(poses, body_of, bodies))
+
+    def changed(self, changes: Mapping[str, Box | None], before: Mapping[str, Frame],
+                bodies: Mapping[str, Frame]) -> tuple[Boxes, np.ndarray]:
+        """Return the arrays where boxes are new, or replaced where they are, or gone (None).
+
+        before, bodies: those of these arrays, and of the next ones. New boxes come last. Returns
+        also where each row comes from (m,): this one, or behind them all, that of what is new.
+        """
+        part = Boxes.of({name: box for name, box in changes.items() if box}, bodies)
+        first, index_of = len(self.names), self.index_of
+        gone = [index_of[name] for name, box in changes.items() if box is None]
+        is_new = np.array([name not in index_of for name in part.names], bool)
+        source = np.arange(first)
+        source[[index_of[name] for name in part.names if name in index_of]] = (
+            first + np.flatnonzero(~is_new))
+        source = np.concatenate((np.delete(source, gone), first + np.flatnonzero(is_new)))
+        added = tuple(name for name in part.names if name not in index_of)
+        names = self.names
+        if gone:
+            names = tuple(name for name in names if changes.get(name, name) is not None)
+            index_of = {name: index for index, name in enumerate(names)}
+        index = {name: number for number, name in enumerate(bodies)}
+        renumbered = np.array([index.get(name, -1) for name in before] + [-1], np.int32)
+        sizes, poses, body_of = (np.concatenate(both)[source] for both in (
+            (self.sizes, part.sizes), (self.poses, part.poses),
+            (renumbered[self.body_of], part.body_of)))
+        return Boxes(names + added, {**index_of, **dict(zip(added, count(len(names))))}, sizes,
+                     poses, body_of, _are_fixed(poses, body_of, bodies)), source
+
+
+def poses_of(parts: Mapping[str, Box] | Mapping[str, Frame]) -> np.ndarray:
+    """Return the poses (n, 7) of boxes or bodies, NaN for those that have none."""
+    return np.array([NOWHERE if part.pose is None else part.pose
+                     for part in parts.values()]).reshape(-1, 7)
+
+
+def _are_fixed(poses: np.ndarray, body_of: np.ndarray, bodies: Mapping[str, Frame]) -> np.ndarray:
+    """Return which boxes (n,) have a pose, or a body that has one."""
+    frames = [frame.pose is not None for frame in bodies.values()]
+    fixed: np.ndarray = np.where(body_of < 0, ~np.isnan(poses[:, 0]),
+                                 np.array([*frames, False])[body_of])
+    return fixed

@@ -9,11 +9,9 @@ theirs in its frame.
 """
 from __future__ import annotations
 
-import fnmatch
-import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import count
 from typing import Any, NamedTuple
 
@@ -21,7 +19,8 @@ import numpy as np
 
 from ..core import native
 from ..solver.checks import name_fault, nearest_name, pose_fault, short_repr
-from .boxes import AT_FRAME, NOWHERE, Box, Frame, KeyPath, SceneError
+from .boxes import AT_FRAME, Box, Boxes, Frame, KeyPath, SceneError, poses_of
+from .patterns import Pattern, Patterns
 
 EVERY_PAIR = (('*', '*'),)
 """Patterns of a scene in which each two boxes are a pair, if one of them moves."""
@@ -53,10 +52,6 @@ class Pair(NamedTuple):
         return cls(f'{a}_{b}', a, b)
 
 
-Pattern = tuple[str, str]
-"""Names of the boxes or bodies a and b of some pairs, with `*`, `?` and `[..]`."""
-
-
 @dataclass(frozen=True)
 class Scene:
     """Boxes by name, and which pairs matter. Raises SceneError for what cannot be computed.
@@ -77,22 +72,30 @@ class Scene:
     """Pairs of patterns of names of boxes or bodies, such as (('load', '*'), ('crane*', 'c?'))."""
     bodies: Mapping[str, Frame] = field(default_factory=dict)
     """Bodies by name; each box names the one that it is a part of."""
+    arrays: Boxes = field(init=False, repr=False, compare=False)
+    matched: Patterns = field(init=False, repr=False, compare=False)
+    moving: tuple[str, ...] = field(init=False, repr=False, compare=False)
+    """Names of boxes, then of bodies that move; with topics, only of those in a pair."""
 
     def __post_init__(self) -> None:
-        _check_kinds(self)
-        _check_bodies(self)
-        _check_pairs(self)
-        for number, (a, b) in enumerate(self.patterns):
-            _check_pattern(self, number, self.matching(a), self.matching(b))
+        self._make()
+        for number in range(len(self.patterns)):
+            _check_pattern(self, number)
         if not self.pairs and not self.patterns:
             raise SceneError(('pairs',), 'a scene needs at least one pair')
 
-    def matching(self, pattern: str) -> np.ndarray:
-        """Return which boxes (n,) a pattern matches by their names, or by those of their bodies."""
-        is_alike = _matcher_of(pattern)
-        bodies = {name for name in self.bodies if is_alike(name)}
-        return np.array([is_alike(name) is not None or box.body in bodies
-                         for name, box in self.boxes.items()])
+    def _make(self) -> None:
+        """Check all but what patterns match, and make the arrays."""
+        _check_kinds(self)
+        _check_bodies(self)
+        self._set(arrays=Boxes.of(self.boxes, self.bodies),
+                  matched=Patterns.of(self.patterns, self.boxes, self.bodies))
+        _check_pairs(self)
+        self._set(moving=self._movers())
+
+    def _set(self, **fields: Any) -> None:
+        for name, value in fields.items():
+            object.__setattr__(self, name, value)
 
     @property
     def in_one_message(self) -> bool:
@@ -114,66 +117,23 @@ class Scene:
         goes into copies: only what changes is looked at.
         """
         given = {name: box for name, box in changes.items() if box is not None}
-        gone = [self.index_of[name] for name in changes.keys() - given.keys()]
         boxes = {**self.boxes, **given}
         for name in changes.keys() - given.keys():
             del boxes[name]
         bodies: dict[str, Frame] = {name: frame for name, frame in {**self.bodies, **frames}.items()
                                     if frame is not None}
-        part = self._with(given, bodies)
-        # Rows of this scene's arrays, and behind them of those of `part`.
-        source = np.arange(len(self.boxes))
-        is_new = np.array([name not in self.boxes for name in given], bool)
-        source[[self.index_of[name] for name in given if name in self.boxes]] = (
-            len(source) + np.flatnonzero(~is_new))
-        source = np.concatenate((np.delete(source, gone), len(source) + np.flatnonzero(is_new)))
-        scene = self._with(boxes, bodies)
-        kept = self._keep_arrays(scene, part, source)
-        self._keep_groups(scene, part, source)
-        if not gone:
-            added = tuple(name for name in given if name not in self.boxes)
-            vars(scene)['names'] = self.names + added
-            index_of = vars(scene)['index_of'] = dict(self.index_of)
-            index_of.update(zip(added, count(len(index_of))))
-            vars(scene)['rows'] = self.rows
-        vars(scene)['listed_names'] = self.listed_names
-        if not self.in_one_message:  # topics stay
-            vars(scene)['moving'] = self.moving
+        arrays, source = self.arrays.changed(changes, self.bodies, bodies)
+        scene = object.__new__(Scene)
+        scene._set(boxes=boxes, bodies=bodies, pairs=self.pairs, frame_id=self.frame_id,
+                   poses=self.poses, patterns=self.patterns, arrays=arrays,
+                   matched=self.matched.changed(given, source, boxes, bodies))
+        # Topics stay.
+        scene._set(moving=scene._movers() if self.in_one_message else self.moving)
         if self.pairs and (frames or not self.listed_names.isdisjoint(changes)):
             _check_pairs(scene)
-        return scene, kept
-
-    def _keep_arrays(self, scene: Scene, part: Scene, source: np.ndarray) -> np.ndarray:
-        """Make the arrays of a changed scene; return the index (n,) in this one of each box, or -1.
-
-        part: what is new. source (n,): rows of the arrays of this scene and of `part`.
-        """
-        index = {name: number for number, name in enumerate(scene.bodies)}
-        renumbered = np.array([index.get(name, -1) for name in self.bodies] + [-1], np.int32)
-        for key, rows in (('sizes', self.sizes), ('box_poses', self.box_poses),
-                          ('body_of', renumbered[self.body_of])):
-            vars(scene)[key] = np.concatenate((rows, getattr(part, key)))[source]
-        frames = [frame.pose is not None for frame in scene.bodies.values()]
-        vars(scene)['is_fixed'] = np.where(
-            scene.body_of < 0, ~np.isnan(scene.box_poses[:, 0]),
-            np.array([*frames, False])[scene.body_of])
-        is_same = [self.bodies.get(name) is frame for name, frame in scene.bodies.items()]
-        return np.where((source < len(self.boxes)) & np.array([*is_same, True])[scene.body_of],
-                        source, -1)
-
-    def _keep_groups(self, scene: Scene, part: Scene, source: np.ndarray) -> None:
-        """Take over which patterns match the boxes of a changed scene."""
-        kinds, kind = self._kinds
-        number_of = {row.tobytes(): number for number, row in enumerate(kinds)}
-        numbers = [number_of.setdefault(row.tobytes(), len(number_of)) for row in part.sides]
-        if not self.patterns or len(number_of) > len(scene.boxes):  # kinds of no box any more go
-            return
-        kind = np.concatenate((kind, np.array(numbers, np.int32)))[source]
-        if len(number_of) == len(kinds):
-            vars(scene)['groups'] = kind, self.groups[1]
-        else:
-            kinds = np.frombuffer(b''.join(number_of), bool).reshape(-1, kinds.shape[1])
-        vars(scene)['_kinds'] = kinds, kind
+        is_same = [self.bodies.get(name) is frame for name, frame in bodies.items()]
+        stays = (source < len(self.boxes)) & np.array([*is_same, True])[arrays.body_of]
+        return scene, np.where(stays, source, -1)
 
     @classmethod
     def as_changed(cls, **fields: Any) -> Scene:
@@ -182,28 +142,34 @@ class Scene:
         Raises SceneError.
         """
         scene = object.__new__(cls)
-        vars(scene).update(fields)
-        _check_kinds(scene)
-        _check_bodies(scene)
-        _check_pairs(scene)
+        scene._set(**fields)
+        scene._make()
         return scene
 
-    def _with(self, boxes: Mapping[str, Box], bodies: Mapping[str, Frame]) -> Scene:
-        """Return an unchecked scene of other boxes and bodies."""
-        scene = object.__new__(Scene)
-        vars(scene).update({key: getattr(self, key) for key in self.__dataclass_fields__},
-                           boxes=boxes, bodies=bodies)
-        return scene
-
-    @cached_property
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the boxes by index."""
-        return tuple(self.boxes)
+        return self.arrays.names
 
-    @cached_property
+    @property
     def index_of(self) -> Mapping[str, int]:
         """Return the indices of the boxes by name."""
-        return {name: index for index, name in enumerate(self.boxes)}
+        return self.arrays.index_of
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """Return full extents (n, 3) [m]."""
+        return self.arrays.sizes
+
+    @property
+    def body_of(self) -> np.ndarray:
+        """Return the index of the body (n,) that each box is a part of, or -1."""
+        return self.arrays.body_of
+
+    @property
+    def is_fixed(self) -> np.ndarray:
+        """Return which boxes (n,) never move."""
+        return self.arrays.is_fixed
 
     @cached_property
     def _parts(self) -> Mapping[str, Box | Frame]:
@@ -217,16 +183,6 @@ class Scene:
         return {**self.index_of, **bodies} if bodies else self.index_of
 
     @cached_property
-    def sizes(self) -> np.ndarray:
-        """Return full extents (n, 3) [m]."""
-        return np.array([box.size for box in self.boxes.values()]).reshape(-1, 3)
-
-    @cached_property
-    def box_poses(self) -> np.ndarray:
-        """Return the poses (n, 7) that boxes have in the scene, NaN where they have none."""
-        return _poses_of(self.boxes)
-
-    @cached_property
     def listed_names(self) -> frozenset[str]:
         """Return the names of the boxes of listed pairs."""
         return frozenset(name for pair in self.pairs for name in (pair.a, pair.b))
@@ -234,18 +190,6 @@ class Scene:
     def mover(self, box: str) -> str:
         """Return whose pose moves a box: the name of its body, else its own."""
         return self.boxes[box].body or box
-
-    @cached_property
-    def body_of(self) -> np.ndarray:
-        """Return the index of the body (n,) that each box is a part of, or -1."""
-        index = {name: number for number, name in enumerate(self.bodies)}
-        return np.array([index.get(box.body, -1) for box in self.boxes.values()], np.int32)
-
-    @cached_property
-    def is_fixed(self) -> np.ndarray:
-        """Return which boxes (n,) never move."""
-        return np.array([(self.bodies[box.body] if box.body else box).pose is not None
-                         for box in self.boxes.values()], bool)
 
     @cached_property
     def rigid(self) -> np.ndarray:
@@ -260,12 +204,12 @@ class Scene:
     def placement(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the row of each box's body (n,) or -1, and its pose (n, 7) in the body's frame."""
         of_body = self.body_of >= 0
-        local = np.where(of_body[:, None], self.box_poses, AT_FRAME)
+        local = np.where(of_body[:, None], self.arrays.poses, AT_FRAME)
         return np.where(of_body, len(self.boxes) + self.body_of, -1).astype(np.int64), local
 
     def fixed_poses(self) -> np.ndarray:
         """Return new poses (n + m, 7) of boxes and bodies, by `row_of`: NaN for what moves."""
-        poses = np.concatenate((self.box_poses, _poses_of(self.bodies)))
+        poses = np.concatenate((self.arrays.poses, poses_of(self.bodies)))
         if self.bodies:
             self.place_boxes(poses)
         return poses
@@ -288,41 +232,12 @@ class Scene:
                         dtype=np.int64).reshape(-1, 2)
 
     @cached_property
-    def groups(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the group of each box (n,), and by two groups which of them may be box a (g, g).
-
-        Bit 0: the first, bit 1: the other, by the first pattern that asks for them. Boxes of a
-        group match the same sides of the same patterns.
-        """
-        kinds, group = self._kinds
-        if not self.patterns:
-            return group, np.zeros((0, 0), np.uint8)
-        allowed = np.zeros((len(kinds), len(kinds)), np.uint8)
-        for a, b in zip(kinds.T[::2], kinds.T[1::2]):
-            asked = (a[:, None] & b).astype(np.uint8)
-            allowed = np.where(allowed, allowed, asked | asked.T << 1)
-        return group, allowed
-
-    @cached_property
     def filter(self) -> native.Filter:
         """Return which pairs the scene has, and which box is a; it takes no box for fixed."""
         order = np.empty(len(self.boxes), np.int32)
         order[np.argsort(np.array(self.names, object), kind='stable')] = np.arange(len(order))
-        return native.Filter(self.rows, *self.groups, self.body_of, order)
-
-    @cached_property
-    def sides(self) -> np.ndarray:
-        """Return for each box which sides of p patterns it matches, (n, 2 p)."""
-        sides = [self.matching(side) for pattern in self.patterns for side in pattern]
-        return np.array(sides, bool).reshape(len(sides), len(self.boxes)).T
-
-    @cached_property
-    def _kinds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the kinds (g, 2 p) of boxes by the sides that they match, and each box's (n,)."""
-        if not self.patterns:
-            return self.sides[:1], np.zeros(len(self.boxes), np.int32)
-        kinds, kind = np.unique(self.sides, axis=0, return_inverse=True)
-        return kinds, kind.ravel().astype(np.int32)
+        return native.Filter(self.rows, self.matched.group, self.matched.allowed, self.body_of,
+                             order)
 
     @cached_property
     def _listed(self) -> Mapping[tuple[int, int], Pair]:
@@ -344,9 +259,7 @@ class Scene:
     @property
     def is_matched(self) -> np.ndarray:
         """Return which boxes (n,) some side of a pattern matches."""
-        kinds, kind = self._kinds
-        matched: np.ndarray = np.any(kinds, axis=1, keepdims=True)
-        return matched[kind, 0] if self.patterns else np.zeros(len(kind), bool)
+        return np.asarray(self.matched.sides.any(axis=1))
 
     @cached_property
     def is_paired(self) -> np.ndarray:
@@ -355,7 +268,7 @@ class Scene:
         paired[self.rows.ravel()] = True
         if not self.patterns:
             return paired
-        group, allowed = self.groups
+        group, allowed = self.matched.group, self.matched.allowed
         meet = (allowed > 0).astype(np.int64)
         partners = (np.bincount(group, minlength=len(meet)) @ meet)[group]
         # Fixed boxes do not meet, nor do boxes of one body, nor a box and itself.
@@ -370,12 +283,12 @@ class Scene:
     @cached_property
     def is_asked(self) -> np.ndarray:
         """Return which boxes (n,) patterns pair with others."""
-        group, allowed = self.groups
+        group, allowed = self.matched.group, self.matched.allowed
         return (allowed.max(axis=1) > 0)[group] if self.patterns else np.zeros(len(group), bool)
 
     def partners(self, index: int) -> np.ndarray:
         """Return which boxes (n,) patterns pair a box with, without those of listed pairs."""
-        group, allowed = self.groups
+        group, allowed = self.matched.group, self.matched.allowed
         if not self.patterns:
             return np.zeros(len(self.boxes), bool)
         met: np.ndarray = np.greater(allowed[group[index]][group], 0)
@@ -400,7 +313,7 @@ class Scene:
         """How many pairs the scene has."""
         if not self.patterns:
             return len(self.pairs)
-        group, allowed = self.groups
+        group, allowed = self.matched.group, self.matched.allowed
         meet = (allowed > 0).astype(np.int64)
 
         def pairs_among(boxes: np.ndarray) -> int:
@@ -413,31 +326,17 @@ class Scene:
         return len(self.pairs) + pairs_among(np.bincount(group, minlength=len(meet))) - (
             pairs_among(rigid.reshape(shape))) - int(listed)
 
-    @cached_property
-    def moving(self) -> tuple[str, ...]:
-        """Names of boxes, then of bodies that move; with topics, only of those in a pair."""
+    def _movers(self) -> tuple[str, ...]:
+        """Return `moving`."""
         moves = ~self.is_fixed
         if not self.in_one_message:
             asked = self.is_asked.copy()
             asked[self.rows.ravel()] = True
             moves &= asked
-        names = self.names
-        movers = [names[box] for box in np.flatnonzero(moves).tolist()]
+        movers = [self.names[box] for box in np.flatnonzero(moves).tolist()]
         bodies = {self.mover(name) for name in movers} if self.bodies else set()
         return (*(name for name in movers if not self.boxes[name].body),
                 *(name for name in self.bodies if name in bodies))
-
-
-@lru_cache
-def _matcher_of(pattern: str) -> Callable[[str], object]:
-    """Return what tells whether a name matches a pattern."""
-    return re.compile(fnmatch.translate(pattern)).match
-
-
-def _poses_of(parts: Mapping[str, Box] | Mapping[str, Frame]) -> np.ndarray:
-    """Return the poses (n, 7) of boxes or bodies, NaN for those that have none."""
-    return np.array([NOWHERE if part.pose is None else part.pose
-                     for part in parts.values()]).reshape(-1, 7)
 
 
 def two_boxes(size_a: Sequence[float], size_b: Sequence[float]) -> Scene:
@@ -526,11 +425,9 @@ def _check_pairs(scene: Scene) -> None:
                     f'the same {what} as that of {short_repr(a)} and {short_repr(b)}')
 
 
-def _check_pattern(scene: Scene, number: int, is_a: np.ndarray, is_b: np.ndarray) -> None:
-    """Raise SceneError for a pattern without a pair.
-
-    is_a, is_b: the boxes (n,) that its sides match.
-    """
+def _check_pattern(scene: Scene, number: int) -> None:
+    """Raise SceneError for a pattern without a pair."""
+    is_a, is_b = scene.matched.sides.T[2 * number:2 * number + 2]
     for side, is_matched, pattern in zip('ab', (is_a, is_b), scene.patterns[number]):
         if not is_matched.any():
             raise SceneError(('patterns', number, side),

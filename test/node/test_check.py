@@ -18,6 +18,7 @@ from unittest.mock import Mock
 import numpy as np
 import poses
 import pytest
+from answers import near_pairs
 from raw_client import APART, ORIGIN, TOUCHING
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
@@ -245,7 +246,7 @@ def test_a_question_is_answered_as_a_tick_of_the_scene_that_it_makes(margin: flo
         listed, near = response.contacts.contacts, response.contacts.near
         assert [entry.pair for entry in listed] == [pair.label for pair, _ in answer.named()]
         assert [entry.depth for entry in listed] == (-answer.contacts.separation).tolist()
-        assert [entry.pair for entry in near] == [pair.label for pair, _ in answer.named_near()]
+        assert [entry.pair for entry in near] == [pair.label for pair, _ in near_pairs(answer)]
         assert [entry.distance for entry in near] == answer.near.distance.tolist()
         count += len(listed) + len(near)
     assert count > 500
