@@ -83,10 +83,11 @@ def cpu_milliseconds(work: Callable[..., Any], *arguments: Any) -> tuple[float, 
     return 1e-6 * took, found
 
 
-def after_warm_up(run: Callable[[], object], count: int) -> float:
+def after_warm_up(run: Callable[[], object], count: int,
+                  clock: Callable[[], int] = time.perf_counter_ns) -> float:
     """Return the time of a run right after an untimed one, for each of its `count` items [ns]."""
     run()
-    return nanoseconds(run)[0] / count
+    return nanoseconds(run, clock=clock)[0] / count
 
 
 def each_call(calls: Sequence[Callable[[], object]], seconds: float) -> list[int]:
