@@ -32,7 +32,7 @@ from box_contact_ros.demo.landing import (
 )
 from box_contact_ros.forces.patch_forces import FRICTION
 from box_contact_ros.models.make_model import make_model
-from box_contact_ros.scene.scene import CONTAINER
+from box_contact_ros.scene.boxes import CONTAINER
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from box_contact_ros.scene.scene import CONTAINER as CONTAINER
+from box_contact_ros.scene.boxes import CONTAINER as CONTAINER
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix

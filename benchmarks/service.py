@@ -36,7 +36,8 @@ from box_contact_ros.node.messages import make_header, pose_message, set_pose
 from box_contact_ros.node.runtime import GuardedNode, run_node, running_node, spin_once
 from box_contact_ros.node.topics import DEEP_RELIABLE
 from box_contact_ros.processes import keep_to_this_host, program, running
-from box_contact_ros.scene.scene import Box, Scene
+from box_contact_ros.scene.boxes import Box
+from box_contact_ros.scene.scene import Scene
 from box_contact_ros.scene.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import SceneSolver
 

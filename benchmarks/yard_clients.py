@@ -49,7 +49,8 @@ from box_contact_ros.node.paced_service import REQUESTS
 from box_contact_ros.node.runtime import GuardedNode, run_node, running_node, spin_once
 from box_contact_ros.node.topics import LATCHED
 from box_contact_ros.processes import keep_to_this_host, running
-from box_contact_ros.scene.scene import AT_FRAME, Box, Frame, Scene
+from box_contact_ros.scene.boxes import AT_FRAME, Box, Frame
+from box_contact_ros.scene.scene import Scene
 from box_contact_ros.scene.scene_check import NO_SIZE
 from box_contact_ros.scene.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import SceneSolver
@@ -244,7 +245,8 @@ class Judge(GuardedNode):
         for field in ('separation', 'point', 'normal', 'volume', 'covariance'):
             if not np.array_equal(getattr(told.contacts, field), getattr(answer.contacts, field)):
                 return f'another {field}'
-        stale = [pair.label if pair.a != pair.b else pair.a for pair in answer.named_stale()]
+        pairs = [answer.scene.pair_of(*boxes) for boxes in answer.stale.tolist()]
+        stale = [pair.label if pair.a != pair.b else pair.a for pair in pairs]
         return '' if told.stale == stale else f'stale {told.stale} instead of {stale}'
 
 

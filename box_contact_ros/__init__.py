@@ -24,8 +24,9 @@ if TYPE_CHECKING:
     from .plans.inspection import Fall, Inspection, Row
     from .plans.plan import Fault, Plan
     from .plans.read_plan import read_plan
+    from .scene.boxes import Box, Frame, SceneError
     from .scene.path import PathCheck
-    from .scene.scene import Box, Frame, Pair, Scene, SceneError
+    from .scene.scene import Pair, Scene
     from .scene.scene_file import read_scene
     from .scene.scene_solver import Answer, SceneSolver
     from .solver.contacts_of import TooManyNear, contacts_of
@@ -52,7 +53,8 @@ _LOADED_WHEN_USED = {
     'plans.read_plan': ('read_plan',),
     'scene.path': ('PathCheck',),
     'scene.scene_file': ('read_scene',),
-    'scene.scene': ('Box', 'Frame', 'Pair', 'Scene', 'SceneError'),
+    'scene.boxes': ('Box', 'Frame', 'SceneError'),
+    'scene.scene': ('Pair', 'Scene'),
     'scene.scene_solver': ('Answer', 'SceneSolver'),
     'solver.contacts_of': ('TooManyNear', 'contacts_of'),
     'solver.faces': ('FacePatches', 'face_patches'),

@@ -28,7 +28,7 @@ from box_contact_msgs.msg import Contacts as ContactsMessage
 from ..node.messages import make_header, pose_message
 from ..node.runtime import GuardedNode, spin_for
 from ..node.topics import DEEP_RELIABLE
-from ..scene.scene import CONTAINER
+from ..scene.boxes import CONTAINER
 from ..solver.contact_solver import ContactSolver
 from ..stream.read_contacts import read_contacts
 from .echo_node import FRAME, raw_stamp, with_stamp

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..scene.scene import CONTAINER
+from ..scene.boxes import CONTAINER
 from ..solver.pose import rotation_matrix
 
 DEPTHS = (0.005, 0.02)

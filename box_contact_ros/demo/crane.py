@@ -28,7 +28,7 @@ require('sim')  # a missing MuJoCo ends in one line
 import mujoco
 
 from ..forces.patch_forces import GRAVITY, Body
-from ..scene.scene import CONTAINER
+from ..scene.boxes import CONTAINER
 from ..solver.pose import cross, rotation_matrix
 
 PHYSICS_STEP = 5e-4

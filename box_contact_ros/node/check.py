@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from box_contact_msgs.srv import Check
 
 from ..models.make_model import most_near
-from ..scene.scene_check import Row, SceneCheck
+from ..scene.scene_check import Pose, SceneCheck
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import TooMuch
 from .messages import KeptMessages, check_frame, near_messages, pose_of, size_of
@@ -29,7 +29,7 @@ class CheckAnswerer:
         self._kept = KeptMessages(MOST_CONTACTS)
 
     def answer(self, request: Check.Request, response: Check.Response,
-               last: Mapping[str, Row] | None = None) -> Iterator[None]:
+               last: Mapping[str, Pose] | None = None) -> Iterator[None]:
         """Fill in contacts, in steps; they are overwritten by the next answer.
 
         last: poses of what moves, for a request that asks for them. Raises ValueError, with field

@@ -12,7 +12,7 @@ from box_contact_msgs.msg import Approach as ApproachMessage
 from box_contact_msgs.msg import BoxPair
 from box_contact_msgs.srv import CheckPath
 
-from ..scene.scene_check import NO_POSE, Row, SceneCheck
+from ..scene.scene_check import NO_POSE, Pose, SceneCheck
 from ..solver.checks import TooMuch, short_repr
 from ..solver.motion import Approaches
 from .messages import check_frame, near_messages, size_of
@@ -24,7 +24,7 @@ MESSAGES = 256
 
 
 def answer(check: SceneCheck, epoch: int, request: CheckPath.Request,
-           response: CheckPath.Response, last: Mapping[str, Row] | None = None) -> Iterator[None]:
+           response: CheckPath.Response, last: Mapping[str, Pose] | None = None) -> Iterator[None]:
     """Fill in, in steps, what the path meets.
 
     last: poses of what moves, for a request that asks for them. Raises ValueError, with field and

@@ -22,7 +22,7 @@ from box_contact_msgs.srv import Check, CheckPath, GetBoxes, SetBoxes
 
 from ..models.make_model import make_model, most_near
 from ..scene.scene import Scene, two_boxes
-from ..scene.scene_check import Row
+from ..scene.scene_check import Pose
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import short_repr
@@ -271,7 +271,7 @@ class ContactNode(GuardedNode, LifecycleNode):
             yield
         return checker
 
-    def _last_poses(self, request: Check.Request | CheckPath.Request) -> Mapping[str, Row] | None:
+    def _last_poses(self, request: Check.Request | CheckPath.Request) -> Mapping[str, Pose] | None:
         """Return the last poses of what moves, for a request that asks for them."""
         return self._tick.last_poses() if request.last_poses else None
 

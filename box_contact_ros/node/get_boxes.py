@@ -12,7 +12,8 @@ from std_msgs.msg import Header
 from box_contact_msgs.msg import Body, BoxPair, BoxState
 from box_contact_msgs.srv import GetBoxes
 
-from ..scene.scene import Frame, Scene
+from ..scene.boxes import Frame
+from ..scene.scene import Scene
 from ..scene.scene_solver import SceneSolver
 from ..stream.streams import topics_of
 from .messages import set_pose
@@ -45,7 +46,7 @@ class Lister:
         response.header = Header(frame_id=scene.frame_id)
         response.epoch, response.revision, response.count = self._epoch, revision, len(scene.boxes)
         if request.first == 0:
-            _tell_pairs(scene, response)
+            yield from _tell_pairs(scene, response)
             response.margin, response.model = solver.margin, model
         bodies: dict[str, Frame] = {}
         for index in range(request.first, min(request.first + PAGE, len(scene.boxes))):
@@ -91,11 +92,14 @@ def _state_of(scene: Scene, index: int) -> BoxState:
     return state
 
 
-def _tell_pairs(scene: Scene, response: GetBoxes.Response) -> None:
-    """Fill in what a scene has beside boxes and bodies."""
+def _tell_pairs(scene: Scene, response: GetBoxes.Response) -> Iterator[None]:
+    """Fill in, in steps, what a scene has beside boxes and bodies."""
     response.poses, response.pose_topics = scene.poses, list(topics_of(scene).values())
-    response.pairs = [BoxPair(box_a=pair.a, box_b=pair.b) for pair in scene.pairs]
-    response.pair_names = [pair.name for pair in scene.pairs]
+    for number, pair in enumerate(scene.pairs, 1):
+        response.pairs.append(BoxPair(box_a=pair.a, box_b=pair.b))
+        response.pair_names.append(pair.name)
+        if number % STEP == 0:
+            yield
     response.patterns = [BoxPair(box_a=a, box_b=b) for a, b in scene.patterns]
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..core import LENGTH_MAX
 from ..models.make_model import MODELS, MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, check_model
-from ..scene.scene import CONTAINER
+from ..scene.boxes import CONTAINER
 from ..solver.checks import nearest_name, short_repr, size_fault
 from ..stream.pairing import PAIRINGS
 

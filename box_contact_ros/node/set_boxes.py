@@ -11,8 +11,9 @@ from box_contact_msgs.msg import Box as BoxMessage
 from box_contact_msgs.msg import Boxes
 from box_contact_msgs.srv import SetBoxes
 
+from ..scene.boxes import Box, Frame, KeyPath, SceneError
 from ..scene.changes import boxes_of
-from ..scene.scene import Box, Frame, KeyPath, Scene, SceneError
+from ..scene.scene import Scene
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import TooMuch, name_fault, nearest_name, short_repr
 from .diagnostics import some_names

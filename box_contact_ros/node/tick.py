@@ -10,14 +10,15 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import compress
 from random import randrange
 from typing import Any
 
 import numpy as np
 
-from ..scene.scene import NOWHERE
+from ..scene.boxes import NOWHERE
 from ..scene.scene_check import Row
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import absent_poses, are_poses, pose_fault
@@ -105,7 +106,7 @@ class LastPoses:
     def forget(self) -> None:
         """Forget all poses."""
         self._single.clear()
-        self._names = ()
+        self._names, self._stamps, self._rows = (), np.zeros(0, np.int64), np.zeros((0, 7))
 
     def take(self, name: str, pose: StampedPose) -> None:
         """Note the pose of one name."""
@@ -123,12 +124,13 @@ class LastPoses:
             stamps[missing] = np.append(self._stamps, 0)[former]
         self._names, self._stamps, self._rows, self._newest = names, stamps, rows, poses.stamp
 
-    def within(self, max_age: int) -> dict[str, Row]:
+    def within(self, max_age: int) -> dict[str, Sequence[float] | np.ndarray]:
         """Return the poses by name whose stamps are within max_age [ns] of the newest; 0: all."""
-        known = {name: (stamp, tuple(row)) for name, stamp, row in zip(
-            self._names, self._stamps.tolist(), self._rows.tolist()) if row[0] == row[0]}
-        return {name: row for name, (stamp, row) in {**known, **self._single}.items()
-                if not 0 < max_age < abs(self._newest - stamp)}
+        most = max_age or np.iinfo(np.int64).max
+        is_known = ~np.isnan(self._rows[:, 0]) & (np.abs(self._newest - self._stamps) <= most)
+        known = dict(zip(compress(self._names, is_known), self._rows[is_known]))
+        return {**known, **{name: pose for name, (stamp, pose) in self._single.items()
+                            if abs(self._newest - stamp) <= most}}
 
 
 class TickAnswerer:
@@ -176,7 +178,7 @@ class TickAnswerer:
         self.pairing.reset()
         self._last.forget()
 
-    def last_poses(self) -> dict[str, Row]:
+    def last_poses(self) -> dict[str, Sequence[float] | np.ndarray]:
         """Return by name the last poses of what moves, not older than `max_age`."""
         return self._last.within(self.pairing.max_age)
 

@@ -19,8 +19,9 @@ from rclpy.task import Future
 from box_contact_msgs.msg import Boxes, Code
 from box_contact_msgs.srv import GetBoxes
 
+from ..scene.boxes import Box, Frame
 from ..scene.changes import checked_changes
-from ..scene.scene import Box, Frame, Pair, Scene
+from ..scene.scene import Pair, Scene
 from ..scene.scene_solver import finished
 from .messages import pose_of, size_of
 from .paced_service import REQUESTS

@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..solver.checks import name_fault, nearest_name, short_repr
-from .scene import MOST_BOXES, Box, Frame, Scene, SceneError
+from .boxes import MOST_BOXES, Box, Frame, SceneError
+from .scene import Scene
 
 NAMED_ALONE = 'what moves comes and goes in scenes with poses: named alone'
 

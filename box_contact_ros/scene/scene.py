@@ -9,27 +9,18 @@ theirs in its frame.
 """
 from __future__ import annotations
 
-import fnmatch
-import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import count
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core import native
-from ..solver.checks import (
-    as_floats,
-    name_fault,
-    nearest_name,
-    pose_fault,
-    short_repr,
-    size_fault,
-)
-from ..solver.poses import as_pose
+from ..solver.checks import name_fault, nearest_name, pose_fault, short_repr
+from .boxes import AT_FRAME, Box, Boxes, Frame, KeyPath, SceneError, poses_of
+from .patterns import Pattern, Patterns
 
 EVERY_PAIR = (('*', '*'),)
 """Patterns of a scene in which each two boxes are a pair, if one of them moves."""
@@ -39,112 +30,8 @@ MOVES = (': leave `pose` out of a box that moves, and give its pose in the call;
 POSES = ('topics', 'named')
 """How the poses of what moves come: on a topic each; in one message, by names. The boxes that move
 change in scenes of the latter kind alone."""
-MOST_BOXES = 100_000
-"""Of a scene that changes."""
 ALONE = -1
 """Instead of box b, in rows of boxes: all pairs of box a that patterns ask for."""
-
-NOWHERE = (np.nan,) * 7
-"""Instead of the pose of a box that is not there."""
-AT_FRAME = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-"""Pose of a frame in itself."""
-CONTAINER = (12.192, 2.438, 2.591)
-"""Full extents of an ISO 40 ft container [m]."""
-
-
-KeyPath = tuple[str | int, ...]  # ('boxes', 'load', 'size') or ('pairs', 3, 'a')
-
-
-class SceneError(ValueError):
-    """What is wrong with a scene, and where: the path of a key, and of the file if there is one."""
-
-    def __init__(self, path: KeyPath, reason: str, file: str = '') -> None:
-        self.path, self.reason, self.file = path, reason, file
-        dotted = ''.join(f'[{part}]' if isinstance(part, int) else f'.{part}' for part in path)
-        super().__init__(': '.join(filter(None, (file, dotted.removeprefix('.'), reason))))
-
-    def __reduce__(self) -> tuple[type[SceneError], tuple[KeyPath, str, str]]:
-        """Pickle the arguments."""
-        return SceneError, (self.path, self.reason, self.file)
-
-    def within(self, *path: str | int) -> SceneError:
-        """Return the same error of what stands at a path of a larger whole."""
-        return SceneError((*path, *self.path), self.reason, self.file)
-
-
-def _as_numbers(value: Any, key: str, shape: str, count: int) -> tuple[float, ...]:
-    """Return so many numbers; raise ValueError for others."""
-    # What files and most programs have, for which NumPy takes three times as long.
-    if (type(value) in (tuple, list) and len(value) == count
-            and {float, int}.issuperset(map(type, value))):
-        with suppress(OverflowError):
-            return tuple(map(float, value))
-    array = as_pose(value, key) if key == 'pose' else as_floats(value, key, shape, (count,))
-    return tuple(array.tolist())
-
-
-def _keep(part: object, key: str, shape: str, count: int,
-          fault_of: Callable[[Sequence[float]], str | None]) -> None:
-    """Turn a field of a box or body into a tuple of numbers; raise SceneError for others."""
-    try:
-        numbers = _as_numbers(getattr(part, key), key, shape, count)
-    except ValueError as error:
-        raise SceneError((key,), str(error).removeprefix(f'{key} ')) from error
-    if fault := fault_of(numbers):
-        raise SceneError((key,), fault)
-    object.__setattr__(part, key, numbers)
-
-
-def _keep_pose(part: Box | Frame) -> None:
-    """Check the fields that boxes and bodies share."""
-    if not isinstance(part.pose_topic, str):
-        raise SceneError(('pose_topic',), f'must be text, not {short_repr(part.pose_topic)}')
-    if part.pose is not None:
-        _keep(part, 'pose', 'a pose (x y z qx qy qz qw)', 7, pose_fault)
-
-
-@dataclass(frozen=True)
-class Box:
-    """A box of the scene: a part of a body, else fixed if it has a pose, else moving.
-
-    Raises SceneError.
-    """
-
-    size: Sequence[float] | np.ndarray  # three full extents [m]
-    pose: Sequence[float] | np.ndarray | None = None
-    """`x y z qx qy qz qw` in the common frame, of a fixed box; in the body's, of a part of one."""
-    pose_topic: str = ''  # where a moving box's poses come from
-    body: str = ''  # the body that the box is a part of
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.body, str):
-            raise SceneError(('body',), f'must be text, not {short_repr(self.body)}')
-        _keep(self, 'size', 'full extents (3,)', 3, size_fault)
-        _keep_pose(self)
-        if self.body and self.pose is None:
-            object.__setattr__(self, 'pose', AT_FRAME)
-        if self.pose_topic and self.pose is not None:
-            raise SceneError(('pose_topic',), f'{short_repr(self.pose_topic)}: ' + (
-                f'the box moves with {short_repr(self.body)}' if self.body else
-                'a box with a pose never moves'))
-
-
-@dataclass(frozen=True)
-class Frame:
-    """The frame of a body, which its boxes name: fixed if it has a pose, else moving.
-
-    Raises SceneError.
-    """
-
-    pose: Sequence[float] | np.ndarray | None = None
-    """`x y z qx qy qz qw` in the common frame, of a fixed body."""
-    pose_topic: str = ''  # where a moving body's poses come from
-
-    def __post_init__(self) -> None:
-        _keep_pose(self)
-        if self.pose_topic and self.pose is not None:
-            raise SceneError(('pose_topic',), f'{short_repr(self.pose_topic)}: a body with a pose '
-                                              'never moves')
 
 
 class Pair(NamedTuple):
@@ -163,10 +50,6 @@ class Pair(NamedTuple):
     def between(cls, a: str, b: str) -> Pair:
         """Return the pair of two boxes, with the name that a scene file gives it."""
         return cls(f'{a}_{b}', a, b)
-
-
-Pattern = tuple[str, str]
-"""Names of the boxes or bodies a and b of some pairs, with `*`, `?` and `[..]`."""
 
 
 @dataclass(frozen=True)
@@ -189,22 +72,30 @@ class Scene:
     """Pairs of patterns of names of boxes or bodies, such as (('load', '*'), ('crane*', 'c?'))."""
     bodies: Mapping[str, Frame] = field(default_factory=dict)
     """Bodies by name; each box names the one that it is a part of."""
+    arrays: Boxes = field(init=False, repr=False, compare=False)
+    matched: Patterns = field(init=False, repr=False, compare=False)
+    moving: tuple[str, ...] = field(init=False, repr=False, compare=False)
+    """Names of boxes, then of bodies that move; with topics, only of those in a pair."""
 
     def __post_init__(self) -> None:
-        _check_kinds(self)
-        _check_bodies(self)
-        _check_pairs(self)
-        for number, (a, b) in enumerate(self.patterns):
-            _check_pattern(self, number, self.matching(a), self.matching(b))
+        self._make()
+        for number in range(len(self.patterns)):
+            _check_pattern(self, number)
         if not self.pairs and not self.patterns:
             raise SceneError(('pairs',), 'a scene needs at least one pair')
 
-    def matching(self, pattern: str) -> np.ndarray:
-        """Return which boxes (n,) a pattern matches by their names, or by those of their bodies."""
-        is_alike = _matcher_of(pattern)
-        bodies = {name for name in self.bodies if is_alike(name)}
-        return np.array([is_alike(name) is not None or box.body in bodies
-                         for name, box in self.boxes.items()])
+    def _make(self) -> None:
+        """Check all but what patterns match, and make the arrays."""
+        _check_kinds(self)
+        _check_bodies(self)
+        self._set(arrays=Boxes.of(self.boxes, self.bodies),
+                  matched=Patterns.of(self.patterns, self.boxes, self.bodies))
+        _check_pairs(self)
+        self._set(moving=self._movers())
+
+    def _set(self, **fields: Any) -> None:
+        for name, value in fields.items():
+            object.__setattr__(self, name, value)
 
     @property
     def in_one_message(self) -> bool:
@@ -226,66 +117,23 @@ class Scene:
         goes into copies: only what changes is looked at.
         """
         given = {name: box for name, box in changes.items() if box is not None}
-        gone = [self.index_of[name] for name in changes.keys() - given.keys()]
         boxes = {**self.boxes, **given}
         for name in changes.keys() - given.keys():
             del boxes[name]
         bodies: dict[str, Frame] = {name: frame for name, frame in {**self.bodies, **frames}.items()
                                     if frame is not None}
-        part = self._with(given, bodies)
-        # Rows of this scene's arrays, and behind them of those of `part`.
-        source = np.arange(len(self.boxes))
-        is_new = np.array([name not in self.boxes for name in given], bool)
-        source[[self.index_of[name] for name in given if name in self.boxes]] = (
-            len(source) + np.flatnonzero(~is_new))
-        source = np.concatenate((np.delete(source, gone), len(source) + np.flatnonzero(is_new)))
-        scene = self._with(boxes, bodies)
-        kept = self._keep_arrays(scene, part, source)
-        self._keep_groups(scene, part, source)
-        if not gone:
-            added = tuple(name for name in given if name not in self.boxes)
-            vars(scene)['names'] = self.names + added
-            index_of = vars(scene)['index_of'] = dict(self.index_of)
-            index_of.update(zip(added, count(len(index_of))))
-            vars(scene)['rows'] = self.rows
-        vars(scene)['listed_names'] = self.listed_names
-        if not self.in_one_message:  # topics stay
-            vars(scene)['moving'] = self.moving
+        arrays, source = self.arrays.changed(changes, self.bodies, bodies)
+        scene = object.__new__(Scene)
+        scene._set(boxes=boxes, bodies=bodies, pairs=self.pairs, frame_id=self.frame_id,
+                   poses=self.poses, patterns=self.patterns, arrays=arrays,
+                   matched=self.matched.changed(given, source, boxes, bodies))
+        # Topics stay.
+        scene._set(moving=scene._movers() if self.in_one_message else self.moving)
         if self.pairs and (frames or not self.listed_names.isdisjoint(changes)):
             _check_pairs(scene)
-        return scene, kept
-
-    def _keep_arrays(self, scene: Scene, part: Scene, source: np.ndarray) -> np.ndarray:
-        """Make the arrays of a changed scene; return the index (n,) in this one of each box, or -1.
-
-        part: what is new. source (n,): rows of the arrays of this scene and of `part`.
-        """
-        index = {name: number for number, name in enumerate(scene.bodies)}
-        renumbered = np.array([index.get(name, -1) for name in self.bodies] + [-1], np.int32)
-        for key, rows in (('sizes', self.sizes), ('box_poses', self.box_poses),
-                          ('body_of', renumbered[self.body_of])):
-            vars(scene)[key] = np.concatenate((rows, getattr(part, key)))[source]
-        frames = [frame.pose is not None for frame in scene.bodies.values()]
-        vars(scene)['is_fixed'] = np.where(
-            scene.body_of < 0, ~np.isnan(scene.box_poses[:, 0]),
-            np.array([*frames, False])[scene.body_of])
-        is_same = [self.bodies.get(name) is frame for name, frame in scene.bodies.items()]
-        return np.where((source < len(self.boxes)) & np.array([*is_same, True])[scene.body_of],
-                        source, -1)
-
-    def _keep_groups(self, scene: Scene, part: Scene, source: np.ndarray) -> None:
-        """Take over which patterns match the boxes of a changed scene."""
-        kinds, kind = self._kinds
-        number_of = {row.tobytes(): number for number, row in enumerate(kinds)}
-        numbers = [number_of.setdefault(row.tobytes(), len(number_of)) for row in part.sides]
-        if not self.patterns or len(number_of) > len(scene.boxes):  # kinds of no box any more go
-            return
-        kind = np.concatenate((kind, np.array(numbers, np.int32)))[source]
-        if len(number_of) == len(kinds):
-            vars(scene)['groups'] = kind, self.groups[1]
-        else:
-            kinds = np.frombuffer(b''.join(number_of), bool).reshape(-1, kinds.shape[1])
-        vars(scene)['_kinds'] = kinds, kind
+        is_same = [self.bodies.get(name) is frame for name, frame in bodies.items()]
+        stays = (source < len(self.boxes)) & np.array([*is_same, True])[arrays.body_of]
+        return scene, np.where(stays, source, -1)
 
     @classmethod
     def as_changed(cls, **fields: Any) -> Scene:
@@ -294,28 +142,34 @@ class Scene:
         Raises SceneError.
         """
         scene = object.__new__(cls)
-        vars(scene).update(fields)
-        _check_kinds(scene)
-        _check_bodies(scene)
-        _check_pairs(scene)
+        scene._set(**fields)
+        scene._make()
         return scene
 
-    def _with(self, boxes: Mapping[str, Box], bodies: Mapping[str, Frame]) -> Scene:
-        """Return an unchecked scene of other boxes and bodies."""
-        scene = object.__new__(Scene)
-        vars(scene).update({key: getattr(self, key) for key in self.__dataclass_fields__},
-                           boxes=boxes, bodies=bodies)
-        return scene
-
-    @cached_property
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the boxes by index."""
-        return tuple(self.boxes)
+        return self.arrays.names
 
-    @cached_property
+    @property
     def index_of(self) -> Mapping[str, int]:
         """Return the indices of the boxes by name."""
-        return {name: index for index, name in enumerate(self.boxes)}
+        return self.arrays.index_of
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """Return full extents (n, 3) [m]."""
+        return self.arrays.sizes
+
+    @property
+    def body_of(self) -> np.ndarray:
+        """Return the index of the body (n,) that each box is a part of, or -1."""
+        return self.arrays.body_of
+
+    @property
+    def is_fixed(self) -> np.ndarray:
+        """Return which boxes (n,) never move."""
+        return self.arrays.is_fixed
 
     @cached_property
     def _parts(self) -> Mapping[str, Box | Frame]:
@@ -329,16 +183,6 @@ class Scene:
         return {**self.index_of, **bodies} if bodies else self.index_of
 
     @cached_property
-    def sizes(self) -> np.ndarray:
-        """Return full extents (n, 3) [m]."""
-        return np.array([box.size for box in self.boxes.values()]).reshape(-1, 3)
-
-    @cached_property
-    def box_poses(self) -> np.ndarray:
-        """Return the poses (n, 7) that boxes have in the scene, NaN where they have none."""
-        return _poses_of(self.boxes)
-
-    @cached_property
     def listed_names(self) -> frozenset[str]:
         """Return the names of the boxes of listed pairs."""
         return frozenset(name for pair in self.pairs for name in (pair.a, pair.b))
@@ -346,18 +190,6 @@ class Scene:
     def mover(self, box: str) -> str:
         """Return whose pose moves a box: the name of its body, else its own."""
         return self.boxes[box].body or box
-
-    @cached_property
-    def body_of(self) -> np.ndarray:
-        """Return the index of the body (n,) that each box is a part of, or -1."""
-        index = {name: number for number, name in enumerate(self.bodies)}
-        return np.array([index.get(box.body, -1) for box in self.boxes.values()], np.int32)
-
-    @cached_property
-    def is_fixed(self) -> np.ndarray:
-        """Return which boxes (n,) never move."""
-        return np.array([(self.bodies[box.body] if box.body else box).pose is not None
-                         for box in self.boxes.values()], bool)
 
     @cached_property
     def rigid(self) -> np.ndarray:
@@ -372,12 +204,12 @@ class Scene:
     def placement(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the row of each box's body (n,) or -1, and its pose (n, 7) in the body's frame."""
         of_body = self.body_of >= 0
-        local = np.where(of_body[:, None], self.box_poses, AT_FRAME)
+        local = np.where(of_body[:, None], self.arrays.poses, AT_FRAME)
         return np.where(of_body, len(self.boxes) + self.body_of, -1).astype(np.int64), local
 
     def fixed_poses(self) -> np.ndarray:
         """Return new poses (n + m, 7) of boxes and bodies, by `row_of`: NaN for what moves."""
-        poses = np.concatenate((self.box_poses, _poses_of(self.bodies)))
+        poses = np.concatenate((self.arrays.poses, poses_of(self.bodies)))
         if self.bodies:
             self.place_boxes(poses)
         return poses
@@ -400,41 +232,12 @@ class Scene:
                         dtype=np.int64).reshape(-1, 2)
 
     @cached_property
-    def groups(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the group of each box (n,), and by two groups which of them may be box a (g, g).
-
-        Bit 0: the first, bit 1: the other, by the first pattern that asks for them. Boxes of a
-        group match the same sides of the same patterns.
-        """
-        kinds, group = self._kinds
-        if not self.patterns:
-            return group, np.zeros((0, 0), np.uint8)
-        allowed = np.zeros((len(kinds), len(kinds)), np.uint8)
-        for a, b in zip(kinds.T[::2], kinds.T[1::2]):
-            asked = (a[:, None] & b).astype(np.uint8)
-            allowed = np.where(allowed, allowed, asked | asked.T << 1)
-        return group, allowed
-
-    @cached_property
     def filter(self) -> native.Filter:
         """Return which pairs the scene has, and which box is a; it takes no box for fixed."""
         order = np.empty(len(self.boxes), np.int32)
         order[np.argsort(np.array(self.names, object), kind='stable')] = np.arange(len(order))
-        return native.Filter(self.rows, *self.groups, self.body_of, order)
-
-    @cached_property
-    def sides(self) -> np.ndarray:
-        """Return for each box which sides of p patterns it matches, (n, 2 p)."""
-        sides = [self.matching(side) for pattern in self.patterns for side in pattern]
-        return np.array(sides, bool).reshape(len(sides), len(self.boxes)).T
-
-    @cached_property
-    def _kinds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the kinds (g, 2 p) of boxes by the sides that they match, and each box's (n,)."""
-        if not self.patterns:
-            return self.sides[:1], np.zeros(len(self.boxes), np.int32)
-        kinds, kind = np.unique(self.sides, axis=0, return_inverse=True)
-        return kinds, kind.ravel().astype(np.int32)
+        return native.Filter(self.rows, self.matched.group, self.matched.allowed, self.body_of,
+                             order)
 
     @cached_property
     def _listed(self) -> Mapping[tuple[int, int], Pair]:
@@ -456,9 +259,7 @@ class Scene:
     @property
     def is_matched(self) -> np.ndarray:
         """Return which boxes (n,) some side of a pattern matches."""
-        kinds, kind = self._kinds
-        matched: np.ndarray = np.any(kinds, axis=1, keepdims=True)
-        return matched[kind, 0] if self.patterns else np.zeros(len(kind), bool)
+        return np.asarray(self.matched.sides.any(axis=1))
 
     @cached_property
     def is_paired(self) -> np.ndarray:
@@ -467,7 +268,7 @@ class Scene:
         paired[self.rows.ravel()] = True
         if not self.patterns:
             return paired
-        group, allowed = self.groups
+        group, allowed = self.matched.group, self.matched.allowed
         meet = (allowed > 0).astype(np.int64)
         partners = (np.bincount(group, minlength=len(meet)) @ meet)[group]
         # Fixed boxes do not meet, nor do boxes of one body, nor a box and itself.
@@ -482,12 +283,12 @@ class Scene:
     @cached_property
     def is_asked(self) -> np.ndarray:
         """Return which boxes (n,) patterns pair with others."""
-        group, allowed = self.groups
+        group, allowed = self.matched.group, self.matched.allowed
         return (allowed.max(axis=1) > 0)[group] if self.patterns else np.zeros(len(group), bool)
 
     def partners(self, index: int) -> np.ndarray:
         """Return which boxes (n,) patterns pair a box with, without those of listed pairs."""
-        group, allowed = self.groups
+        group, allowed = self.matched.group, self.matched.allowed
         if not self.patterns:
             return np.zeros(len(self.boxes), bool)
         met: np.ndarray = np.greater(allowed[group[index]][group], 0)
@@ -512,7 +313,7 @@ class Scene:
         """How many pairs the scene has."""
         if not self.patterns:
             return len(self.pairs)
-        group, allowed = self.groups
+        group, allowed = self.matched.group, self.matched.allowed
         meet = (allowed > 0).astype(np.int64)
 
         def pairs_among(boxes: np.ndarray) -> int:
@@ -525,31 +326,17 @@ class Scene:
         return len(self.pairs) + pairs_among(np.bincount(group, minlength=len(meet))) - (
             pairs_among(rigid.reshape(shape))) - int(listed)
 
-    @cached_property
-    def moving(self) -> tuple[str, ...]:
-        """Names of boxes, then of bodies that move; with topics, only of those in a pair."""
+    def _movers(self) -> tuple[str, ...]:
+        """Return `moving`."""
         moves = ~self.is_fixed
         if not self.in_one_message:
             asked = self.is_asked.copy()
             asked[self.rows.ravel()] = True
             moves &= asked
-        names = self.names
-        movers = [names[box] for box in np.flatnonzero(moves).tolist()]
+        movers = [self.names[box] for box in np.flatnonzero(moves).tolist()]
         bodies = {self.mover(name) for name in movers} if self.bodies else set()
         return (*(name for name in movers if not self.boxes[name].body),
                 *(name for name in self.bodies if name in bodies))
-
-
-@lru_cache
-def _matcher_of(pattern: str) -> Callable[[str], object]:
-    """Return what tells whether a name matches a pattern."""
-    return re.compile(fnmatch.translate(pattern)).match
-
-
-def _poses_of(parts: Mapping[str, Box] | Mapping[str, Frame]) -> np.ndarray:
-    """Return the poses (n, 7) of boxes or bodies, NaN for those that have none."""
-    return np.array([NOWHERE if part.pose is None else part.pose
-                     for part in parts.values()]).reshape(-1, 7)
 
 
 def two_boxes(size_a: Sequence[float], size_b: Sequence[float]) -> Scene:
@@ -638,11 +425,9 @@ def _check_pairs(scene: Scene) -> None:
                     f'the same {what} as that of {short_repr(a)} and {short_repr(b)}')
 
 
-def _check_pattern(scene: Scene, number: int, is_a: np.ndarray, is_b: np.ndarray) -> None:
-    """Raise SceneError for a pattern without a pair.
-
-    is_a, is_b: the boxes (n,) that its sides match.
-    """
+def _check_pattern(scene: Scene, number: int) -> None:
+    """Raise SceneError for a pattern without a pair."""
+    is_a, is_b = scene.matched.sides.T[2 * number:2 * number + 2]
     for side, is_matched, pattern in zip('ab', (is_a, is_b), scene.patterns[number]):
         if not is_matched.any():
             raise SceneError(('patterns', number, side),

@@ -47,6 +47,7 @@ MOST_FOUND = 1 << 17
 SOLVED = 2048
 """Pairs that one step solves: in a millisecond."""
 Row = tuple[float, ...]  # numbers of one box
+Pose = Sequence[float] | np.ndarray  # (7,)
 NO_POSE: Row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 NO_SIZE: Row = (0.0, 0.0, 0.0)
 """Pose and size of a new message: of a fixed box, only the name is given."""
@@ -79,7 +80,7 @@ class SceneCheck:
 
     def __call__(self, names: Sequence[str], poses: Sequence[Row], sizes: Sequence[Row],
                  pairs: Sequence[tuple[str, str]] = (), margin: float = 0.0,
-                 last: Mapping[str, Row] | None = None,
+                 last: Mapping[str, Pose] | None = None,
                  ) -> Generator[None, None, tuple[Found, np.ndarray]]:
         """Return, in steps, which boxes touch, and which are apart by the margin [m] at most.
 
@@ -165,7 +166,7 @@ class SceneCheck:
 
     def path(self, names: Sequence[str], path: np.ndarray, sizes: Sequence[Row],
              pairs: Sequence[tuple[str, str]] = (), clearance: float = 0.0,
-             last: Mapping[str, Row] | None = None) -> Generator[None, None, PathFound]:
+             last: Mapping[str, Pose] | None = None) -> Generator[None, None, PathFound]:
         """Return, in steps, what the boxes, bodies and guests of a question meet on a path.
 
         path: poses (m, n, 7) by names. sizes, pairs, last: as of a question without a path. What is
@@ -192,7 +193,7 @@ class SceneCheck:
                                  beside, wanted, clearance, most_pairs=MOST_PAIRS,
                                  most_looks=MOST_LOOKS))
 
-    def left_out(self, names: Sequence[str], last: Mapping[str, Row]) -> tuple[int, list[str]]:
+    def left_out(self, names: Sequence[str], last: Mapping[str, Pose]) -> tuple[int, list[str]]:
         """Return how many boxes and bodies that move a question leaves out, and the first names."""
         given = self._movers.intersection([*names, *last])
         others = (name for name in self._scene.moving if name not in given)
@@ -259,16 +260,15 @@ class SceneCheck:
         body = scene.row_of[name] - len(scene.boxes)
         return [int(box) for box in np.flatnonzero(scene.body_of == body)]
 
-    def _standing(self, asked: Question, last: Mapping[str, Row],
+    def _standing(self, asked: Question, last: Mapping[str, Pose],
                   ) -> tuple[np.ndarray, native.Index | None]:
         """Return the poses (n, 7) of what stands, and an index of what stands where it was last."""
         scene = self._scene
-        if not last:
-            return self._fixed[:len(scene.boxes)], None
         names = [name for name in self._movers.intersection(last) if name not in asked.movers]
+        if not names:
+            return self._fixed[:len(scene.boxes)], None
         rows = self._fixed.copy()
-        for name in names:
-            rows[scene.row_of[name]] = last[name]
+        rows[[scene.row_of[name] for name in names]] = [last[name] for name in names]
         scene.place_boxes(rows)
         standing = rows[:len(scene.boxes)]
         beside = np.where(scene.is_fixed[:, None], np.nan, standing)
@@ -312,7 +312,7 @@ class SceneCheck:
         return pose, size if known is None or any(size) else known
 
     def _places(self, asked: Question, pairs: Sequence[tuple[str, str]],
-                last: Mapping[str, Row]) -> np.ndarray:
+                last: Mapping[str, Pose]) -> np.ndarray:
         """Return the numbers (n, 2) of pairs that are listed by the names of boxes or bodies."""
         if len(pairs) > MOST_PAIRS:
             raise TooMuch(f'pairs: a request has at most {MOST_PAIRS}, not {len(pairs)}')

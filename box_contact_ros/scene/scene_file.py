@@ -18,7 +18,8 @@ import yaml
 
 from ..resources import find_file, read_regular, resource_path
 from ..solver.checks import SHOWN, short_repr
-from .scene import Box, Frame, KeyPath, Pair, Scene, SceneError
+from .boxes import Box, Frame, KeyPath, SceneError
+from .scene import Pair, Scene
 
 MOST_STREAMS = 1000
 """Boxes with a topic of their own. Each subscription takes a millisecond and 100 kB; with

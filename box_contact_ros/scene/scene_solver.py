@@ -22,11 +22,12 @@ from ..solver.contact import Contact, Contacts
 from ..solver.contact_solver import ContactSolver
 from ..solver.contacts_of import find_contacts, touching_and_near
 from ..solver.model import Model
-from ..solver.nearest import Nearest, Nearests
+from ..solver.nearest import Nearests
 from ..solver.poses import as_pose
+from .boxes import NOWHERE, Box, Frame
 from .changes import checked_changes
 from .path import PathCheck, as_path, boxes_of, moved_boxes, start
-from .scene import NOWHERE, Box, Frame, Pair, Scene
+from .scene import Pair, Scene
 
 NO_BODIES = np.zeros(0, np.int64)
 """The bodies of boxes, where a scene has none."""
@@ -57,15 +58,6 @@ class Answer(NamedTuple):
         """Return each pair with its contact, by name."""
         return [(self.scene.pair_of(a, b), contact)
                 for (a, b), contact in zip(self.pairs.tolist(), self.contacts)]
-
-    def named_near(self) -> list[tuple[Pair, Nearest]]:
-        """Return each pair that is near with its nearest points, by name."""
-        return [(self.scene.pair_of(a, b), nearest)
-                for (a, b), nearest in zip(self.near_pairs.tolist(), self.near)]
-
-    def named_stale(self) -> list[Pair]:
-        """Return the stale pairs by name; a box whose pairs all are is paired with itself."""
-        return [self.scene.pair_of(a, b) for a, b in self.stale.tolist()]
 
 
 class _Revision(NamedTuple):

@@ -13,7 +13,7 @@ import struct
 import numpy as np
 
 from ..core import native
-from ..scene.scene import MOST_BOXES
+from ..scene.boxes import MOST_BOXES
 from ..solver.checks import pose_fault, short_repr
 from .cdr import (
     ENCAPSULATION,

@@ -8,7 +8,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..scene.scene import ALONE, Box, Frame, Pair, Scene
+from ..scene.boxes import Box, Frame
+from ..scene.scene import ALONE, Pair, Scene
 
 POSES_TOPIC = 'poses'
 """Topic of the poses of all boxes and bodies that move, where they come as one message."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.bench.poses import DEPTHS, swaying_containers
-from box_contact_ros.scene.scene import CONTAINER
+from box_contact_ros.scene.boxes import CONTAINER
 
 
 def test_the_stream_is_the_same_for_the_same_seed():

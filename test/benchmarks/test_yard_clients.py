@@ -14,7 +14,8 @@ from typed_messages import joint_state
 from benchmarks import yard_clients
 from benchmarks.yard_clients import Judge
 from box_contact_ros import SceneSolver, read_contacts
-from box_contact_ros.scene.scene import NOWHERE, Box, Scene
+from box_contact_ros.scene.boxes import NOWHERE, Box
+from box_contact_ros.scene.scene import Scene
 from box_contact_ros.stream.pairing import StampedPose
 from box_contact_ros.stream.write_contacts import TickWriter
 

@@ -267,7 +267,7 @@ def test_by_find_package(tmp_path: Path) -> None:
                       re.M)
     assert found[1] == str(PREFIX / 'lib/cmake/box_contact_ros')
     assert example(tmp_path / 'first_contact') == EXAMPLE_SAYS
-    for name, lines in (('stack', 3), ('landing', 7)):
+    for name, lines in (('stack', 3), ('landing', 7), ('yard_path', 4)):
         says = example(tmp_path / name)
         assert len(says) == lines
         text = (EXAMPLE / f'{name}.cpp').read_text()

@@ -15,7 +15,7 @@ pytest.importorskip('mujoco')
 from box_contact_ros.demo.crane import Crane, CraneScenario
 from box_contact_ros.demo.landing import DURATION
 from box_contact_ros.forces.patch_forces import GRAVITY
-from box_contact_ros.scene.scene import CONTAINER
+from box_contact_ros.scene.boxes import CONTAINER
 from box_contact_ros.solver.pose import rotation_matrix
 
 pytestmark = pytest.mark.reports

@@ -18,6 +18,7 @@ from unittest.mock import Mock
 import numpy as np
 import poses
 import pytest
+from answers import near_pairs
 from raw_client import APART, ORIGIN, TOUCHING
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
@@ -36,7 +37,8 @@ from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.paced_service import PacedService
 from box_contact_ros.node.runtime import GuardedNode
 from box_contact_ros.node.tick import LastPoses
-from box_contact_ros.scene.scene import Box, Frame, Pair, Scene
+from box_contact_ros.scene.boxes import Box, Frame
+from box_contact_ros.scene.scene import Pair, Scene
 from box_contact_ros.scene.scene_check import MOST_BOXES, MOST_PAIRS
 from box_contact_ros.stream.pairing import StampedPose
 
@@ -244,7 +246,7 @@ def test_a_question_is_answered_as_a_tick_of_the_scene_that_it_makes(margin: flo
         listed, near = response.contacts.contacts, response.contacts.near
         assert [entry.pair for entry in listed] == [pair.label for pair, _ in answer.named()]
         assert [entry.depth for entry in listed] == (-answer.contacts.separation).tolist()
-        assert [entry.pair for entry in near] == [pair.label for pair, _ in answer.named_near()]
+        assert [entry.pair for entry in near] == [pair.label for pair, _ in near_pairs(answer)]
         assert [entry.distance for entry in near] == answer.near.distance.tolist()
         count += len(listed) + len(near)
     assert count > 500
@@ -585,7 +587,7 @@ def test_an_answer_is_made_in_steps(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_small_request_comes_between_the_turns_of_a_long_one(
         monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another client would wait for seconds, and for the pause; where the order matters, it does."""
+    """Another client would wait for seconds, and for the pause; with in_turn it does."""
     for in_turn, order in ((False, ['small', 'long']), (True, ['long', 'small'])):
         bench = Bench(monkeypatch, steps=9, in_turn=in_turn)
         bench.ask('long', 80, 0.01)

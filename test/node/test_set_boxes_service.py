@@ -37,8 +37,9 @@ from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import set_pose
 from box_contact_ros.node.set_boxes import boxes_message, changing
 from box_contact_ros.node.topics import LATCHED
+from box_contact_ros.scene.boxes import Box
 from box_contact_ros.scene.changes import NAMED_ALONE
-from box_contact_ros.scene.scene import Box, Scene
+from box_contact_ros.scene.scene import Scene
 from box_contact_ros.scene.scene_solver import finished
 from box_contact_ros.stream.write_contacts import TickWriter
 

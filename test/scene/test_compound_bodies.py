@@ -10,10 +10,12 @@ from dataclasses import replace
 import numpy as np
 import poses
 import pytest
+from answers import stale_pairs
 
 from box_contact_ros import Body, PatchForces
 from box_contact_ros.core import native
-from box_contact_ros.scene.scene import ALONE, EVERY_PAIR, Box, Frame, Pair, Scene
+from box_contact_ros.scene.boxes import Box, Frame
+from box_contact_ros.scene.scene import ALONE, EVERY_PAIR, Pair, Scene
 from box_contact_ros.scene.scene_solver import SceneSolver
 
 UNIT = (1.0, 1.0, 1.0)
@@ -130,7 +132,7 @@ def test_a_bad_pose_of_a_body_is_refused_by_its_name(pose, words):
     with pytest.raises(ValueError, match=f'pose of b: .*{words}'):
         SceneSolver(BODIES)([poses.IDENTITY, pose])
     assert BODIES.moving == ('a', 'b')
-    assert [pair.label for pair in SceneSolver(BODIES)([poses.IDENTITY, None]).named_stale()] == [
+    assert [pair.label for pair in stale_pairs(SceneSolver(BODIES)([poses.IDENTITY, None]))] == [
         'b1', 'b2']
 
 

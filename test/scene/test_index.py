@@ -12,10 +12,12 @@ import sys
 import numpy as np
 import poses
 import pytest
+from answers import stale_pairs
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import native
-from box_contact_ros.scene.scene import ALONE, EVERY_PAIR, Box, Pair, Scene
+from box_contact_ros.scene.boxes import Box
+from box_contact_ros.scene.scene import ALONE, EVERY_PAIR, Pair, Scene
 from box_contact_ros.scene.scene_solver import SceneSolver
 from box_contact_ros.solver.contacts_of import TooManyNear
 from box_contact_ros.stream.streams import partners_of
@@ -348,7 +350,7 @@ def test_the_pairs_of_a_scene(patterns, listed):
     poses.assert_same_bits(answer.contacts, contacts[hit])
     assert [pair for pair, _ in answer.named()] == [present[row] for row in hit]
     asks = any(gone in pair for pair in wanted[listed:])
-    assert answer.named_stale() == [pair for pair in pairs if gone in pair] + [
+    assert stale_pairs(answer) == [pair for pair in pairs if gone in pair] + [
         Pair(gone, gone, gone)] * asks
     for name in scene.moving:
         others = {pair.a if pair.b == name else pair.b for pair in wanted if name in pair[1:]}
@@ -374,7 +376,8 @@ import resource
 import numpy as np
 from box_contact_ros.core import native
 from box_contact_ros.solver.contacts_of import TooManyNear
-from box_contact_ros.scene.scene import EVERY_PAIR, Box, Scene
+from box_contact_ros.scene.boxes import Box
+from box_contact_ros.scene.scene import EVERY_PAIR, Scene
 from box_contact_ros.scene.scene_solver import SceneSolver
 
 def memory():

@@ -13,10 +13,12 @@ from dataclasses import replace
 import numpy as np
 import poses
 import pytest
+from answers import near_pairs, stale_pairs
 
 from box_contact_ros import ContactSolver, make_model
 from box_contact_ros.core import native
-from box_contact_ros.scene.scene import EVERY_PAIR, Box, Pair, Scene, SceneError, two_boxes
+from box_contact_ros.scene.boxes import Box, SceneError
+from box_contact_ros.scene.scene import EVERY_PAIR, Pair, Scene, two_boxes
 from box_contact_ros.scene.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import SceneSolver
 
@@ -80,7 +82,7 @@ def test_a_tick_is_every_pair_alone(model, origin):
                        for name in scene.moving}
         answer = solver([given_poses[name] for name in scene.moving])
         assert_same(answer, alone(scene, given_poses, model))
-        assert answer.named_stale() == [pair for pair in pairs if missing in (pair.a, pair.b)]
+        assert stale_pairs(answer) == [pair for pair in pairs if missing in (pair.a, pair.b)]
         contacts += answer.touching
         stale += len(answer.stale)
         left_out += len(pairs) - len(answer.stale) - answer.candidates
@@ -104,7 +106,7 @@ def test_close_pairs_are_those_within_the_margin(patterns, origin):
         answer, plain = solver(where), SceneSolver(scene, model='exact')(where)
         assert not len(plain.near) and not answer.near.colliding.any()
         assert np.array_equal(answer.pairs, plain.pairs)
-        found = {frozenset(pair[1:]): nearest.distance for pair, nearest in answer.named_near()}
+        found = {frozenset(pair[1:]): nearest.distance for pair, nearest in near_pairs(answer)}
         wanted = {}
         for pair in pairs:
             a, b = int(pair.a[1:]), int(pair.b[1:])
@@ -163,7 +165,7 @@ def test_one_pair_with_a_fixed_box():
     assert pair.name == 'down' and contact.normal.tolist() == [0, 0, 1]
     assert contact.separation == pytest.approx(-0.1)
     assert contact.point == pytest.approx([1, 2, -0.05])
-    assert solver([None]).named_stale() == [pair]
+    assert stale_pairs(solver([None])) == [pair]
 
 
 @pytest.mark.parametrize('pose, words', [
@@ -284,7 +286,7 @@ def test_a_solver_can_be_copied_and_pickled():
     solver = SceneSolver(scene, model='exact', margin=1.0)
     where = [poses.IDENTITY, np.array([2.5, 0, 0, 0, 0, 0, 1])]
     for twin in (copy.deepcopy(solver), pickle.loads(pickle.dumps(solver))):
-        assert twin(where).named_near()[0][1].distance == solver(where).near.distance[0] == 0.5
+        assert near_pairs(twin(where))[0][1].distance == solver(where).near.distance[0] == 0.5
 
 
 def test_models_that_do_not_know_a_size_refuse_the_scene():

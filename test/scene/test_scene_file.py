@@ -14,7 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from box_contact_ros.scene import scene_file
-from box_contact_ros.scene.scene import Pair, SceneError
+from box_contact_ros.scene.boxes import SceneError
+from box_contact_ros.scene.scene import Pair
 from box_contact_ros.scene.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import SceneSolver
 from box_contact_ros.stream.streams import partners_of, topics_of

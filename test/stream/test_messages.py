@@ -14,6 +14,7 @@ from itertools import product
 import numpy as np
 import pytest
 import typed_messages
+from answers import near_pairs, stale_pairs
 from geometry_msgs.msg import PoseStamped
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -36,16 +37,8 @@ from box_contact_ros import ContactSolver, face_patches
 from box_contact_ros.core import native
 from box_contact_ros.models.make_model import make_model
 from box_contact_ros.node.messages import KeptMessages, make_header
-from box_contact_ros.scene.scene import (
-    EVERY_PAIR,
-    NOWHERE,
-    POSES,
-    Box,
-    Frame,
-    Pair,
-    Scene,
-    two_boxes,
-)
+from box_contact_ros.scene.boxes import NOWHERE, Box, Frame
+from box_contact_ros.scene.scene import EVERY_PAIR, POSES, Pair, Scene, two_boxes
 from box_contact_ros.scene.scene_solver import SceneSolver
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contacts_of import TooManyNear
@@ -316,8 +309,8 @@ def typed(scene, poses, *, model='exact', margin=0.0, topics=None):
     answer = solver(numbers[0] if scene.in_one_message else numbers)
     frame_id = known[0].frame_id
     message = make_contacts(make_header(max(pose.stamp for pose in known), frame_id),
-                            answer.named(), [pair.label for pair in answer.named_stale()],
-                            answer.named_near(), areas_of(solver, answer))
+                            answer.named(), [pair.label for pair in stale_pairs(answer)],
+                            near_pairs(answer), areas_of(solver, answer))
     of_pairs = []
     for pair, contact in answer.named():
         if (pair.a, pair.b) in (topics or {}):

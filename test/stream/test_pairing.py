@@ -9,7 +9,8 @@ import random
 import numpy as np
 import pytest
 
-from box_contact_ros.scene.scene import Box, Pair, Scene, two_boxes
+from box_contact_ros.scene.boxes import Box
+from box_contact_ros.scene.scene import Pair, Scene, two_boxes
 from box_contact_ros.stream.pairing import (
     NO_PARTNER,
     OLD,

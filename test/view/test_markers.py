@@ -27,7 +27,8 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
 from box_contact_ros.resources import resource_path
-from box_contact_ros.scene.scene import Box, Pair, Scene
+from box_contact_ros.scene.boxes import Box
+from box_contact_ros.scene.scene import Pair, Scene
 from box_contact_ros.solver.contact import Contact
 from box_contact_ros.solver.nearest import Nearest
 from box_contact_ros.view.live.listener import DrawnTick, SceneRows, read_sorted

@@ -41,7 +41,8 @@ from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
 from box_contact_ros.node.parameters import SCENE_PARAMETERS
 from box_contact_ros.node.topics import contact_qos
-from box_contact_ros.scene.scene import Box, Pair, Scene, two_boxes
+from box_contact_ros.scene.boxes import Box
+from box_contact_ros.scene.scene import Pair, Scene, two_boxes
 from box_contact_ros.solver.nearest import Nearest
 from box_contact_ros.solver.pose import rotation_matrix
 from box_contact_ros.stream.cdr import NANOSECONDS, MessageError

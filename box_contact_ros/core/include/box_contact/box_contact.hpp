@@ -87,6 +87,8 @@ class Span {
   constexpr Span(Container&& container) : data_(container.data()), size_(container.size()) {}
 
   constexpr T* data() const { return data_; }
+  constexpr T* begin() const { return data_; }
+  constexpr T* end() const { return data_ + size_; }
   constexpr std::size_t size() const { return size_; }
 
  private:
