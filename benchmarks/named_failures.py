@@ -87,7 +87,7 @@ def fault(one: NamedFailure, found: Manifold, bound: float) -> str:
     deepest = int(np.argmax(found.depths))
     depth = float(found.depths[deepest])  # NaN: none is given
     if abs(depth + one.separation) > bound:
-        return f'depth {depth:.3g}'
+        return f'depth {depth:.3g} for {-one.separation:.3g}'
     contact = Contact(True, one.separation, found.normals[deepest], found.points[deepest],
                       np.nan, np.full((3, 3), np.nan))
     along = judge(*pairs, Contacts.of([contact])).along[0]

@@ -36,6 +36,8 @@ FOLDER = Path(__file__).parent
 LIBRARY = Path(sys.prefix, 'lib', 'libbox_contact.so')  # its headers are in include/
 TITLES = {'coal': 'Coal', 'fcl': 'FCL', 'bullet': 'Bullet'}
 """Rivals that may be missing, by file of this folder and by name for pkg-config."""
+PACKAGES = {'bullet': 'bullet-float64'}
+"""Names for pkg-config that differ: Debian builds Bullet in both precisions."""
 BRINGS = {'coal': 'pip install coal cmeel-eigen', 'fcl': 'apt install libfcl-dev',
           'bullet': 'apt install libbullet-dev'}
 """What brings their headers and libraries."""
@@ -77,7 +79,7 @@ def package_flags(name: str) -> list[str] | None:
 
     The standard is ours: FCL's flags name C++11, which MuJoCo's headers refuse.
     """
-    answer = package_config(name, '--cflags', '--libs')
+    answer = package_config(PACKAGES.get(name, name), '--cflags', '--libs')
     if answer is None:
         return None
     flags = [flag for flag in shlex.split(answer) if not flag.startswith('-std=')]
@@ -162,7 +164,7 @@ class Program:
     def engines(self) -> str:
         """Return the names of all rivals in it, with their versions."""
         return ', '.join([f'MuJoCo {metadata.version("mujoco")}', *(
-            f'{TITLES[name]} {package_config(name, "--modversion")}'
+            f'{TITLES[name]} {package_config(PACKAGES.get(name, name), "--modversion")}'
             for name in RIVALS[self.query] if name not in self.missing)])
 
     def left_out(self) -> str:

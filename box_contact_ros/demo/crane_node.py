@@ -28,10 +28,9 @@ from ..node.parameters import declare, warn_of_unknown
 from ..node.runtime import REFUSALS, GuardedNode, running_node, spin_once
 from ..node.topics import DEEP_RELIABLE, contact_qos
 from ..stream.read_contacts import read_contacts
-from . import CRANE_ROPES, CRANE_WRENCH
+from . import CRANE_PARAMETERS, CRANE_ROPES, CRANE_WRENCH
 from .crane import CraneScenario
 from .landing import CORNER_SPEED_LIMIT, ClosedLoop, Landing, LandingRecord, LoopState, with_patch
-from .run_crane import PARAMETERS
 
 FRAME = 'world'  # of the published poses
 OFFER_PERIOD = 0.1  # time between the pairs that only ask whether anyone answers [s]
@@ -52,8 +51,8 @@ class CraneNode(GuardedNode):
                  **options: Any) -> None:
         """Read the parameters and make the crane; `options` go to Node."""
         super().__init__('crane', context=context, **options)
-        values = declare(self, PARAMETERS)
-        warn_of_unknown(self, PARAMETERS)
+        values = declare(self, CRANE_PARAMETERS)
+        warn_of_unknown(self, CRANE_PARAMETERS)
         self._rate, self._wait, self._lockstep, self._paced, self._judge_force = (
             values[name] for name in ('rate', 'wait', 'lockstep', 'paced', 'judge_force'))
         self._look_every = math.ceil(self._rate / LOOK_RATE)

@@ -20,21 +20,13 @@ from collections.abc import Sequence
 
 from ..arguments import parse_command_line, program_main
 from ..extras import require
-from ..node.parameters import Setting, flag, number
-
-PARAMETERS = {
-    'rate': Setting(200.0, 'pairs of poses published per second [Hz]', number(1, 2000)),
-    'wait': Setting(30.0, 'patience for a contact node to answer [s]', number(0, 600)),
-    'lockstep': Setting(False, 'no real time: every tick waits for its answer', flag),
-    'paced': Setting(False, 'in lockstep, never faster than real time', flag),
-    'judge_force': Setting(False, 'the force must equal the weight, as by model exact', flag),
-}
+from . import CRANE_PARAMETERS
 
 
 @program_main
 def main(args: Sequence[str] | None = None) -> int:
     """Land once; 0 only if the load came to rest and no answer was lost."""
-    parse_command_line('crane', __doc__, PARAMETERS, args)
+    parse_command_line('crane', __doc__, CRANE_PARAMETERS, args)
     require('ros', 'sim')
     from .crane_node import run
     return run(args)

@@ -17,13 +17,7 @@ from collections.abc import Sequence
 
 from ..arguments import outside_ros_args, parse_command_line, program_main
 from ..extras import MissingExtra, require
-from ..node.parameters import SCENE_PARAMETERS, Setting, text, whole_number
-
-PARAMETERS = SCENE_PARAMETERS | {
-    'host': Setting('127.0.0.1', 'address to serve at; everybody who reaches it sees the page',
-                    text),
-    'port': Setting(8080, 'port to serve at, or the next that is free', whole_number(1, 65535)),
-}
+from . import VIEW_PARAMETERS
 
 
 @program_main
@@ -33,7 +27,7 @@ def main(args: Sequence[str] | None = None) -> int:
     if any(not arg.startswith('-') for arg in outside_ros_args(args)):
         from . import plan_page
         return plan_page.main(args)
-    parse_command_line('view', __doc__, PARAMETERS, args)
+    parse_command_line('view', __doc__, VIEW_PARAMETERS, args)
     try:
         require('ros', 'view')
     except MissingExtra as error:

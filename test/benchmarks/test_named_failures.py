@@ -57,7 +57,7 @@ def test_every_fault_is_found() -> None:
     assert fault(one, APART, 1e-9) == 'missed'
     phantom = Manifold(np.repeat(right.points, 2, axis=0), np.repeat(right.normals, 2, axis=0),
                        np.array([0.01, 2.01]))
-    assert fault(one, phantom, 1e-9) == 'depth 2.01'
+    assert fault(one, phantom, 1e-9) == 'depth 2.01 for 0.01'
     for normal, depth in ((-right.normals, 0.39), (np.array([[1.0, 0, 0]]), 1.1)):
         assert fault(one, right._replace(normals=normal), 1e-9) == f'normal {depth:.3g}'
     assert 'outside' in fault(one, right._replace(points=right.points + [0, 0, 0.1]), 1e-9)

@@ -176,6 +176,24 @@ def test_it_is_neither_late_nor_early(kind):
 
 
 @every_kind
+def test_no_answer_is_late(kind):
+    """Of 300 motions, 200 poses before the time that is answered, half of them close to it."""
+    drawn = motions.draw(kind, 0, 300)
+    tolerance = least_tolerance(drawn)
+    ends = np.array([ask(drawn, rows=slice(row, row + 1), tolerance=tolerance,
+                         clearance=float(drawn.clearance[row])).time[0] for row in range(300)])
+    ends = np.where(np.isnan(ends), 1.0, ends)
+    shares = np.concatenate((1.0 - np.geomspace(1e-9, 1.0, 100, endpoint=False),
+                             np.linspace(0.0, 1.0, 100, endpoint=False)))
+    times = np.outer(ends, shares)
+    every = motions.Motions(*(np.repeat(part, 200, axis=0) for part in drawn))
+    near = nearest_at(every, times.ravel()).distance.reshape(300, 200)
+    before = times < ends[:, None] - 1e-12
+    assert before.sum() > 20_000 or kind in ('no motion', 'equal motions')
+    assert (near > drawn.clearance[:, None])[before].all()
+
+
+@every_kind
 def test_the_least_distance_is_that_of_its_time(kind):
     drawn = motions.draw(kind, 4, 200)
     low = ask(drawn, 'least_distance', tolerance=least_tolerance(drawn))

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
+from graphlib import TopologicalSorter
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -64,6 +65,17 @@ def test_imports_point_one_way() -> None:
     assert [(module, name) for file, module in inner.items() for name in imported(file)
             if name.startswith(f'{NAME}.') and rank(name.removeprefix(f'{NAME}.')) > rank(module)
             ] == []
+
+
+def test_imports_make_no_circle() -> None:
+    """Also those within functions. But for the package itself, which exports names of all."""
+    modules = {'.'.join(file.relative_to(ROOT).with_suffix('').parts): file
+               for file in INSTALLED if file.suffix == '.py' and file.name != '__init__.py'}
+    graph = {module: {name if name in modules else name.rpartition('.')[0]
+                      for name in imported(file)} & modules.keys() - {module}
+             for module, file in modules.items()}
+    assert sum(map(len, graph.values())) > 200
+    assert [*TopologicalSorter(graph).static_order()]  # raises CycleError
 
 
 def test_only_the_root_imports_by_name() -> None:

@@ -17,7 +17,7 @@ from visualization_msgs.msg import Marker
 
 from ...demo import CRANE_ROPES, CRANE_WRENCH
 from ...node.messages import stamp_of
-from ..view import PARAMETERS
+from .. import VIEW_PARAMETERS
 from .listener import Listener
 
 FRAME_PERIOD = 1 / 30
@@ -33,7 +33,7 @@ class ViewNode(Listener):
 
         # Best effort: the view must never hold up the contact node.
         qos = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
-        super().__init__('view', context, PARAMETERS, qos, **options)
+        super().__init__('view', context, VIEW_PARAMETERS, qos, **options)
         self.model = ''  # of the contact node, as /diagnostics tells it
         self._force = (0, math.nan)  # stamp [ns], upward part [N]
         self._ropes = np.zeros((0, 2, 3))  # ends [m]
