@@ -66,8 +66,6 @@ MEDIAN = re.compile(r'^\| *quiet \| *contact(?: \| *[\d.]+){3} \| *([\d.]+)', re
 """The median latency of the contact node [ms]."""
 RATE = re.compile(r'([\d.]+) pairs per second')
 VOID = re.compile(r'^void: .*$', re.MULTILINE)
-MACHINE = re.compile(r'^- machine: (.*), \d+ cores', re.MULTILINE)
-"""Processor and instruction set."""
 SETS = {
     'landings': 'containers that land on each other',
     'settled': 'goods at rest',
@@ -150,7 +148,7 @@ def with_version(name: str, row: Row) -> str:
 
 def models() -> str:
     """Return what each way to find the contact point costs, and how far it is off."""
-    body, shares = [], []
+    body = []
     for choice in CHOICES:
         call = fastest(rows('frontier.csv', contestant=choice.resting or choice.contestant,
                             set=choice.rest, **{'class': 'all'}))
@@ -158,7 +156,6 @@ def models() -> str:
         errors = [', '.join(f'{float(f"{float(row[column]):.2g}"):g}'
                             for column in ('point_p50', 'point_p99'))
                   for row in error_rows(choice)] or ['reference'] * 2
-        shares.append(float(call['contacts']) / float(call['judged']))
         body.append([with_version(choice.name, call), cell(call, 'call_p50', 1e3),
                      from_c(choice, AT_REST), from_c(choice, SWAY), *errors])
     table = markdown_table(
@@ -169,15 +166,11 @@ def models() -> str:
     batch = [by_exact('mlp', of_set, 'batch') for of_set in ('settled', 'landings', SWAY)]
     return (f'{table}\n\nMedians on one core, {SHOWN[where["instruction_set"]]}, '
             f'{where["processor"]}. In brackets: with the patch, as in Python. Off: p50, p99 from '
-            "`exact`'s point, in % of the smaller box's longest edge; "
-            f'{100 * min(shares):.0f} % are answered. [How each was asked]'
+            "`exact`'s point, in % of the smaller box's longest edge. [How each was asked]"
             '(docs/results/native.md).\n\n'
-            f'`exact` is the default. In batches from Python `mlp` takes {batch[0]} of its time '
-            f'at rest, {batch[1]} landing and {batch[2]} moving; for one pair it takes longer, '
-            f'but its slowest contact takes {slowest("mlp")} ns from C, and that of `exact` '
-            f'{slowest("exact")}. '
-            f"For one pair, the paper's network takes {by_exact('paper', 'landings', 'call')} of "
-            'the time of `exact` landing.')
+            f'`exact` is the default. Batches of `mlp` take {batch[0]} of its time at rest, '
+            f'{batch[1]} landing, {batch[2]} moving. Its slowest contact takes {slowest("mlp")} ns '
+            f'from C, that of `exact` {slowest("exact")}.')
 
 
 def bench() -> str:
@@ -185,14 +178,13 @@ def bench() -> str:
     text = (RESULTS / 'bench_exact.md').read_text('utf-8')
     if void := VOID.search(text):
         return f'The last [run of the bench](docs/results/bench_exact.md) is {void[0]}.'
-    ratios, median, rate, machine = (each.search(text) for each in (RATIOS, MEDIAN, RATE, MACHINE))
-    assert ratios and median and rate and machine
+    ratios, median, rate = (each.search(text) for each in (RATIOS, MEDIAN, RATE))
+    assert ratios and median and rate
     soup = ratios[1].partition('soup / contact ')[2].partition(' ')[0]
     ratio, _, rest = ratios[1].removeprefix('contact / echo ').partition(' ')
-    return (f'Over ROS, an answer takes {ratio} times as long as that of an echo node, which sends '
-            f'each pose back and computes nothing (95 % interval {rest.partition("]")[0]}]; '
-            f'{machine[1]}). The median answer at {rate[1]} Hz '
-            f'takes {median[1]} ms, and that of the soup node {soup} times as long. See [the '
+    return (f'Over ROS, an answer takes {ratio} times as long as an echo, which computes nothing '
+            f'(95 % interval {rest.partition("]")[0]}]). The median takes {median[1]} ms at '
+            f'{rate[1]} Hz; polygon soup takes {soup} times as long. See [the '
             'report](docs/results/bench_exact.md).')
 
 

@@ -58,6 +58,7 @@ def drawing(places: dict[str, tuple[int, int, str, str]], flows: list[tuple[str,
     width = max(x for x, _ in middle.values()) + WIDTH / 2 + 20
     height = max(y for _, y in middle.values()) + HEIGHT / 2 + 20
     lines = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" '
+             f'width="{2 * width:g}" height="{2 * height:g}" '  # wide: a table gives it room
              'font-family="sans-serif" text-anchor="middle">',
              '<defs><marker id="head" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="8" '
              'markerHeight="8" orient="auto"><path d="M0,0 L10,5 L0,10 z" fill="#555"/></marker>'

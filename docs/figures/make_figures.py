@@ -16,7 +16,6 @@ import numpy as np
 
 from box_contact_ros import (
     ContactSolver,
-    Plan,
     SceneSolver,
     inspect_plan,
     read_plan,
@@ -47,7 +46,6 @@ CONTAINER = (12.192, 2.438, 2.591)
 DEPTHS = {0.05: '#222222', 0.5e-3: '#777777', 0.03e-3: '#aaaaaa'}
 """Depths of the lowest corner in the graph [m], from a hard landing to rest, and their colours."""
 RIVAL_DEPTH = 0.5e-3  # at which MuJoCo's point is drawn [m]
-ORDER = '00100003/'  # of BED-BPP
 LEAST_TILT = 1e-4  # up to which the axis is linear [°]
 
 
@@ -239,21 +237,37 @@ def trihedron(folder: Path) -> None:
     figure.savefig(folder / 'trihedron.png', metadata={'Software': None})
 
 
-def pallets(folder: Path) -> None:
-    """Draw a real order, a packer's file and a lorry with its trailer, coloured by cause."""
-    examples = Path(__file__).parents[1] / 'examples'
-    orders = read_plan(examples / 'pallets' / 'packing_plans.json')
-    kept = [n for n, name in enumerate(orders.names)
-            if name.startswith(ORDER) or n in orders.ground]
-    order = Plan(orders.sizes[kept], orders.poses[kept], orders.masses[kept],
-                 ground=len(kept) - 1, names=[orders.names[n].removeprefix(ORDER) for n in kept])
-    packed = read_plan(examples / 'files' / 'solution.csv', unit='mm')
-    lorry = read_plan(examples / 'files' / 'semitrailer.csv')
-    for name, plan, size in (('pallets', order, (9.0, 6.0)), ('pallet', packed, (9.0, 4.5)),
-                             ('lorry', lorry, (9.0, 4.0))):
+def plans(folder: Path) -> None:
+    """Draw a packer's file and a lorry with its trailer, coloured by cause."""
+    files = Path(__file__).parents[1] / 'examples' / 'files'
+    packed = read_plan(files / 'solution.csv', unit='mm')
+    lorry = read_plan(files / 'semitrailer.csv')
+    for name, plan, size in (('pallet', packed, (9.0, 4.5)), ('lorry', lorry, (9.0, 4.0))):
         figure = inspect_plan(plan).plot()
         figure.set_size_inches(*size)
         figure.savefig(folder / f'{name}.png', dpi=80, metadata={'Software': None})
+
+
+def door(folder: Path) -> None:
+    """Draw pallets.png: a pallet of groceries, for the README, a third as wide as its page.
+
+    The README shows it 260 px wide: there its letters are 12 px high.
+    """
+    plan = read_plan(Path(__file__).parents[1] / 'examples' / 'files' / 'pallet.csv')
+    figure = inspect_plan(plan).plot()
+    figure.set_size_inches(2.6, 2.6)
+    figure.suptitle('')
+    figure.legends[0].remove()
+    axes, = figure.axes
+    axes.set_position((0.02, 0.18, 0.96, 0.64))
+    for label, height, start in zip(list(axes.texts), (0.94, 0.06), ((0.9, 0), (0.3, 1)),
+                                    strict=True):
+        text = label.get_text().replace('\n', ', ').partition(', share')[0]
+        axes.annotate(text, label.xy, (0.5, height), textcoords='figure fraction', ha='center',
+                      va='center', fontsize=72 * 12 / 100,
+                      arrowprops={'arrowstyle': '-', 'color': '0.3', 'relpos': start})
+        label.remove()
+    figure.savefig(folder / 'pallets.png', dpi=300, metadata={'Software': None})
 
 
 def main() -> None:
@@ -269,7 +283,8 @@ def main() -> None:
     slide(axes['graph'])
     first_contact(folder)
     lift(folder)
-    pallets(folder)
+    plans(folder)
+    door(folder)
     trihedron(folder)
     # No version and no date in the file: the same figure is the same bytes.
     figure.savefig(folder / 'centroid.png', metadata={'Software': None})

@@ -65,10 +65,10 @@ def typed(page: str, verb: str) -> Iterator[list[str]]:
 
 
 def test_the_lines_of_the_pages(ros2: Start) -> None:
-    """The terminals of README, a parameter, and the lifecycle."""
+    """The terminals of install.md, a parameter, and the lifecycle."""
     ros2('run', PACKAGE, 'contact_node', '--ros-args', '-p', 'pairing:=latest').wait_for_output(
         'ready')
-    *_, echo = [ros2(*words) for words in typed('README.md', 'topic')]
+    *_, echo = [ros2(*words) for words in typed('docs/install.md', 'topic')]
     assert 'depth: 0.0100' in echo.wait_for_output('covariance')
     assert 'success=True' in run('service', 'call', '/contact_node/reset',
                                  'std_srvs/srv/Trigger').stdout

@@ -143,7 +143,24 @@ def test_what_is_not_there_or_not_ours_is_named(clone: Path) -> None:
     refused = start(clone)
     output, _ = refused.communicate()
     assert refused.returncode == 1
-    assert output.startswith('error: .venv exists, and make did not make it')
+    assert output.startswith('error: .venv exists, and is no environment of Python 3.11 to 3.14')
+    assert (clone / '.venv' / 'mine').exists()
+
+
+@pytest.mark.parametrize('shared', ['false', 'true'])
+def test_an_environment_made_by_hand_is_used(clone: Path, shared: str) -> None:
+    """As README says to make it; but not one that sees the packages of the machine."""
+    subprocess.run(['./python', '-m', 'venv'], cwd=clone, check=True)
+    calls(clone)
+    (clone / '.venv' / 'pyvenv.cfg').write_text(f'include-system-site-packages = {shared}\n')
+    (clone / '.venv' / 'mine').touch()
+    if shared == 'true':
+        refused = start(clone)
+        assert 'error: .venv exists' in refused.communicate()[0]
+        assert refused.returncode == 1 and calls(clone) == []
+    else:
+        assert set_up(clone) == NEW[1:]
+        assert set_up(clone) == []
     assert (clone / '.venv' / 'mine').exists()
 
 
