@@ -100,12 +100,16 @@ def pallets(copies: int) -> Boxes:
 
 
 def scene_of(boxes: Boxes, pairs: np.ndarray | None = None) -> Scene:
-    """Return the scene of boxes, with these pairs (m, 2) listed; without them, with all pairs."""
-    named = {f'b{row}': Box(tuple(size), tuple(pose) if is_fixed else None)
-             for row, (size, pose, is_fixed) in enumerate(zip(
-                 boxes.size.tolist(), boxes.pose.tolist(), boxes.fixed))}
+    """Return the scene of boxes, with these pairs (m, 2) listed; without them, with all pairs.
+
+    Names are in the order of the boxes, so the lower one is box a.
+    """
+    names = [f'b{row:06}' for row in range(len(boxes.size))]
+    named = {name: Box(tuple(size), tuple(pose) if is_fixed else None)
+             for name, size, pose, is_fixed in zip(
+                 names, boxes.size.tolist(), boxes.pose.tolist(), boxes.fixed)}
     listed = () if pairs is None else tuple(
-        Pair.between(f'b{a}', f'b{b}') for a, b in pairs.tolist())
+        Pair.between(names[a], names[b]) for a, b in pairs.tolist())
     return Scene(named, listed, poses='named', patterns=EVERY_PAIR if pairs is None else ())
 
 

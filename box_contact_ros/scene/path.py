@@ -123,7 +123,7 @@ def moved_boxes(scene: Scene, numbers: np.ndarray, of: np.ndarray, path: np.ndar
     is_part[is_part] = scene.body_of[numbers[is_part]] >= 0
     if is_part.any():
         # Boxes of all times behind one another, and then their bodies.
-        local = scene.arrays.poses[numbers[is_part]]
+        local = scene.box_poses[numbers[is_part]]
         bodies = poses[:, is_part].reshape(-1, 7)
         rows = np.concatenate((np.empty_like(bodies), bodies))
         native.place_boxes(rows, np.arange(len(bodies), 2 * len(bodies)),

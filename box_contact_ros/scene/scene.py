@@ -72,8 +72,8 @@ class Scene:
     """Pairs of patterns of names of boxes or bodies, such as (('load', '*'), ('crane*', 'c?'))."""
     bodies: Mapping[str, Frame] = field(default_factory=dict)
     """Bodies by name; each box names the one that it is a part of."""
-    arrays: Boxes = field(init=False, repr=False, compare=False)
-    matched: Patterns = field(init=False, repr=False, compare=False)
+    _arrays: Boxes = field(init=False, repr=False, compare=False)
+    _matched: Patterns = field(init=False, repr=False, compare=False)
     moving: tuple[str, ...] = field(init=False, repr=False, compare=False)
     """Names of boxes, then of bodies that move; with topics, only of those in a pair."""
 
@@ -88,8 +88,8 @@ class Scene:
         """Check all but what patterns match, and make the arrays."""
         _check_kinds(self)
         _check_bodies(self)
-        self._set(arrays=Boxes.of(self.boxes, self.bodies),
-                  matched=Patterns.of(self.patterns, self.boxes, self.bodies))
+        self._set(_arrays=Boxes.of(self.boxes, self.bodies),
+                  _matched=Patterns.of(self.patterns, self.boxes, self.bodies))
         _check_pairs(self)
         self._set(moving=self._movers())
 
@@ -122,11 +122,11 @@ class Scene:
             del boxes[name]
         bodies: dict[str, Frame] = {name: frame for name, frame in {**self.bodies, **frames}.items()
                                     if frame is not None}
-        arrays, source = self.arrays.changed(changes, self.bodies, bodies)
+        arrays, source = self._arrays.changed(changes, self.bodies, bodies)
         scene = object.__new__(Scene)
         scene._set(boxes=boxes, bodies=bodies, pairs=self.pairs, frame_id=self.frame_id,
-                   poses=self.poses, patterns=self.patterns, arrays=arrays,
-                   matched=self.matched.changed(given, source, boxes, bodies))
+                   poses=self.poses, patterns=self.patterns, _arrays=arrays,
+                   _matched=self._matched.changed(given, source, boxes, bodies))
         # Topics stay.
         scene._set(moving=scene._movers() if self.in_one_message else self.moving)
         if self.pairs and (frames or not self.listed_names.isdisjoint(changes)):
@@ -149,27 +149,37 @@ class Scene:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the boxes by index."""
-        return self.arrays.names
+        return self._arrays.names
 
     @property
     def index_of(self) -> Mapping[str, int]:
         """Return the indices of the boxes by name."""
-        return self.arrays.index_of
+        return self._arrays.index_of
 
     @property
     def sizes(self) -> np.ndarray:
         """Return full extents (n, 3) [m]."""
-        return self.arrays.sizes
+        return self._arrays.sizes
 
     @property
     def body_of(self) -> np.ndarray:
         """Return the index of the body (n,) that each box is a part of, or -1."""
-        return self.arrays.body_of
+        return self._arrays.body_of
+
+    @property
+    def box_poses(self) -> np.ndarray:
+        """Return the poses (n, 7) that boxes have in the scene, or in their bodies; NaN: none."""
+        return self._arrays.poses
+
+    @property
+    def sides(self) -> np.ndarray:
+        """Return which sides of patterns each box matches: a, b of the first, and so on."""
+        return self._matched.sides
 
     @property
     def is_fixed(self) -> np.ndarray:
         """Return which boxes (n,) never move."""
-        return self.arrays.is_fixed
+        return self._arrays.is_fixed
 
     @cached_property
     def _parts(self) -> Mapping[str, Box | Frame]:
@@ -204,12 +214,12 @@ class Scene:
     def placement(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the row of each box's body (n,) or -1, and its pose (n, 7) in the body's frame."""
         of_body = self.body_of >= 0
-        local = np.where(of_body[:, None], self.arrays.poses, AT_FRAME)
+        local = np.where(of_body[:, None], self._arrays.poses, AT_FRAME)
         return np.where(of_body, len(self.boxes) + self.body_of, -1).astype(np.int64), local
 
     def fixed_poses(self) -> np.ndarray:
         """Return new poses (n + m, 7) of boxes and bodies, by `row_of`: NaN for what moves."""
-        poses = np.concatenate((self.arrays.poses, poses_of(self.bodies)))
+        poses = np.concatenate((self._arrays.poses, poses_of(self.bodies)))
         if self.bodies:
             self.place_boxes(poses)
         return poses
@@ -236,7 +246,7 @@ class Scene:
         """Return which pairs the scene has, and which box is a; it takes no box for fixed."""
         order = np.empty(len(self.boxes), np.int32)
         order[np.argsort(np.array(self.names, object), kind='stable')] = np.arange(len(order))
-        return native.Filter(self.rows, self.matched.group, self.matched.allowed, self.body_of,
+        return native.Filter(self.rows, self._matched.group, self._matched.allowed, self.body_of,
                              order)
 
     @cached_property
@@ -259,7 +269,7 @@ class Scene:
     @property
     def is_matched(self) -> np.ndarray:
         """Return which boxes (n,) some side of a pattern matches."""
-        return np.asarray(self.matched.sides.any(axis=1))
+        return np.asarray(self._matched.sides.any(axis=1))
 
     @cached_property
     def is_paired(self) -> np.ndarray:
@@ -268,7 +278,7 @@ class Scene:
         paired[self.rows.ravel()] = True
         if not self.patterns:
             return paired
-        group, allowed = self.matched.group, self.matched.allowed
+        group, allowed = self._matched.group, self._matched.allowed
         meet = (allowed > 0).astype(np.int64)
         partners = (np.bincount(group, minlength=len(meet)) @ meet)[group]
         # Fixed boxes do not meet, nor do boxes of one body, nor a box and itself.
@@ -283,12 +293,12 @@ class Scene:
     @cached_property
     def is_asked(self) -> np.ndarray:
         """Return which boxes (n,) patterns pair with others."""
-        group, allowed = self.matched.group, self.matched.allowed
+        group, allowed = self._matched.group, self._matched.allowed
         return (allowed.max(axis=1) > 0)[group] if self.patterns else np.zeros(len(group), bool)
 
     def partners(self, index: int) -> np.ndarray:
         """Return which boxes (n,) patterns pair a box with, without those of listed pairs."""
-        group, allowed = self.matched.group, self.matched.allowed
+        group, allowed = self._matched.group, self._matched.allowed
         if not self.patterns:
             return np.zeros(len(self.boxes), bool)
         met: np.ndarray = np.greater(allowed[group[index]][group], 0)
@@ -313,7 +323,7 @@ class Scene:
         """How many pairs the scene has."""
         if not self.patterns:
             return len(self.pairs)
-        group, allowed = self.matched.group, self.matched.allowed
+        group, allowed = self._matched.group, self._matched.allowed
         meet = (allowed > 0).astype(np.int64)
 
         def pairs_among(boxes: np.ndarray) -> int:
@@ -427,7 +437,7 @@ def _check_pairs(scene: Scene) -> None:
 
 def _check_pattern(scene: Scene, number: int) -> None:
     """Raise SceneError for a pattern without a pair."""
-    is_a, is_b = scene.matched.sides.T[2 * number:2 * number + 2]
+    is_a, is_b = scene._matched.sides.T[2 * number:2 * number + 2]
     for side, is_matched, pattern in zip('ab', (is_a, is_b), scene.patterns[number]):
         if not is_matched.any():
             raise SceneError(('patterns', number, side),

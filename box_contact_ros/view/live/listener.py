@@ -52,7 +52,7 @@ class SceneRows:
         self.sizes = np.array([box.size for box in scene.boxes.values()], dtype=float)
         self.poses = scene.fixed_poses()
         """Poses (n + m, 7) of boxes and, behind them, of bodies: NaN for what moves."""
-        self.is_a = scene.matched.sides[:, ::2].any(axis=1) | np.isin(
+        self.is_a = scene.sides[:, ::2].any(axis=1) | np.isin(
             np.arange(len(self.sizes)), scene.rows[:, 0])
         """Which boxes (n,) may be box a of a pair: normals point away from them."""
 
