@@ -7,7 +7,9 @@
 and of masses up to 10,000 to one, stand on each other, fall, hit and slide. Steps are uneven, from
 1 µs to 50 ms. A heap may end by a ValueError that names the body. A needle of a millimetre that
 spins by radians in a sub-step may gain energy, so the bound is `BOUND` times the first energy, and
-the gain is told.
+the gain is told. So may a heavy box: what it presses into each other within a long step is pushed
+out again, and lifts it by that depth. In heap 588 of seed 1, 3.3 t on boxes of 3 kg and 5 mm are
+lifted by 2.6 mm, to 2.2 times the first energy, and fall back to .73 of it.
 
 Lengths in m, masses in kg, times in s.
 """
