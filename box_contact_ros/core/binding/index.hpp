@@ -234,9 +234,8 @@ inline PyObject* path_new(PyTypeObject* type, PyObject* args, PyObject*) {
 
 inline PyObject* path_advance(PyObject* self, PyObject* work) {
   bool is_done = false;
-  int64_t looks = whole_of(work);
-  bc_path* path = Holder<Path>::of(self).made.get();
-  check(without_lock([&] { return bc_path_advance(path, looks, &is_done); }));
+  // With Python's lock: another thread may have the same path.
+  check(bc_path_advance(Holder<Path>::of(self).made.get(), whole_of(work), &is_done));
   return PyBool_FromLong(is_done);
 }
 
