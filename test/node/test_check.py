@@ -598,74 +598,57 @@ def test_a_small_request_comes_between_the_turns_of_a_long_one(
         assert bench.sent == order
 
 
+class Stepper(GuardedNode):
+    """Answers in steps of 5 ms of the processor, each of which sends the node itself a tick."""
+
+    def __init__(self, context: Any, *, steps: int, pause: float = 0.0) -> None:
+        super().__init__('stepper', context=context)
+        self.steps, self.pause = steps, pause
+        self.order: list[str] = []
+        self.create_subscription(Header, 'ticks', lambda _: self.order.append('tick'), 10)
+        self.ticks = self.create_publisher(Header, 'ticks', 10)
+        self.served = 0  # how often the timer ended
+        service = PacedService(self, Counter(), 'checks', (Check, '~/check'), self.answer,
+                               check_module.kind_and_size)
+        go_on = service._timer.callback
+
+        def counted() -> None:
+            self.served += 1
+            go_on()
+        service._timer.callback = counted
+
+    def answer(self, _: Any, response: Check.Response) -> Iterator[None]:
+        for _ in range(self.steps):
+            self.order.append('step')
+            self.ticks.publish(Header())
+            began = time.thread_time()
+            while time.thread_time() < began + 0.005:
+                pass
+            time.sleep(self.pause)  # on a busy machine the message needs it to arrive
+            yield
+
+
 @pytest.mark.parametrize('executor_type', [SingleThreadedExecutor, EventsExecutor])
 def test_what_comes_in_a_step_is_served_before_the_next(client: Client, executor_type: Any) -> None:
-    """Each step sends a message to the node itself, and takes 5 ms of the processor."""
-    order: list[str] = []
-
-    class Stepper(GuardedNode):
-        def __init__(self, context: Any) -> None:
-            super().__init__('stepper', context=context)
-            self.create_subscription(Header, 'ticks', lambda _: order.append('tick'), 10)
-            self.ticks = self.create_publisher(Header, 'ticks', 10)
-            PacedService(self, Counter(), 'checks', (Check, '~/check'), self.answer,
-                         check_module.kind_and_size)
-
-        def answer(self, _: Any, response: Check.Response) -> Iterator[None]:
-            for _ in range(10):
-                order.append('step')
-                self.ticks.publish(Header())
-                began = time.thread_time()
-                while time.thread_time() < began + 0.005:
-                    pass
-                time.sleep(0.02)  # on a busy machine the message needs it to arrive
-                yield
-
-    with serving(Stepper, executor_type) as node:
+    with serving(partial(Stepper, steps=10, pause=0.02), executor_type) as node:
         assert client.spin(lambda: node.ticks.get_subscription_count())
         assert client.call(Check, 'stepper/check', Check.Request()).success
-    in_a_row = sum(pair == ('step', 'step') for pair in pairwise(order))
-    assert order.count('step') == 10 and in_a_row < 4, order
+    in_a_row = sum(pair == ('step', 'step') for pair in pairwise(node.order))
+    assert node.order.count('step') == 10 and in_a_row < 4, node.order
 
 
 @pytest.mark.parametrize('executor_type', [SingleThreadedExecutor, EventsExecutor])
 def test_many_requests_at_once_are_served_once_each(client: Client, executor_type: Any) -> None:
     """Ticks come between all of their steps, and the timer ends some times for each request."""
-    order: list[str] = []
-
-    class Stepper(GuardedNode):
-        def __init__(self, context: Any) -> None:
-            super().__init__('stepper', context=context)
-            self.create_subscription(Header, 'ticks', lambda _: order.append('tick'), 10)
-            self.ticks = self.create_publisher(Header, 'ticks', 10)
-            self.served = 0
-            service = PacedService(self, Counter(), 'checks', (Check, '~/check'), self.answer,
-                                   lambda request: ((), len(request.boxes)))
-            go_on = service._timer.callback
-
-            def counted() -> None:
-                self.served += 1
-                go_on()
-            service._timer.callback = counted
-
-        def answer(self, _: Any, response: Check.Response) -> Iterator[None]:
-            for _ in range(3):
-                order.append('step')
-                self.ticks.publish(Header())
-                began = time.thread_time()
-                while time.thread_time() < began + 0.005:
-                    pass
-                yield
-
-    with serving(Stepper, executor_type) as node:
+    with serving(partial(Stepper, steps=3), executor_type) as node:
         assert client.spin(lambda: node.ticks.get_subscription_count())
         service = client._client_of(Check, 'stepper/check')
         request = Check.Request(boxes=[a_box('p', ORIGIN, CUBE)])
         futures = [service.call_async(request) for _ in range(10)]
         assert client.spin(lambda: all(future.done() for future in futures))
     assert all(future.result().success for future in futures)
-    silences = ''.join(word[0] for word in order).split('t')
-    assert node.served <= 10 * len(futures) and max(map(len, silences)) <= 4, order
+    silences = ''.join(word[0] for word in node.order).split('t')
+    assert node.served <= 10 * len(futures) and max(map(len, silences)) <= 4, node.order
 
 
 @pytest.mark.parametrize('by_topics', [False, True])
