@@ -86,6 +86,19 @@ def test_a_box_at_its_body_keeps_the_bits_of_the_pose():
         assert rows[0].tobytes() == rows[1].tobytes() == np.array(pose).tobytes()
 
 
+def test_a_part_without_a_pose_is_where_its_body_is():
+    """To the bit: it answers as a box of that name that moves alone."""
+    rng = np.random.default_rng(3)
+    floor = Box((3.0, 3.0, 1.0), (0.1, -0.2, -0.4, 0.0, 0.1, 0.0, 1.0))
+    part = Scene({'part': Box(UNIT, body='hook'), 'floor': floor}, patterns=EVERY_PAIR,
+                 poses='named', bodies={'hook': Frame()})
+    alone = Scene({'part': Box(UNIT), 'floor': floor}, patterns=EVERY_PAIR, poses='named')
+    for pose in np.hstack((rng.uniform(-0.4, 0.4, (20, 3)), rng.normal(size=(20, 4)))):
+        found, wanted = (SceneSolver(scene)([pose]).contacts for scene in (part, alone))
+        assert len(wanted) == 1
+        poses.assert_same_bits(found, wanted)
+
+
 def test_a_rotation_moves_what_is_beside():
     """A quarter turn about z, of a box that is turned a quarter about x in the body's frame."""
     half = math.sqrt(0.5)
