@@ -11,6 +11,7 @@ fault survives. Name files to draw among these alone. A survivor gets a law, or 
 from __future__ import annotations
 
 import argparse
+import os
 import random
 import re
 import subprocess
@@ -68,9 +69,10 @@ def tests_of(file: Path) -> list[str]:
 
 
 def run(*words: str) -> int:
-    """Run a program in the checkout; return its status, or 1 after PATIENCE."""
+    """Run a program on this checkout's package; return its status, or 1 after PATIENCE."""
     try:
         return subprocess.run([sys.executable, *words], cwd=ROOT, timeout=PATIENCE,
+                              env={**os.environ, 'PYTHONPATH': str(ROOT)},
                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode
     except subprocess.TimeoutExpired:
         return 1
