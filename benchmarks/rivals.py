@@ -265,7 +265,19 @@ def report(by_name: Mapping[str, Engine], missing: Sequence[str], made: Path, fo
     return {'engines': _engines_table(by_name), 'times': _table(found, rivals_picture.STATES),
             'ways': _table({name: found[name] for make in scenes if make not in NEVER_SLEEP
                             for name in [make().name]}, ('sank', 'creep')),
+            'box3d': _where_box3d_wins(found),
             'missing': ''.join(f'\n\nLeft out: {line}.' for line in missing)}
+
+
+def _where_box3d_wins(found: Found) -> str:
+    """Return what Box3D takes of the time of PatchForces in a pile and a yard, in words."""
+    shares = [getattr(found[scene]['Box3D'], state) / getattr(found[scene]['PatchForces'], state)
+              for scene, state in (('pile of 1,000', 'moving'), ('pile of 1,000', 'awake'),
+                                   ('yard of 5,000', 'moving'))
+              if 'Box3D' in found.get(scene, ())]
+    return '' if len(shares) < 3 else (
+        'Box3D takes {:.2g} of the time of PatchForces where a pile of a thousand falls, {:.2g} '
+        'where it lies awake, and {:.2g} in the first second of a yard. '.format(*shares))
 
 
 def _table(found: Found, fields: Sequence[str]) -> str:

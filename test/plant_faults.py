@@ -25,7 +25,8 @@ CODE = ROOT / 'box_contact_ros'
 TESTS = {'core/src/force': ('forces', 'core/test_library.py'),
          'core/src/faces': ('plans', 'solver'),
          'core/src/mlp': ('core', 'models', 'solver'), 'core/src/motion': ('core', 'scene'),
-         'core/src': ('core', 'solver', 'scene'), 'solver': ('solver', 'models', 'scene'),
+         'core/src': ('core', 'solver', 'scene'),
+         'solver': ('solver', 'models', 'scene', 'core/test_motion.py'),
          'scene': ('scene', 'node/test_check.py', 'node/test_check_path.py'), 'plans': ('plans',)}
 """What tests a folder: the first that a file is in."""
 SWAPS = {'<': '<=', '<=': '<', '>': '>=', '>=': '>', '==': '!=', '!=': '==', '+': '-', '-': '+',

@@ -177,7 +177,7 @@ def test_the_program(monkeypatch: pytest.MonkeyPatch, tmp_path: Path,
     monkeypatch.setattr(stacks, 'ORDERS', ())
     monkeypatch.setattr(rivals, 'engines', lambda made: ({}, []))
     monkeypatch.setattr(rivals, 'report', lambda *_, quick: dict.fromkeys(
-        ('engines', 'times', 'ways', 'missing'), ''))
+        ('engines', 'times', 'ways', 'box3d', 'missing'), ''))
     assert stacks.main(['--out', str(tmp_path)]) == 1
     assert 'stacks: falls does not come to rest' in capsys.readouterr().err
     assert '| falls | **' in (tmp_path / 'stacks.md').read_text()
