@@ -19,6 +19,7 @@ import numpy as np
 from ..solver.checks import printable
 from ..solver.rows import NoTruth
 from .plan import LACKS, VERDICTS, Plan
+from .plot import picture
 from .room import SIDES
 from .verdict import CAUSES, GOES
 
@@ -345,7 +346,6 @@ class Inspection(NoTruth):
 
         file: where the picture is written to, too. It needs Matplotlib, the extra `report`.
         """
-        from .plot import picture
         figure = picture(self.plan, self.verdicts, self.rows(), self.summary())
         if file is not None:
             figure.savefig(file, dpi=120)
