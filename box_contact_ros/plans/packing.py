@@ -27,6 +27,7 @@ from .plan import GROUND, NO_ROOM, UNTURNED, Fault, Plan, slab_below
 from .roles import (
     ANGLES,
     MASS_UNITS,
+    PLACE,
     TURNS,
     UNITS,
     Finder,
@@ -34,6 +35,7 @@ from .roles import (
     Taken,
     is_harmless,
     is_named,
+    word_of,
     words_of,
 )
 from .room import walls
@@ -49,6 +51,8 @@ MOST_FRICTION = 10.0  # more is no friction [1]
 SAME = 1e-4  # by which least corners of containers may differ that have frames of their own [m]
 STRAIGHT = np.array(UNTURNED)
 SQUARE = 1e-6  # by which a turn by quarters may miss them [1]
+SLACK = 0.05
+"""Part of its thinnest side by which a box may hang or overlap while an axis is chosen [1]."""
 MOST_STEPS = 2**53  # a float64 has all whole numbers up to it
 AXES = {'x': [1, 2, 0], 'y': [0, 2, 1], 'z': [0, 1, 2]}
 """Which axes of the file are x, y and z of the plan, by the one that is up."""
@@ -106,9 +110,67 @@ def read_packing(tables: Sequence[Table], given: Given) -> tuple[Plan, str]:
                          f'{_ignore(paths[1:])}')
     finder = able[0] if able else max(finders, key=lambda finder: (
         len(finder.taken.columns), len(finder.table.records)))
+    if finder in able and not given.up:
+        _ask_up(finder)
     if finder.open.questions:
         raise ValueError(str(finder.open))
     return _read(every, finder.table, finder.taken, given, None)
+
+
+def _ask_up(finder: Finder) -> None:
+    """Ask which axis is up where words tell y, or where most boxes stand only if it is not z.
+
+    Words tell y if the height is listed between the other sizes, as y is between x and z. The
+    origin is asked, too, if boxes stand by least corners alone; two boxes tell too little of it.
+    """
+    taken, given, table = finder.taken, finder.given, finder.table
+    in_file = sorted(taken.size, key=table.columns.index)
+    says_y = not taken.is_along_file and in_file[1] == taken.size[2]
+    is_asked = '--origin' in finder.open.options
+    is_open = is_asked or len(table.records) > 2 and not given.origin and [*PLACE] == [
+        word_of(name).key for name in taken.place]
+
+    def fallen(up: str, is_corner: bool) -> int:
+        return _fallen(table, replace(taken, up=up, is_corner=is_corner), given)
+
+    if not says_y and fallen('z', taken.is_corner) <= max(1, len(table.records) // 2):
+        return
+    corners = sorted({taken.is_corner, taken.is_corner or is_open})
+    readings = {up: min((fallen(up, is_corner), is_corner) for is_corner in corners)
+                for up in 'yzx'}
+    up = min(readings, key=lambda up: readings[up][0])
+    count, is_corner = readings[up]
+    if not says_y and 2 * count >= readings['z'][0]:
+        return
+    if is_corner and not (taken.is_corner or is_asked):
+        finder.ask_origin(taken.place)
+    finder.open.ask(f'which axis is up, {up} or {"z" if up != "z" else "y"}?', '--up', up)
+
+
+def _fallen(table: Table, taken: Taken, given: Given) -> int:
+    """Return how many rows are not placed by a reading, hang, or overlap others.
+
+    What is at z = 0 stands, too. Containers are judged each by itself.
+    """
+    try:
+        boxes = _Rows(table, taken, given, None).boxes()
+        stack = np.array([box.stack for box in boxes])
+        sizes, poses, half = (np.array([getattr(box, name) for box in boxes]).reshape(
+            len(boxes), -1) for name in ('size', 'pose', 'half'))
+        slack = SLACK * sizes.min(axis=1, initial=np.inf)
+        low = poses[:, 2] - half[:, 2]
+        poses[:, 0] += 3.0 * (np.abs(poses[:, 0]) + half[:, 0]).max(initial=0.0) * stack
+        pairs, contacts = contacts_of(sizes, poses, tolerance=slack,
+                                      most_near=most_near(len(boxes)))
+    except ValueError:  # such as TooManyNear
+        return len(table.records)
+    rise = contacts.normal[:, 2]
+    stands = np.abs(low) <= slack
+    stands[np.where(rise > 0.0, pairs[:, 1], pairs[:, 0])[np.abs(rise) > 0.5]] = True
+    stands[pairs[-contacts.separation > slack[pairs].min(axis=1)].ravel()] = False
+    stands[low < -slack] = False
+    stands |= [box.fixed for box in boxes]
+    return len(table.records) - int(np.count_nonzero(stands))
 
 
 def _formed(form: Form, given: Given) -> Taken:

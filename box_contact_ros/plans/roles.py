@@ -292,9 +292,12 @@ class Finder:
         is_low = kind == 'centre' and self.open.questions and place and min(
             self.table.numbers(place.words['xyz'.index(taken.up)]), default=1.0) <= 0.0
         if place and not given.origin and (not kind or is_low):
-            self.open.ask(f'are {" ".join(place.words)} centres or least corners?', '--origin',
-                          'corner')
+            self.ask_origin(place.words)
         return taken
+
+    def ask_origin(self, place: Sequence[str]) -> None:
+        """Ask what the columns of a place are."""
+        self.open.ask(f'are {" ".join(place)} centres or least corners?', '--origin', 'corner')
 
     def _lines(self, group: str) -> list[Line]:
         """Return the lines of a group whose columns are all there, with these; '' is another."""
