@@ -19,20 +19,16 @@ class Form:
     """A form of a packer."""
 
     title: str
-    header: tuple[str, ...]
-    """All columns of a CSV file in lower case, or some of a JSON document."""
+    header: tuple[str, ...]  # all columns of a CSV file in lower case, or some of a JSON document
     taken: Taken
-    unit: str | None = None
-    """One of UNITS; None: the form has none."""
+    unit: str | None = None  # one of UNITS; None: the form has none
     turned: tuple[str, Mapping[int, tuple[int, ...]]] = ('', {})
     """A column, and which of the sizes are along x y z by its number."""
     above: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Keys of what is just above: `room`, and `most`, the greatest mass in it [kg]."""
-    kinds: str = ''
-    """The column that tells items from bins and stacks."""
+    kinds: str = ''  # the column that tells items from bins and stacks
     frames: str = 'own'
-    in_line: bool = False
-    """Whether a container begins where the one before it ends, along x."""
+    in_line: bool = False  # whether a container begins where the one before it ends, along x
 
 
 def _csv(title: str, header: str, unit: str | None, taken: Taken, **more: object) -> Form:

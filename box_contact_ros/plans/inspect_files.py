@@ -36,10 +36,8 @@ STATUSES = {'sound': 0, 'not all judged': 3, 'not sound': 1, 'not read': NOT_REA
 """Exit statuses, by verdict; of several files the last of these counts."""
 PATIENT = 5.0  # time [s] after which several files have a progress bar
 COLUMNS = ('file', 'kind', 'boxes', 'text')
-STEPS = (5e-4, 1e-3, 2e-3, 5e-3)
-"""Tolerances that places may need that are rounded [m]."""
-ROUNDED = 1.5
-"""A tolerance must exceed a gap by so much to be a hint [1]."""
+STEPS = (5e-4, 1e-3, 2e-3, 5e-3)  # tolerances that places may need that are rounded [m]
+ROUNDED = 1.5  # A tolerance must exceed a gap by so much to be a hint [1]
 
 
 def judged(path: str, options: argparse.Namespace) -> tuple[Inspection, str]:

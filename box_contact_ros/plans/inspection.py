@@ -30,12 +30,9 @@ HINTS = 'origin', 'tolerance'
 """Kinds that come first: what the file seems to mean, and the option that says so."""
 LEFT_OUT = ('place', 'part', 'shape')
 """What rows lack that come first: others may fall because these are left out."""
-OVER = 1e-6
-"""By how much a load may exceed its limit [1]: rounding."""
-MOST_LINES = 40
-"""Lines that are printed of what is wrong, if not all are asked for."""
-MOST_NAMES = 3
-"""Names that a line shows of a fault with more."""
+OVER = 1e-6  # by how much a load may exceed its limit [1]: rounding
+MOST_LINES = 40  # lines that are printed of what is wrong, if not all are asked for
+MOST_NAMES = 3  # names that a line shows of a fault with more
 
 
 class Row(NamedTuple):

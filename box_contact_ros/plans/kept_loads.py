@@ -25,10 +25,8 @@ BALANCED = 1e-4
 """Part of what is on a body that loads along gravity may lack: else friction holds the body."""
 EXACT, SHARINGS = 1e-10, 30
 """Part of a force that may be left of it, and the steps in which it is shared."""
-VISITS = 4
-"""How often bodies are visited, on average: more where two carry each other."""
-VISIT = 2500.0
-"""Work of a visit, in the unit of `Work`."""
+VISITS = 4  # how often bodies are visited, on average: more where two carry each other
+VISIT = 2500.0  # work of a visit, in the unit of `Work`
 Planes = list[tuple[float, float, float]]
 """Normals (x, y) into a polygon, and how far along them its edges are."""
 Force = tuple[float, float, float]
@@ -39,14 +37,11 @@ Force = tuple[float, float, float]
 class _Stand:
     """Where a body may press on what carries it."""
 
-    rows: list[int]
-    """Of the patches."""
+    rows: list[int]  # of the patches
     edges: tuple[np.ndarray, np.ndarray]
     """Of their hull: where they begin, and unit normals into it (e, 2)."""
-    need: float
-    """How far within the hull it presses [m]."""
-    inside: Planes
-    """Of the hull, pulled in."""
+    need: float  # how far within the hull it presses [m]
+    inside: Planes  # of the hull, pulled in
     patches: list[Planes] = field(default_factory=list)
     """The patches as they are, if there are several."""
     points: tuple[np.ndarray, np.ndarray] | None = None

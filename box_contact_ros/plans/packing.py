@@ -67,8 +67,7 @@ class Box:
     stack: int
     size: np.ndarray
     pose: np.ndarray
-    half: np.ndarray
-    """Half of the extents of its bounding box (3,) [m]."""
+    half: np.ndarray  # half of the extents of its bounding box (3,) [m]
     mass: float | None
     limit: float
     friction: float

@@ -34,23 +34,19 @@ COLOURS = {'sound': '#dde5ee', 'not judged': '#b8b8c8', 'overlap': '#000000',
            'tips under its load': '#cc79a7', 'slides': '#56b4e9', GOES: '#f7d9a0',
            'overloaded': '#f0e442', 'step': '#009e73', 'way': '#5b2a86', 'ground': '#f4f4f0'}
 """By verdict, in the order of the legend; they differ for who sees no red or no green, too."""
-QUIET = ('sound', 'not judged', 'ground', GOES)
-"""Verdicts without labels."""
+QUIET = ('sound', 'not judged', 'ground', GOES)  # verdicts without labels
 MOST_LABELS, MOST_LOOKED_AT = 6, 30
 """More labels would cover the boxes; and the faulty boxes that decide on the view, at most."""
 MOST_SORTED = 1000
 """More boxes are drawn by the depth of their centres alone, from the first corner."""
-SHADES = 1.0, 0.93, 0.86
-"""Of the faces along z, y and x of a box [share of its colour]."""
+SHADES = 1.0, 0.93, 0.86  # of the faces along z, y and x of a box [share of its colour]
 CORNERS = [np.array((x, y, 0.45)) for x, y in product((0.5, -0.5), (-0.75, 0.75))]
 """Directions to the viewer."""
 SPOTS = np.array([*product((-0.4, 0.0, 0.4), repeat=2)])
 """Of a face, which are looked at [of its edges]."""
-LONGEST, WIDEST = 24, 34
-"""Characters of a name, and of a line of a label."""
+LONGEST, WIDEST = 24, 34  # characters of a name, and of a line of a label
 ROUNDING = 1e-6  # of a box's diagonal, by which what touches it may seem to be before it
-HIDDEN = 0.5
-"""Share of its spots that are seen, below which a box is drawn through."""
+HIDDEN = 0.5  # share of its spots that are seen, below which a box is drawn through
 _RING = np.array([[-0.5, -0.5], [-0.5, 0.5], [0.5, 0.5], [0.5, -0.5]])
 
 
@@ -61,8 +57,7 @@ class View:
     viewer: np.ndarray
     faces: np.ndarray
     """(n, 3, 4, 2) corners in the picture, of the three faces of each box that are seen."""
-    shades: np.ndarray
-    """(n, 3)."""
+    shades: np.ndarray  # (n, 3)
 
     @property
     def edges(self) -> np.ndarray:

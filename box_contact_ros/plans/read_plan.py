@@ -23,18 +23,15 @@ from .table import Table, header_of, is_first, read_csv, read_tables
 FORMATS = 'SMDG BAPLIE, and packing plans as CSV or JSON'
 WORLDS = ('it is a world or a model of a simulator, which is no plan; fill a Plan from it, as '
           'docs/examples/mujoco_plan.py does')
-FEWEST = 4
-"""Columns of a table whose file's ending does not tell that it is one."""
+FEWEST = 4  # columns of a table whose file's ending does not tell that it is one
 
 
 class ReadPlan(NamedTuple):
     """A plan, and how its boxes stand on each other."""
 
     plan: Plan
-    bears: str
-    """'corners' of containers, else 'faces', as `inspect_plan` takes it."""
-    taken: str = ''
-    """What was taken of a table, for people; '' for other files."""
+    bears: str  # 'corners' of containers, else 'faces', as `inspect_plan` takes it
+    taken: str = ''  # what was taken of a table, for people; '' for other files
 
 
 def read_plan(path: str | os.PathLike[str], *, origin: str | None = None, unit: str | None = None,

@@ -116,29 +116,20 @@ ROLES = tuple(dict.fromkeys([*WORDS, *(
 UNIT_WORDS = ('unit', 'units', 'lengthunit', 'lengthunits', 'dimensionunit', 'uom')
 MINE = {*SIZE, 'lx', 'ly', 'lz', 'dx', 'dy', 'dz', *PLACE, *LEAST, *GREATEST}
 """With these names, and one that is `name`, lengths are metres unless told otherwise."""
-LONG = 20.0
-"""Half of the boxes are longer only where their unit is not the metre [m]."""
+LONG = 20.0  # half of the boxes are longer only where their unit is not the metre [m]
 
 
 class Given(NamedTuple):
     """What the caller tells of a table, where the file does not."""
 
-    origin: str | None = None
-    """One of ORIGINS: what `x y z` are."""
-    unit: str | None = None
-    """One of UNITS, of all lengths."""
-    container: Sequence[float] | None = None
-    """(3,) inner size, in the unit of the file."""
-    columns: Mapping[str, str] = {}
-    """Which column has a role of ROLES, by role."""
-    ignore: Sequence[str] = ()
-    """Columns, or the first words of dotted ones, that decide on nothing."""
-    up: str | None = None
-    """One of UPS: the axis of the file that is up."""
-    turns: str | None = None
-    """One of TURNS."""
-    frames: str | None = None
-    """One of FRAMES: whether each container has a frame of its own."""
+    origin: str | None = None  # one of ORIGINS: what `x y z` are
+    unit: str | None = None  # one of UNITS, of all lengths
+    container: Sequence[float] | None = None  # (3,) inner size, in the unit of the file
+    columns: Mapping[str, str] = {}  # which column has a role of ROLES, by role
+    ignore: Sequence[str] = ()  # columns, or the first words of dotted ones, that decide on nothing
+    up: str | None = None  # one of UPS: the axis of the file that is up
+    turns: str | None = None  # one of TURNS
+    frames: str | None = None  # one of FRAMES: whether each container has a frame of its own
 
     def check(self) -> None:
         """Raise ValueError for what is none of the words."""
@@ -181,23 +172,18 @@ class Taken:
     """Which columns have which role, and how their numbers are read."""
 
     size: tuple[str, ...] = ()
-    is_along_file: bool = True
-    """Whether sizes are along the file's axes; else along x, y and up."""
-    place: tuple[str, ...] = ()
-    """Three columns, or six of two corners."""
+    is_along_file: bool = True  # whether sizes are along the file's axes; else along x, y and up
+    place: tuple[str, ...] = ()  # three columns, or six of two corners
     is_corner: bool = False
-    turn: tuple[str, ...] = ()
-    """Four columns of a quaternion."""
-    single: Mapping[str, str] = field(default_factory=dict)
-    """The columns of other roles."""
+    turn: tuple[str, ...] = ()  # four columns of a quaternion
+    single: Mapping[str, str] = field(default_factory=dict)  # the columns of other roles
     room: tuple[str, ...] = ()
     is_room_along_file: bool = True
     unit: str = 'm'
     mass_unit: str = 'kg'
     turns: str = 'degrees'
     up: str = 'z'
-    quiet: frozenset[str] = frozenset()
-    """Other columns that decide on nothing."""
+    quiet: frozenset[str] = frozenset()  # other columns that decide on nothing
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -13,10 +13,8 @@ from .plan import Plan
 
 SIDES = (('-x', '-y', '-z'), ('+x', '+y', '+z'))
 """Of a room, at its least and at its greatest corner."""
-ROUNDING = 1e-6
-"""By how much a wall may miss its room, or reach into it [m]."""
-THICKNESS = 0.1
-"""Of a container's walls and floor [m]."""
+ROUNDING = 1e-6  # by how much a wall may miss its room, or reach into it [m]
+THICKNESS = 0.1  # of a container's walls and floor [m]
 
 
 def beyond(plan: Plan, fixed: np.ndarray, tolerances: np.ndarray) -> np.ndarray:

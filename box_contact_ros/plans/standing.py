@@ -13,8 +13,7 @@ EDGE = 1e-6
 """What boxes share across gravity at least where one is above the other [m]: rounding is less."""
 
 
-MOST_LOOKS = 200_000_000
-"""Of boxes that hang at what may be below them: some 5 s."""
+MOST_LOOKS = 200_000_000  # of boxes that hang at what may be below them: some 5 s
 
 
 def across_of(direction: np.ndarray) -> np.ndarray:
