@@ -79,14 +79,17 @@ def hull_margins(points: np.ndarray, upper: np.ndarray, at: np.ndarray) -> np.nd
                               first * points.shape[1], np.ascontiguousarray(at))
 
 
-def standing(lower: np.ndarray, upper: np.ndarray, inside: np.ndarray, on_ground: np.ndarray,
-             ) -> np.ndarray:
-    """Return which of n stand: from the ground up, so a ring does not."""
+def standing(lower: np.ndarray, upper: np.ndarray, holds: np.ndarray, on_ground: np.ndarray, *,
+             on_all: bool = True) -> np.ndarray:
+    """Return which of n stand: from the ground up, so a ring does not.
+
+    They hold by themselves, and all that carries them stands, or else one that does.
+    """
+    least = np.bincount(upper, minlength=len(holds)) if on_all else 1
     stands = on_ground
     while True:
-        leans = ~inside
-        leans[upper[~stands[lower]]] = True
-        higher = on_ground | ~leans
+        carriers = np.bincount(upper[stands[lower]], minlength=len(holds))
+        higher = on_ground | holds & (carriers >= least)
         if np.array_equal(higher, stands):
             return stands
         stands = higher
