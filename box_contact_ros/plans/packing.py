@@ -43,7 +43,6 @@ from .table import Record, Table
 
 FIXED = {'true': True, '1': True, 'yes': True, 'false': False, '0': False, 'no': False, '': False}
 """What `fixed` may be."""
-"""Name, thickness, and how far it reaches beyond the boxes [m]."""
 ROOM = 1.0  # between the containers of one file, which are placed side by side [m]
 LONG, LONG_ROOM, FULL = 20.0, 30.0, 5.0
 """A container is longer, or shorter than a box by more, only where their units differ [m, m, 1]."""
@@ -111,8 +110,7 @@ def read_packing(tables: Sequence[Table], given: Given) -> tuple[Plan, str]:
         len(finder.taken.columns), len(finder.table.records)))
     if finder in able and not given.up:
         _ask_up(finder)
-    if finder.open.questions:
-        raise ValueError(str(finder.open))
+    finder.check()
     return _read(every, finder.table, finder.taken, given, None)
 
 
@@ -125,7 +123,7 @@ def _ask_up(finder: Finder) -> None:
     taken, given, table = finder.taken, finder.given, finder.table
     in_file = sorted(taken.size, key=table.columns.index)
     says_y = not taken.is_along_file and in_file[1] == taken.size[2]
-    is_asked = '--origin' in finder.open.options
+    is_asked = '--origin' in finder.options
     is_open = is_asked or len(table.records) > 2 and not given.origin and [*PLACE] == [
         word_of(name).key for name in taken.place]
 
@@ -143,7 +141,7 @@ def _ask_up(finder: Finder) -> None:
         return
     if is_corner and not (taken.is_corner or is_asked):
         finder.ask_origin(taken.place)
-    finder.open.ask(f'which axis is up, {up} or {"z" if up != "z" else "y"}?', '--up', up)
+    finder.ask(f'which axis is up, {up} or {"z" if up != "z" else "y"}?', '--up', up)
 
 
 def _fallen(table: Table, taken: Taken, given: Given) -> int:
@@ -555,12 +553,9 @@ def _loading(boxes: Sequence[Box], faults: list[Fault]) -> list[int] | None:
     free = [box for box in boxes if not box.fixed]
     if all(box.order is None for box in free):
         return None
-    lack = tuple(box.name for box in free if not _is_whole_number(box.order))
+    lack = tuple(box.name for box in free if box.order is None or not (
+        box.order.is_integer() and abs(box.order) <= MOST_STEPS))
     if lack:
         faults.append(Fault('order', lack, 'has no whole number: steps are not judged'))
         return None
     return [0 if box.fixed else int(box.order or 0) for box in boxes]
-
-
-def _is_whole_number(value: float | None) -> bool:
-    return value is not None and value.is_integer() and abs(value) <= MOST_STEPS

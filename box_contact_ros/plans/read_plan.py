@@ -76,11 +76,12 @@ def _read(file: Path, data: bytes, given: Given) -> ReadPlan:
     if start[:1] in ('{', '['):
         plan, taken = read_packing(_tables(data), given)
         return ReadPlan(plan, 'faces', taken)
-    first = next(filter(is_first, start.splitlines()), '')
-    is_edi = start[:4] in ('UNA:', 'UNB+') or start[:3] in ('UNA', 'UNB', 'UNH') or ending == '.edi'
-    if not is_edi and (ending in ('.csv', '.tsv') or _is_table(first)):
-        plan, taken = read_packing([read_csv(data.decode('utf-8'))], given)
-        return ReadPlan(plan, 'faces', taken)
+    is_edi = start[:3] in ('UNA', 'UNB', 'UNH') or ending == '.edi'
+    if not is_edi:
+        cells, delimiter = header_of(next(filter(is_first, start.splitlines()), ''))
+        if ending in ('.csv', '.tsv') or is_header(cells) or delimiter and len(cells) >= FEWEST:
+            plan, taken = read_packing([read_csv(data.decode('utf-8'))], given)
+            return ReadPlan(plan, 'faces', taken)
     for name, value in given._asdict().items():
         if value:
             raise ValueError(f'{name} must not be given: it is for CSV and JSON alone')
@@ -91,12 +92,6 @@ def _read(file: Path, data: bytes, given: Given) -> ReadPlan:
     shown = start.partition('\n')[0].strip()[:60].lower()
     raise ValueError(f'line 1: {shown!r} begins no format that is read: {FORMATS}' if shown else
                      f'it is empty; what is read: {FORMATS}')
-
-
-def _is_table(line: str) -> bool:
-    """Return whether a line is a header, whatever its file is called."""
-    cells, delimiter = header_of(line)
-    return is_header(cells) or bool(delimiter) and len(cells) >= FEWEST
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

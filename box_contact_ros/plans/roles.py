@@ -211,24 +211,6 @@ def _from(roles: Sequence[str], columns: Sequence[str]) -> str:
     return ' '.join(columns) if same else f'{" ".join(roles)} from {" ".join(columns)}'
 
 
-@dataclass
-class Open:
-    """What is open, and options that answer it."""
-
-    questions: list[str] = field(default_factory=list)
-    options: list[str] = field(default_factory=list)
-
-    def ask(self, question: str, *options: str) -> None:
-        """Add a question, with options as they are typed."""
-        self.questions.append(question)
-        self.options += options
-
-    def __str__(self) -> str:
-        """Return one message with all of it."""
-        hint = f'; if it is so, add {shlex.join(self.options)}' if self.options else ''
-        return f'{"; ".join(self.questions)}{hint}'
-
-
 def words_of(option: str, values: Iterable[str]) -> list[str]:
     """Return an option with each of its values, as they are typed."""
     return [word for value in values for word in (option, value)]
@@ -239,7 +221,9 @@ class Finder:
 
     def __init__(self, table: Table, given: Given) -> None:
         """Find them. Raises ValueError for what contradicts the file."""
-        self.table, self.given, self.open = table, given, Open()
+        self.table, self.given = table, given
+        self.questions: list[str] = []
+        self.options: list[str] = []
         told = {column: role for role, column in given.columns.items()}
         for column in told:
             if column not in table.columns:
@@ -255,7 +239,7 @@ class Finder:
         size, place, turn = (self._one(group) for group in GROUPS)
         single = self._singles()
         if place and place.kind == 'corners' and size:
-            self.open.ask(f'which tells the size, {" ".join(size.words)} or two corners?',
+            self.ask(f'which tells the size, {" ".join(size.words)} or two corners?',
                           *words_of('--ignore', size.words))
             size = None
         kind = place.kind if place else ''
@@ -272,18 +256,29 @@ class Finder:
         self._ask_missing(size or kind == 'corners', place, taken)
         angles = [single[role] for role in ANGLES if role in single]
         if turn and angles:
-            self.open.ask(f'which is the turn, {" ".join(turn.words)} or {" ".join(angles)}?',
+            self.ask(f'which is the turn, {" ".join(turn.words)} or {" ".join(angles)}?',
                           *words_of('--ignore', angles))
         taken = replace(taken, unit=self._length_unit(taken), turns=self._angle_unit(angles))
-        is_low = kind == 'centre' and self.open.questions and place and min(
+        is_low = kind == 'centre' and self.questions and place and min(
             self.table.numbers(place.words['xyz'.index(taken.up)]), default=1.0) <= 0.0
         if place and not given.origin and (not kind or is_low):
             self.ask_origin(place.words)
         return taken
 
+    def ask(self, question: str, *options: str) -> None:
+        """Add a question, with options as they are typed."""
+        self.questions.append(question)
+        self.options += options
+
+    def check(self) -> None:
+        """Raise ValueError with all that is open, and options that answer it."""
+        if self.questions:
+            hint = f'; if it is so, add {shlex.join(self.options)}' if self.options else ''
+            raise ValueError(f'{"; ".join(self.questions)}{hint}')
+
     def ask_origin(self, place: Sequence[str]) -> None:
         """Ask what the columns of a place are."""
-        self.open.ask(f'are {" ".join(place)} centres or least corners?', '--origin', 'corner')
+        self.ask(f'are {" ".join(place)} centres or least corners?', '--origin', 'corner')
 
     def _lines(self, group: str) -> list[Line]:
         """Return the lines of a group whose columns are all there, with these; '' is another."""
@@ -308,7 +303,7 @@ class Finder:
         if len(found) > 1:
             ways = ' or '.join(' '.join(line.words) for line in found)
             others = {name for line in found[1:] for name in line.words} - {*found[0].words}
-            self.open.ask(f'which is the {group}, {ways}?', *words_of('--ignore', sorted(others)))
+            self.ask(f'which is the {group}, {ways}?', *words_of('--ignore', sorted(others)))
         return found[0] if found else None
 
     def _singles(self) -> dict[str, str]:
@@ -330,13 +325,13 @@ class Finder:
         for role, words in RIVALS.items():
             rivals = [name for name, word in self.words.items() if word.key in words.split()]
             if rivals and role not in found:
-                self.open.ask(f'is {rivals[0]} the {role}?', *words_of(
+                self.ask(f'is {rivals[0]} the {role}?', *words_of(
                     '--column', [f'{role}={rivals[0]}']), *words_of('--ignore', rivals[1:]))
             elif rivals and role not in self.given.columns:
                 found[role] += rivals
         for role, columns in found.items():
             if len(columns) > 1:
-                self.open.ask(f'which is the {role}, {" or ".join(columns)}?',
+                self.ask(f'which is the {role}, {" or ".join(columns)}?',
                               *words_of('--ignore', columns[1:]))
         return {role: columns[0] for role, columns in found.items()}
 
@@ -378,7 +373,7 @@ class Finder:
         if 'name' in names and {name.lower() for name in (*taken.size, *taken.place)} <= MINE and (
                 middle <= LONG):
             return 'm'
-        self.open.ask('in which unit are lengths (m, cm, mm, in, ft)?', '--unit',
+        self.ask('in which unit are lengths (m, cm, mm, in, ft)?', '--unit',
                       'mm' if middle > 100.0 else 'cm' if middle > LONG / 4.0 else 'm')
         return 'm'
 
@@ -389,7 +384,7 @@ class Finder:
             return unit or 'degrees'
         if any(abs(value) > 2.0 * math.pi for value in values):
             return 'degrees'
-        self.open.ask(f'is {" ".join(columns)} in degrees or radians?', '--turns', 'radians')
+        self.ask(f'is {" ".join(columns)} in degrees or radians?', '--turns', 'radians')
         return 'degrees'
 
     def _ask_missing(self, size: object, place: object, taken: Taken) -> None:
@@ -409,7 +404,7 @@ class Finder:
             if not there:
                 some = [names for names in whole if size or place or is_size == all(
                     value > 0.0 for name in names for value in self.table.numbers(name))][:1]
-                self.open.ask(f'which columns are {what} ({" ".join(roles)})?{hint}', *(
+                self.ask(f'which columns are {what} ({" ".join(roles)})?{hint}', *(
                     word for names in some for word in words_of(
                         '--column', map('='.join, zip(roles, names)))))
 

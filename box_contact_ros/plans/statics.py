@@ -431,8 +431,6 @@ class _Programme:
 
         rubs = np.flatnonzero(bound > 0.0)
         share = csc_matrix((len(rubs), len(self.point)))
-        if not len(rubs):
-            return _Friction(csc_matrix((len(self.wanted), 0)), np.zeros(0), bound[rubs], share)
         rows = self.rows[rubs]
         normal, radius = self.beds.normal[rows], ROUGH * self.beds.radius[rows]
         aside = np.where(np.abs(normal[:, :1]) < 0.6, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
