@@ -115,59 +115,68 @@ def read_packing(tables: Sequence[Table], given: Given) -> tuple[Plan, str]:
 
 
 def _ask_up(finder: Finder) -> None:
-    """Ask which axis is up where words tell y, or where most boxes stand only if it is not z.
+    """Ask which axis is up where words tell y, or where boxes stand in piles only if it is not z.
 
     Words tell y if the height is listed between the other sizes, as y is between x and z. The
-    origin is asked, too, if boxes stand by least corners alone; two boxes tell too little of it.
+    origin is asked, too, if boxes stand by least corners alone.
     """
-    taken, given, table = finder.taken, finder.given, finder.table
+    taken, table = finder.taken, finder.table
     in_file = sorted(taken.size, key=table.columns.index)
     says_y = not taken.is_along_file and in_file[1] == taken.size[2]
-    is_asked = '--origin' in finder.options
-    is_open = is_asked or len(table.records) > 2 and not given.origin and [*PLACE] == [
-        word_of(name).key for name in taken.place]
-
-    def fallen(up: str, is_corner: bool) -> int:
-        return _fallen(table, replace(taken, up=up, is_corner=is_corner), given)
-
-    if not says_y and fallen('z', taken.is_corner) <= max(1, len(table.records) // 2):
+    try:
+        boxes = _Rows(table, taken, finder.given, None).boxes()
+    except ValueError:  # which is told when the table is read
+        boxes = []
+    if not boxes:
         return
+    half = np.array([box.half for box in boxes])
+    place = np.array([box.pose[:3] for box in boxes]) - taken.is_corner * half
+
+    def fallen(up: str, is_corner: bool) -> tuple[int, bool, bool]:
+        axes = AXES[up]
+        reach = half[:, axes] if taken.is_along_file else half
+        count, has_piles = _fallen(boxes, place[:, axes] + is_corner * reach, reach)
+        return count, is_corner, has_piles
+
+    if not says_y and fallen('z', taken.is_corner)[0] == 0:
+        return
+    is_asked = '--origin' in finder.options
+    is_open = is_asked or not finder.given.origin and [*PLACE] == [
+        word_of(name).key for name in taken.place]
     corners = sorted({taken.is_corner, taken.is_corner or is_open})
-    readings = {up: min((fallen(up, is_corner), is_corner) for is_corner in corners)
-                for up in 'yzx'}
+    readings = {up: min(fallen(up, is_corner) for is_corner in corners) for up in 'yzx'}
     up = min(readings, key=lambda up: readings[up][0])
-    count, is_corner = readings[up]
-    if not says_y and 2 * count >= readings['z'][0]:
+    count, is_corner, has_piles = readings[up]
+    is_sure = has_piles and (count == 0 or 2 * count < readings['z'][0] > len(boxes) // 2)
+    if not says_y and (up == 'z' or not is_sure):
         return
     if is_corner and not (taken.is_corner or is_asked):
         finder.ask_origin(taken.place)
     finder.ask(f'which axis is up, {up} or {"z" if up != "z" else "y"}?', '--up', up)
 
 
-def _fallen(table: Table, taken: Taken, given: Given) -> int:
-    """Return how many rows are not placed by a reading, hang, or overlap others.
+def _fallen(boxes: Sequence[Box], centre: np.ndarray, half: np.ndarray) -> tuple[int, bool]:
+    """Return how many boxes hang or overlap others, by bounding boxes, and if one is on another.
 
-    What is at z = 0 stands, too. Containers are judged each by itself.
+    centre, half: (n, 3) by a reading. What is at z = 0 stands, too; containers are apart.
     """
+    stack = np.array([box.stack for box in boxes])
+    low, slack = centre[:, 2] - half[:, 2], SLACK * 2.0 * half.min(axis=1)
+    poses = np.hstack((centre, np.tile(UNTURNED, (len(boxes), 1))))
+    poses[:, 0] += 3.0 * (np.abs(centre[:, 0]) + half[:, 0]).max() * stack
     try:
-        boxes = _Rows(table, taken, given, None).boxes()
-        stack = np.array([box.stack for box in boxes])
-        sizes, poses, half = (np.array([getattr(box, name) for box in boxes]).reshape(
-            len(boxes), -1) for name in ('size', 'pose', 'half'))
-        slack = SLACK * sizes.min(axis=1, initial=np.inf)
-        low = poses[:, 2] - half[:, 2]
-        poses[:, 0] += 3.0 * (np.abs(poses[:, 0]) + half[:, 0]).max(initial=0.0) * stack
-        pairs, contacts = contacts_of(sizes, poses, tolerance=slack,
+        pairs, contacts = contacts_of(2.0 * half, poses, tolerance=slack,
                                       most_near=most_near(len(boxes)))
-    except ValueError:  # such as TooManyNear
-        return len(table.records)
+    except ValueError:  # too many near each other, or containers that reach too far
+        return len(boxes), False
     rise = contacts.normal[:, 2]
+    upper = np.where(rise > 0.0, pairs[:, 1], pairs[:, 0])[np.abs(rise) > 0.5]
     stands = np.abs(low) <= slack
-    stands[np.where(rise > 0.0, pairs[:, 1], pairs[:, 0])[np.abs(rise) > 0.5]] = True
+    stands[upper] = True
     stands[pairs[-contacts.separation > slack[pairs].min(axis=1)].ravel()] = False
     stands[low < -slack] = False
     stands |= [box.fixed for box in boxes]
-    return len(table.records) - int(np.count_nonzero(stands))
+    return len(boxes) - int(np.count_nonzero(stands)), len(upper) > 0
 
 
 def _formed(form: Form, given: Given) -> Taken:

@@ -137,12 +137,47 @@ LAYER = ('a,1,1,1,.5,.5,.5', 'b,1,1,1,1.5,.5,.5', 'c,1,1,1,.5,1.5,.5', 'd,1,1,1,
     ((*LAYER[:3], 'd,1,1,1,1.5,1.5,2'), [], 1), (('a,1,1,1,.5,.5,3',), [], 1),
     (('a,1,1,1,3,.5,.7', 'b,1,1,1,3,1.5,.7'), ['--up', 'z'], 1),
     (('a,1,1,1,3,.5,.7', 'b,1,1,1,3,1.5,.7'), ['--up', 'y'], 0),
-    (('a,1,1,1,3,.5,.7', 'b,1,1,1,3,1.5,.7'), [], 2)])
+    (('a,1,1,1,3,.5,.7', 'b,1,1,1,3,1.5,.7'), [], 2),
+    (('a,1,1,1,3,.5,3', 'b,1,1,1,4,.5,4'), [], 1)])
 def test_the_axis_that_is_up_is_asked_only_where_most_stand_by_another(
         cells, options, status, tmp_path, capsys):
-    """A layer on the floor, one box that hangs among others or alone, and a pile along y."""
+    """A layer on the floor, one box that hangs among others or alone, a row and a pile along y."""
     assert inspect_files.main([str(written(tmp_path, 'a.csv', sheet(*cells))), *options]) == status
     assert ('add --up y' in capsys.readouterr().err) == (status == 2)
+
+
+def pile(rng):
+    """Return least corners and sizes (n, 6) of boxes in columns, without a gap or with some."""
+    boxes, x = [], rng.choice((0, 0.4))
+    for width in rng.uniform(0.3, 0.9, rng.integers(1, 5)):
+        y = rng.choice((0, 0.3))
+        for depth in rng.uniform(0.3, 0.9, rng.integers(1, 4)):
+            heights = rng.uniform(0.1, 0.6, rng.integers(1, 5))
+            boxes += [(x, y, top - height, width, depth, height)
+                      for top, height in zip(heights.cumsum(), heights)]
+            y += depth
+        x += width
+    return np.array(boxes)
+
+
+@pytest.mark.parametrize('is_corner', [False, True])
+def test_piles_with_y_up_are_asked_and_others_are_read(is_corner, tmp_path):
+    """All that are sound with z up are read; of those with y up some are sound by both readings."""
+    place, answers = 'x_min,y_min,z_min' if is_corner else 'x,y,z', []
+    for seed in range(100):
+        boxes = pile(np.random.default_rng(seed))
+        boxes[:, :3] += 0 if is_corner else boxes[:, 3:] / 2
+        for order in ([0, 1, 2], [0, 2, 1]):
+            rows = np.hstack((boxes[:, order], boxes[:, 3:][:, order])).round(6).tolist()
+            path = written(tmp_path, 'a.csv', '\n'.join((f'name,{place},lx,ly,lz', *(
+                ','.join(map(str, (n, *row))) for n, row in enumerate(rows)), '')))
+            try:
+                answers.append(inspect_plan(read_plan(path)).verdict)
+            except ValueError as error:
+                answers.append(str(error).rpartition('add ')[2])
+    assert answers[::2] == ['sound'] * 100
+    by_y = [answer for answer in answers[1::2] if answer != 'sound']
+    assert by_y.count('--up y') > max(50, 0.9 * len(by_y))
 
 
 def test_a_height_between_the_other_sizes_tells_no_axis(tmp_path):
