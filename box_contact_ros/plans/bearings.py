@@ -4,7 +4,7 @@
 """Where patches bear: all over, or at the corners of a box, as containers do."""
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,10 +26,6 @@ class Bearings:
 
     def __getitem__(self, rows: np.ndarray) -> Bearings:
         return Bearings(self.point[rows], self.stiffness[rows], self.hull[rows])
-
-    def in_frame(self, axes: np.ndarray) -> Bearings:
-        """Return the same in a frame with these axes, as rows (3, 3)."""
-        return replace(self, point=self.point @ axes.T, hull=self.hull @ axes.T)
 
 
 def on_faces(patches: FacePatches) -> Bearings:

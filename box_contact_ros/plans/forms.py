@@ -7,7 +7,7 @@ A table is known by its whole header, one of JSON by columns that no other has.
 """
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from .roles import Taken
@@ -84,8 +84,3 @@ def form_of(table: Table) -> Form | None:
     return replace(form, above=above, taken=replace(
         form.taken, single=single, room=above.get('room', ()),
         quiet=form.taken.quiet | {*above.get('most', ())}))
-
-
-def is_header(cells: Sequence[str]) -> bool:
-    """Return whether these cells are the header of a form."""
-    return tuple(cells) in {form.header for form in FORMS}

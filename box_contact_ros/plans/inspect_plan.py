@@ -17,12 +17,13 @@ from ..extras import require
 from ..solver.checks import as_floats, as_number, short_repr
 from ..solver.contacts_of import TooManyNear, contacts_of
 from ..solver.faces import TOLERANCE, corner_shares
+from ..solver.pose import rotation_matrix
 from .inspection import OVER, Inspection
 from .meetings import Meetings, beds_of, bodies_of, mass_centres, meetings_of, most_near
 from .plan import Fault, Plan
 from .read_plan import read_any
 from .room import are_beyond, beyond
-from .standing import base_areas, heights
+from .standing import heights
 from .statics import Bodies, Rest, Work, settle
 from .steps import falls_of
 from .verdict import verdict_of
@@ -206,7 +207,10 @@ def _judged(plan: Plan, meet: Meetings, bodies: Bodies, work: Work, tolerances: 
             'not judged: too many boxes bear on each other')))
     lower, upper = meet.pairs[meet.carries].T
     area = (meet.patches.area * (meet.normal @ up))[meet.carries]
-    share = np.bincount(upper, area, count) / base_areas(plan.sizes, plan.poses, up)
+    turned = np.abs(up @ rotation_matrix(plan.poses[:, 3:]))  # cosines of the faces of each box
+    face = np.arange(count), turned.argmax(axis=1)  # most across `up`
+    base = plan.sizes.prod(axis=1) / plan.sizes[face] * turned[face]
+    share = np.bincount(upper, area, count) / base
     share = np.minimum(share, 1.0)  # what carries a box may overlap
     share[meet.fixed[body]] = 1.0
     pressing = np.full(len(meet.pairs), np.nan) if rest is None else rest.load

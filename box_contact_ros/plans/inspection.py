@@ -282,7 +282,10 @@ class Inspection(NoTruth):
             height = self.height[box]
             return (f'{1e3 * height:.1f} mm above what is below' if np.isfinite(height) else
                     'above nothing' if np.isinf(height) else 'by an unknown height') + end
-        return f'share {self.share[box]:.2f}, centre {_side(self.margin[box])}{end}'
+        margin = self.margin[box]
+        side = (f'{1e3 * abs(margin):.0f} mm {"inside" if margin > 0.0 else "outside"}'
+                if np.isfinite(margin) else 'on nothing')
+        return f'share {self.share[box]:.2f}, centre {side}{end}'
 
     def _steps(self) -> Iterator[Row]:
         """Yield rows of what falls while the plan is loaded, and not in the whole of it."""
@@ -376,9 +379,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
-
-
-def _side(margin: float) -> str:
-    if not np.isfinite(margin):
-        return 'on nothing'
-    return f'{1e3 * abs(margin):.0f} mm {"inside" if margin > 0.0 else "outside"}'

@@ -164,12 +164,6 @@ class KeptLoads:
         edges = hull_edges(self._hull[rows].reshape(-1, 2))
         return _Stand(rows, edges, need, _planes(*edges, need))
 
-    def _points(self, stand: _Stand) -> tuple[np.ndarray, np.ndarray]:
-        """Return places at which several patches press, as the programmes move them."""
-        points, depth = pulled_in(self._hull[stand.rows].reshape(-1, 2), *stand.edges, stand.need)
-        kept = depth > stand.need / SURELY
-        return points[kept], np.repeat(np.arange(len(stand.rows)), self._hull.shape[1])[kept]
-
     def _spread(self, body: int, stand: _Stand, goal: Force) -> list[tuple[int, Force]] | None:
         """Return what patches have to carry more, or less, so that they carry the goal.
 
@@ -178,7 +172,13 @@ class KeptLoads:
         centre, size = self._bodies.centre[body, :2], self._bodies.gyration[body]
         before = np.array([self._load[row] for row in stand.rows]) / goal[0]
         rows = np.flatnonzero((before[:, 0] > 0.0) & (not self._is_braced[body]))
-        points, of_point = stand.points = stand.points or self._points(stand)
+        if stand.points is None:  # as the programmes move them
+            points, depth = pulled_in(self._hull[stand.rows].reshape(-1, 2), *stand.edges,
+                                      stand.need)
+            kept = depth > stand.need / SURELY
+            of_point = np.repeat(np.arange(len(stand.rows)), self._hull.shape[1])
+            stand.points = points[kept], of_point[kept]
+        points, of_point = stand.points
         place = np.vstack((points, before[rows, 1:] / before[rows, :1]))
         patch = np.append(of_point, rows)
         given = np.vstack((np.ones(len(place)), (place - centre).T / size))

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from ..resources import read_regular
 from ..solver.checks import short_repr
 from .baplie import read_baplie
-from .forms import is_header
+from .forms import FORMS
 from .packing import read_packing
 from .plan import MOST_BYTES, Plan
 from .roles import NOTHING, Given
@@ -79,7 +79,8 @@ def _read(file: Path, data: bytes, given: Given) -> ReadPlan:
     is_edi = start[:3] in ('UNA', 'UNB', 'UNH') or ending == '.edi'
     if not is_edi:
         cells, delimiter = header_of(next(filter(is_first, start.splitlines()), ''))
-        if ending in ('.csv', '.tsv') or is_header(cells) or delimiter and len(cells) >= FEWEST:
+        if ending in ('.csv', '.tsv') or delimiter and len(cells) >= FEWEST or any(
+                form.header == tuple(cells) for form in FORMS):
             plan, taken = read_packing([read_csv(data.decode('utf-8'))], given)
             return ReadPlan(plan, 'faces', taken)
     for name, value in given._asdict().items():
