@@ -117,22 +117,16 @@ def part(segment: list[str], place: int) -> str:
 
 
 def cuts(parts: list[list[str]]) -> Iterator[Fault]:
-    """Yield a fault for each message whose UNT is missing, or counts other segments."""
-    start = None
+    """Yield a fault for each UNT that counts other segments, and where UNH and UNT are no pairs."""
+    start, tags = 0, [segment[0] for segment in parts]
     for place, segment in enumerate(parts):
         if segment[0] == 'UNH':
-            if start is not None:
-                yield Fault('cut', (), 'a message has no UNT at its end: a part may be missing')
             start = place
-        elif segment[0] == 'UNT':
-            begin, start = start, None
-            if begin is None:
-                yield Fault('cut', (), 'a message has no UNH at its start: a part may be missing')
-            elif part(segment, 1).lstrip('0') != str(count := place + 1 - begin):
-                yield Fault('cut', (), f'UNT counts {_shown(part(segment, 1)) or "no"} segments, '
-                                       f'and there are {count}')
-    if start is not None or all(segment[0] != 'UNT' for segment in parts):
-        yield Fault('cut', (), 'the file has no UNT at its end: a part may be missing')
+        elif segment[0] == 'UNT' and part(segment, 1).lstrip('0') != str(place + 1 - start):
+            yield Fault('cut', (), f'UNT counts {_shown(part(segment, 1)) or "no"} segments, and '
+                                   f'there are {place + 1 - start}')
+    if 'UNT' not in tags or tags.count('UNT') != tags.count('UNH'):
+        yield Fault('cut', (), 'the file has no UNT for each UNH: a part may be missing')
 
 
 def containers(parts: Iterable[list[str]]) -> Iterator[Stowed]:
@@ -394,4 +388,3 @@ def _stack(boxes: list[Placed], left_out: list[Slot], on_deck: bool, size: np.nd
             bases[blocks[n]].add(box.tier)
         pose[n, 2] = floor + size[n, 2] / 2.0
     return lowest
-

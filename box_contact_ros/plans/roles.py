@@ -240,7 +240,7 @@ class Finder:
         single = self._singles()
         if place and place.kind == 'corners' and size:
             self.ask(f'which tells the size, {" ".join(size.words)} or two corners?',
-                          *words_of('--ignore', size.words))
+                     *words_of('--ignore', size.words))
             size = None
         kind = place.kind if place else ''
         if place and given.origin and kind in ('corner', 'corners') and given.origin != 'corner':
@@ -257,7 +257,7 @@ class Finder:
         angles = [single[role] for role in ANGLES if role in single]
         if turn and angles:
             self.ask(f'which is the turn, {" ".join(turn.words)} or {" ".join(angles)}?',
-                          *words_of('--ignore', angles))
+                     *words_of('--ignore', angles))
         taken = replace(taken, unit=self._length_unit(taken), turns=self._angle_unit(angles))
         is_low = kind == 'centre' and self.questions and place and min(
             self.table.numbers(place.words['xyz'.index(taken.up)]), default=1.0) <= 0.0
@@ -332,7 +332,7 @@ class Finder:
         for role, columns in found.items():
             if len(columns) > 1:
                 self.ask(f'which is the {role}, {" or ".join(columns)}?',
-                              *words_of('--ignore', columns[1:]))
+                         *words_of('--ignore', columns[1:]))
         return {role: columns[0] for role, columns in found.items()}
 
     def _room(self) -> Line | None:
@@ -374,7 +374,7 @@ class Finder:
                 middle <= LONG):
             return 'm'
         self.ask('in which unit are lengths (m, cm, mm, in, ft)?', '--unit',
-                      'mm' if middle > 100.0 else 'cm' if middle > LONG / 4.0 else 'm')
+                 'mm' if middle > 100.0 else 'cm' if middle > LONG / 4.0 else 'm')
         return 'm'
 
     def _angle_unit(self, columns: Sequence[str]) -> str:
