@@ -40,21 +40,18 @@ FIRST_ON_DECK, LAST_BASE = 80, 84
 """Tiers: what is on deck, and the highest on which a stack may begin without one beside it."""
 SLAB = 0.1  # thickness [m]
 SHIP = 'ship'
-UNITS = {'KGM': 1.0, 'KG': 1.0, 'T': 1000.0, 'LBR': 0.45359237, 'TNE': 1000.0}
-"""Of masses [kg]."""
+UNITS = {'KGM': 1.0, 'KG': 1.0, 'T': 1000.0, 'LBR': 0.45359237, 'TNE': 1000.0}  # of masses [kg]
 LIGHTEST, HEAVIEST = 1e3, 60e3
 """[kg] of a container with its goods. An empty 10 ft has 1.3 t, and the standard allows 36 t. What
 is below may have been written with a mark of thousands, or in tonnes."""
 MESSAGES = ('BAPLIE', 'MOVINS')
 """A stowage plan, and stowage instructions, which have the same segments."""
-NOT_STOWED = '9999999'
-"""The slot of a container that has none yet."""
+NOT_STOWED = '9999999'  # the slot of a container that has none yet
 GROSS = ('WT', 'VGM', 'G', 'AET')
 """What MEA calls the mass of a container with its goods; VGM is that which was weighed."""
 OVERS = {'5': 'in front', '6': 'behind', '7': 'on the right', '8': 'on the left', '9': 'in height'}
 """Sides to which goods reach beyond a container, by the qualifier of DIM."""
-ESCAPED = 0xE000
-"""Private characters from here on stand for those that `?` releases."""
+ESCAPED = 0xE000  # private characters from here on stand for those that `?` releases
 
 
 @dataclass
@@ -120,22 +117,16 @@ def part(segment: list[str], place: int) -> str:
 
 
 def cuts(parts: list[list[str]]) -> Iterator[Fault]:
-    """Yield a fault for each message whose UNT is missing, or counts other segments."""
-    start = None
+    """Yield a fault for each UNT that counts other segments, and where UNH and UNT are no pairs."""
+    start, tags = 0, [segment[0] for segment in parts]
     for place, segment in enumerate(parts):
         if segment[0] == 'UNH':
-            if start is not None:
-                yield Fault('cut', (), 'a message has no UNT at its end: a part may be missing')
             start = place
-        elif segment[0] == 'UNT':
-            begin, start = start, None
-            if begin is None:
-                yield Fault('cut', (), 'a message has no UNH at its start: a part may be missing')
-            elif part(segment, 1).lstrip('0') != str(count := place + 1 - begin):
-                yield Fault('cut', (), f'UNT counts {_shown(part(segment, 1)) or "no"} segments, '
-                                       f'and there are {count}')
-    if start is not None or all(segment[0] != 'UNT' for segment in parts):
-        yield Fault('cut', (), 'the file has no UNT at its end: a part may be missing')
+        elif segment[0] == 'UNT' and part(segment, 1).lstrip('0') != str(place + 1 - start):
+            yield Fault('cut', (), f'UNT counts {_shown(part(segment, 1)) or "no"} segments, and '
+                                   f'there are {place + 1 - start}')
+    if 'UNT' not in tags or tags.count('UNT') != tags.count('UNH'):
+        yield Fault('cut', (), 'the file has no UNT for each UNH: a part may be missing')
 
 
 def containers(parts: Iterable[list[str]]) -> Iterator[Stowed]:
@@ -234,9 +225,8 @@ def checked(rows: Iterable[Stowed], faults: list[Fault]) -> tuple[list[Placed], 
     rows = list(rows)
     placed: dict[str, Placed] = {}
     slot_of: dict[str, str] = {}
-    unknown: dict[str, list[str]] = defaultdict(list)
-    forms: dict[int, list[str]] = defaultdict(list)
-    not_stowed, breakbulk = [], []
+    gone: dict[tuple[str, str], list[str]] = defaultdict(list)  # names, by kind and reason
+    left_out: list[str] = []
     if all(re.fullmatch(f'[0-9]{{6}}|{NOT_STOWED}|', row.slot) for row in rows):  # BBRRTT
         for row in rows:
             row.slot = row.slot.rjust(7, '0') if row.slot else ''
@@ -246,40 +236,32 @@ def checked(rows: Iterable[Stowed], faults: list[Fault]) -> tuple[list[Placed], 
             faults.append(Fault('goods', (row.name,), 'reaches beyond its container, which is not '
                                                       f'judged: {", ".join(row.over)}'))
         if row.slot == NOT_STOWED:
-            not_stowed.append(row.number or row.slot)
+            gone['slot', f'not stowed ({NOT_STOWED})'].append(row.number or row.slot)
         elif not row.is_container:
-            breakbulk.append(row)
+            gone['slot', 'breakbulk (EQD+BB), of which no size is known'].append(row.name)
+            left_out.append(row.slot)
         elif not re.fullmatch('(?!000)[0-9]{7}', row.slot):  # bays begin at 1
-            forms[len(row.slot)].append(row.name)
+            why = (f'slots of {len(row.slot)} characters are not known, only 7 digits (bay from '
+                   '001, row, tier)' if row.slot else 'without a slot (LOC+147)')
+            gone['slot', why].append(row.name)
         elif row.slot in placed:
             faults.append(Fault('slot taken', (row.slot,), f'{row.number or "a container"} has the '
                                 f'slot of {placed[row.slot].number or "another"}: left out'))
         elif size is None:
-            unknown[row.kind].append(row.slot)
+            why = (f'of the type {row.kind} no size is known' if row.kind else
+                   'without a size type (EQD)')
+            gone['size type', why].append(row.slot)
+            left_out.append(row.slot)
         else:
             other = slot_of.setdefault(row.number, row.slot) if row.number else row.slot
             if other != row.slot:
                 faults.append(Fault('twice', (row.slot,), f'{row.number} is at {other}, too'))
             mass = _mass(row, faults)
             placed[row.slot] = Placed(row.slot, row.number, *_numbers(row.slot), size, mass)
-    for count, names in forms.items():
-        faults.append(Fault('slot', tuple(names), (
-            f'slots of {count} characters are not known, only 7 digits (bay from 001, row, tier)'
-            if count else 'without a slot (LOC+147)') + ': left out'))
-    for kind, names in unknown.items():
-        faults.append(Fault('size type', tuple(names), (
-            f'of the type {kind} no size is known' if kind else 'without a size type (EQD)')
-            + ': left out'))
-    if not_stowed:
-        faults.append(Fault('slot', tuple(not_stowed), f'not stowed ({NOT_STOWED}): left out'))
-    if breakbulk:
-        faults.append(Fault('slot', tuple(row.name for row in breakbulk), 'breakbulk (EQD+BB), of '
-                            'which no size is known: left out'))
+    faults += [Fault(kind, tuple(names), f'{why}: left out') for (kind, why), names in gone.items()]
     if not placed:
         fault = next(fault for fault in faults if fault.kind in ('slot', 'size type'))
         raise ValueError(f'no container can be placed; {fault.kind} {fault.names[0]}: {fault.text}')
-    left_out = [row.slot for row in breakbulk] + [slot for some in unknown.values()
-                                                  for slot in some]
     return sorted(placed.values(), key=lambda box: (box.tier, box.slot)), [
         _numbers(slot) for slot in left_out if re.fullmatch('[0-9]{7}', slot)]
 
@@ -359,7 +341,10 @@ def _stack(boxes: list[Placed], left_out: list[Slot], on_deck: bool, size: np.nd
 
     held: gets what is on something that is left out.
     """
-    missing = _by_row(left_out, on_deck)
+    missing: dict[int, list[tuple[int, int]]] = defaultdict(list)  # bays and tiers, by row
+    for bay, row, tier in left_out:
+        if (tier >= FIRST_ON_DECK) == on_deck:
+            missing[row].append((bay, tier))
     stacks: dict[tuple[int, int], list[int]] = defaultdict(list)
     bases: dict[int, set[int]] = defaultdict(set)  # tiers on which stacks of a bay begin
     lowest, left, right = [], pose[:, 0] - size[:, 0] / 2.0, pose[:, 0] + size[:, 0] / 2.0
@@ -403,12 +388,3 @@ def _stack(boxes: list[Placed], left_out: list[Slot], on_deck: bool, size: np.nd
             bases[blocks[n]].add(box.tier)
         pose[n, 2] = floor + size[n, 2] / 2.0
     return lowest
-
-
-def _by_row(slots: list[Slot], on_deck: bool) -> dict[int, list[tuple[int, int]]]:
-    """Return bays and tiers of slots, in the hold or on deck, by row."""
-    found: dict[int, list[tuple[int, int]]] = defaultdict(list)
-    for bay, row, tier in slots:
-        if (tier >= FIRST_ON_DECK) == on_deck:
-            found[row].append((bay, tier))
-    return found

@@ -4,36 +4,28 @@
 """Where patches bear: all over, or at the corners of a box, as containers do."""
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..solver.faces import FacePatches
 from ..solver.pose import rotation_matrix
 
-CASTING = 0.178
-"""Length of a corner casting [m] (ISO 1161): as far apart two of them still meet."""
-FORTY_FEET = 12.192
-"""Length [m] at which longer containers have castings, too."""
+CASTING = 0.178  # length of a corner casting [m] (ISO 1161): as far apart two of them still meet
+FORTY_FEET = 12.192  # length [m] at which longer containers have castings, too
 
 
 @dataclass(frozen=True, eq=False)
 class Bearings:
     """Points at which k patches bear, m each."""
 
-    point: np.ndarray
-    """(k, m, 3) [m]."""
+    point: np.ndarray  # (k, m, 3) [m]
     stiffness: np.ndarray
     """(k, m) 0 where no point is: an area [m²] of a face, a share of the patch's of a corner."""
-    hull: np.ndarray
-    """(k, h, 3) the first points, which span the others; some may come twice [m]."""
+    hull: np.ndarray  # (k, h, 3) the first points, which span the others; some may come twice [m]
 
     def __getitem__(self, rows: np.ndarray) -> Bearings:
         return Bearings(self.point[rows], self.stiffness[rows], self.hull[rows])
-
-    def in_frame(self, axes: np.ndarray) -> Bearings:
-        """Return the same in a frame with these axes, as rows (3, 3)."""
-        return replace(self, point=self.point @ axes.T, hull=self.hull @ axes.T)
 
 
 def on_faces(patches: FacePatches) -> Bearings:

@@ -15,7 +15,7 @@ import os
 import shlex
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -36,10 +36,8 @@ STATUSES = {'sound': 0, 'not all judged': 3, 'not sound': 1, 'not read': NOT_REA
 """Exit statuses, by verdict; of several files the last of these counts."""
 PATIENT = 5.0  # time [s] after which several files have a progress bar
 COLUMNS = ('file', 'kind', 'boxes', 'text')
-STEPS = (5e-4, 1e-3, 2e-3, 5e-3)
-"""Tolerances that places may need that are rounded [m]."""
-ROUNDED = 1.5
-"""A tolerance must exceed a gap by so much to be a hint [1]."""
+STEPS = (5e-4, 1e-3, 2e-3, 5e-3)  # tolerances that places may need that are rounded [m]
+ROUNDED = 1.5  # A tolerance must exceed a gap by so much to be a hint [1]
 
 
 def judged(path: str, options: argparse.Namespace) -> tuple[Inspection, str]:
@@ -212,8 +210,12 @@ def main(args: Sequence[str] | None = None) -> int:
     writer = csv.writer(sys.stdout, lineterminator='\n')
     if options.csv:
         writer.writerow(COLUMNS)
-    worst, counts, boxes = 'sound', Counter[str](), 0
-    for path in _with_progress(options.files):
+    worst, counts, boxes, paths = 'sound', Counter[str](), 0, options.files
+    if len(paths) > 1:
+        from tqdm import tqdm
+
+        paths = tqdm(paths, unit='file', delay=PATIENT, leave=False, disable=None)
+    for path in paths:
         try:
             found, taken = judged(path, options)
             figure = found.plot() if options.picture else None
@@ -256,15 +258,6 @@ def main(args: Sequence[str] | None = None) -> int:
 def _cell(text: str) -> str:
     """Return a text as a cell that no spreadsheet runs."""
     return ("'" if text.startswith(tuple('=+-@\t\r')) else '') + printable(text)
-
-
-def _with_progress(paths: Sequence[str]) -> Iterable[str]:
-    """Return the paths; of several, a bar tells after a while how many are done."""
-    if len(paths) == 1:
-        return paths
-    from tqdm import tqdm
-
-    return tqdm(paths, unit='file', delay=PATIENT, leave=False, disable=None)
 
 
 if __name__ == '__main__':

@@ -19,6 +19,7 @@ import numpy as np
 from ..solver.checks import printable
 from ..solver.rows import NoTruth
 from .plan import LACKS, VERDICTS, Plan
+from .plot import picture
 from .room import SIDES
 from .verdict import CAUSES, GOES
 
@@ -29,12 +30,9 @@ HINTS = 'origin', 'tolerance'
 """Kinds that come first: what the file seems to mean, and the option that says so."""
 LEFT_OUT = ('place', 'part', 'shape')
 """What rows lack that come first: others may fall because these are left out."""
-OVER = 1e-6
-"""By how much a load may exceed its limit [1]: rounding."""
-MOST_LINES = 40
-"""Lines that are printed of what is wrong, if not all are asked for."""
-MOST_NAMES = 3
-"""Names that a line shows of a fault with more."""
+OVER = 1e-6  # by how much a load may exceed its limit [1]: rounding
+MOST_LINES = 40  # lines that are printed of what is wrong, if not all are asked for
+MOST_NAMES = 3  # names that a line shows of a fault with more
 
 
 class Row(NamedTuple):
@@ -284,7 +282,10 @@ class Inspection(NoTruth):
             height = self.height[box]
             return (f'{1e3 * height:.1f} mm above what is below' if np.isfinite(height) else
                     'above nothing' if np.isinf(height) else 'by an unknown height') + end
-        return f'share {self.share[box]:.2f}, centre {_side(self.margin[box])}{end}'
+        margin = self.margin[box]
+        side = (f'{1e3 * abs(margin):.0f} mm {"inside" if margin > 0.0 else "outside"}'
+                if np.isfinite(margin) else 'on nothing')
+        return f'share {self.share[box]:.2f}, centre {side}{end}'
 
     def _steps(self) -> Iterator[Row]:
         """Yield rows of what falls while the plan is loaded, and not in the whole of it."""
@@ -345,7 +346,6 @@ class Inspection(NoTruth):
 
         file: where the picture is written to, too. It needs Matplotlib, the extra `report`.
         """
-        from .plot import picture
         figure = picture(self.plan, self.verdicts, self.rows(), self.summary())
         if file is not None:
             figure.savefig(file, dpi=120)
@@ -379,9 +379,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
-
-
-def _side(margin: float) -> str:
-    if not np.isfinite(margin):
-        return 'on nothing'
-    return f'{1e3 * abs(margin):.0f} mm {"inside" if margin > 0.0 else "outside"}'

@@ -25,10 +25,8 @@ BALANCED = 1e-4
 """Part of what is on a body that loads along gravity may lack: else friction holds the body."""
 EXACT, SHARINGS = 1e-10, 30
 """Part of a force that may be left of it, and the steps in which it is shared."""
-VISITS = 4
-"""How often bodies are visited, on average: more where two carry each other."""
-VISIT = 2500.0
-"""Work of a visit, in the unit of `Work`."""
+VISITS = 4  # how often bodies are visited, on average: more where two carry each other
+VISIT = 2500.0  # work of a visit, in the unit of `Work`
 Planes = list[tuple[float, float, float]]
 """Normals (x, y) into a polygon, and how far along them its edges are."""
 Force = tuple[float, float, float]
@@ -39,14 +37,11 @@ Force = tuple[float, float, float]
 class _Stand:
     """Where a body may press on what carries it."""
 
-    rows: list[int]
-    """Of the patches."""
+    rows: list[int]  # of the patches
     edges: tuple[np.ndarray, np.ndarray]
     """Of their hull: where they begin, and unit normals into it (e, 2)."""
-    need: float
-    """How far within the hull it presses [m]."""
-    inside: Planes
-    """Of the hull, pulled in."""
+    need: float  # how far within the hull it presses [m]
+    inside: Planes  # of the hull, pulled in
     patches: list[Planes] = field(default_factory=list)
     """The patches as they are, if there are several."""
     points: tuple[np.ndarray, np.ndarray] | None = None
@@ -169,12 +164,6 @@ class KeptLoads:
         edges = hull_edges(self._hull[rows].reshape(-1, 2))
         return _Stand(rows, edges, need, _planes(*edges, need))
 
-    def _points(self, stand: _Stand) -> tuple[np.ndarray, np.ndarray]:
-        """Return places at which several patches press, as the programmes move them."""
-        points, depth = pulled_in(self._hull[stand.rows].reshape(-1, 2), *stand.edges, stand.need)
-        kept = depth > stand.need / SURELY
-        return points[kept], np.repeat(np.arange(len(stand.rows)), self._hull.shape[1])[kept]
-
     def _spread(self, body: int, stand: _Stand, goal: Force) -> list[tuple[int, Force]] | None:
         """Return what patches have to carry more, or less, so that they carry the goal.
 
@@ -183,7 +172,13 @@ class KeptLoads:
         centre, size = self._bodies.centre[body, :2], self._bodies.gyration[body]
         before = np.array([self._load[row] for row in stand.rows]) / goal[0]
         rows = np.flatnonzero((before[:, 0] > 0.0) & (not self._is_braced[body]))
-        points, of_point = stand.points = stand.points or self._points(stand)
+        if stand.points is None:  # as the programmes move them
+            points, depth = pulled_in(self._hull[stand.rows].reshape(-1, 2), *stand.edges,
+                                      stand.need)
+            kept = depth > stand.need / SURELY
+            of_point = np.repeat(np.arange(len(stand.rows)), self._hull.shape[1])
+            stand.points = points[kept], of_point[kept]
+        points, of_point = stand.points
         place = np.vstack((points, before[rows, 1:] / before[rows, :1]))
         patch = np.append(of_point, rows)
         given = np.vstack((np.ones(len(place)), (place - centre).T / size))

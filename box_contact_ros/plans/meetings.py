@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..core import DEPTH_FLOOR
 from ..solver.contacts_of import TooManyNear, contacts_of
 from ..solver.faces import FacePatches, face_patches
 from ..solver.pose import rotation_matrix
 from .bearings import Bearings, on_corners, on_faces
 from .plan import Plan
-from .standing import across_of, needs
 from .statics import Beds, Bodies
 
 BESIDE = np.sqrt(0.5)
@@ -99,7 +99,7 @@ def meetings_of(plan: Plan, tolerances: np.ndarray, felt: np.ndarray, friction: 
         rows &= ~np.isin(pairs @ (len(plan), 1), np.sort(plan.apart, axis=1) @ (len(plan), 1))
     pairs, contacts = pairs[rows], contacts[rows]
     up = -felt / np.linalg.norm(felt)
-    across = across_of(up)[0]
+    across = np.linalg.svd(up[None])[2][1]
     slope = contacts.normal @ up
     normal = np.where(slope[:, None] > 0.0, contacts.normal, -contacts.normal)
     pairs = np.where(slope[:, None] > 0.0, pairs, pairs[:, ::-1])
@@ -110,13 +110,16 @@ def meetings_of(plan: Plan, tolerances: np.ndarray, felt: np.ndarray, friction: 
     # Boxes beside each other may overlap by the tolerance: a strip that wide carries nothing.
     bear = np.flatnonzero((patches.width > tolerance) & (on_top | sides & ~overlaps))
     patches, rubs = patches[bear], plan.frictions(friction)[pairs[bear]].min(axis=1)
+    # Tolerance and depth; boxes that merely touch count as pressed together by the solver's share
+    # of the larger one, those that overlap by the tolerance.
+    pressed = DEPTH_FLOOR * plan.sizes.max(axis=1)[pairs[bear]].max(axis=1, initial=0.0)
+    depth = np.maximum(np.minimum(-contacts.separation, tolerance)[bear], pressed)
     return Meetings(
         felt, np.stack((across, np.cross(up, across), up)), fixed, pairs, contacts.separation,
         overlaps, on_top, np.arange(len(bear)), bear, pairs[bear], on_top[bear],
-        needs(plan.sizes, pairs[bear], contacts.separation[bear], tolerance[bear]), normal[bear],
-        rubs, patches, on_corners(plan.sizes, plan.poses, pairs[bear], normal[bear], patches,
-                                  tolerance[bear], fixed[plan.body]) if by_corners else
-        on_faces(patches), by_corners)
+        tolerance[bear] + depth, normal[bear], rubs, patches, on_corners(
+            plan.sizes, plan.poses, pairs[bear], normal[bear], patches, tolerance[bear],
+            fixed[plan.body]) if by_corners else on_faces(patches), by_corners)
 
 
 def overlaps_of(plan: Plan, tolerance: float) -> int:
@@ -175,7 +178,8 @@ def beds_of(plan: Plan, meet: Meetings) -> Beds:
         pairs=plan.body[meet.pairs], carries=meet.carries, normal=meet.normal @ frame.T,
         centre=patches.centre @ frame.T, area=patches.area, friction=meet.friction,
         radius=np.sqrt((sides**2).sum(axis=(1, 2)) / 12.0),
-        bearings=meet.bearings.in_frame(frame))
+        bearings=replace(meet.bearings, point=meet.bearings.point @ frame.T,
+                         hull=meet.bearings.hull @ frame.T))
 
 
 def mass_centres(plan: Plan) -> np.ndarray:

@@ -27,6 +27,7 @@ from .plan import GROUND, NO_ROOM, UNTURNED, Fault, Plan, slab_below
 from .roles import (
     ANGLES,
     MASS_UNITS,
+    PLACE,
     TURNS,
     UNITS,
     Finder,
@@ -34,6 +35,7 @@ from .roles import (
     Taken,
     is_harmless,
     is_named,
+    word_of,
     words_of,
 )
 from .room import walls
@@ -41,7 +43,6 @@ from .table import Record, Table
 
 FIXED = {'true': True, '1': True, 'yes': True, 'false': False, '0': False, 'no': False, '': False}
 """What `fixed` may be."""
-"""Name, thickness, and how far it reaches beyond the boxes [m]."""
 ROOM = 1.0  # between the containers of one file, which are placed side by side [m]
 LONG, LONG_ROOM, FULL = 20.0, 30.0, 5.0
 """A container is longer, or shorter than a box by more, only where their units differ [m, m, 1]."""
@@ -49,6 +50,8 @@ MOST_FRICTION = 10.0  # more is no friction [1]
 SAME = 1e-4  # by which least corners of containers may differ that have frames of their own [m]
 STRAIGHT = np.array(UNTURNED)
 SQUARE = 1e-6  # by which a turn by quarters may miss them [1]
+SLACK = 0.05
+"""Part of its thinnest side by which a box may hang or overlap while an axis is chosen [1]."""
 MOST_STEPS = 2**53  # a float64 has all whole numbers up to it
 AXES = {'x': [1, 2, 0], 'y': [0, 2, 1], 'z': [0, 1, 2]}
 """Which axes of the file are x, y and z of the plan, by the one that is up."""
@@ -63,8 +66,7 @@ class Box:
     stack: int
     size: np.ndarray
     pose: np.ndarray
-    half: np.ndarray
-    """Half of the extents of its bounding box (3,) [m]."""
+    half: np.ndarray  # half of the extents of its bounding box (3,) [m]
     mass: float | None
     limit: float
     friction: float
@@ -106,9 +108,75 @@ def read_packing(tables: Sequence[Table], given: Given) -> tuple[Plan, str]:
                          f'{_ignore(paths[1:])}')
     finder = able[0] if able else max(finders, key=lambda finder: (
         len(finder.taken.columns), len(finder.table.records)))
-    if finder.open.questions:
-        raise ValueError(str(finder.open))
+    if finder in able and not given.up:
+        _ask_up(finder)
+    finder.check()
     return _read(every, finder.table, finder.taken, given, None)
+
+
+def _ask_up(finder: Finder) -> None:
+    """Ask which axis is up where words tell y, or where boxes stand in piles only if it is not z.
+
+    Words tell y if the height is listed between the other sizes, as y is between x and z. The
+    origin is asked, too, if boxes stand by least corners alone.
+    """
+    taken, table = finder.taken, finder.table
+    in_file = sorted(taken.size, key=table.columns.index)
+    says_y = not taken.is_along_file and in_file[1] == taken.size[2]
+    try:
+        boxes = _Rows(table, taken, finder.given, None).boxes()
+    except ValueError:  # which is told when the table is read
+        boxes = []
+    if not boxes:
+        return
+    half = np.array([box.half for box in boxes])
+    place = np.array([box.pose[:3] for box in boxes]) - taken.is_corner * half
+
+    def fallen(up: str, is_corner: bool) -> tuple[int, bool, bool]:
+        axes = AXES[up]
+        reach = half[:, axes] if taken.is_along_file else half
+        count, has_piles = _fallen(boxes, place[:, axes] + is_corner * reach, reach)
+        return count, is_corner, has_piles
+
+    if not says_y and fallen('z', taken.is_corner)[0] == 0:
+        return
+    is_asked = '--origin' in finder.options
+    is_open = is_asked or not finder.given.origin and [*PLACE] == [
+        word_of(name).key for name in taken.place]
+    corners = sorted({taken.is_corner, taken.is_corner or is_open})
+    readings = {up: min(fallen(up, is_corner) for is_corner in corners) for up in 'yzx'}
+    up = min(readings, key=lambda up: readings[up][0])
+    count, is_corner, has_piles = readings[up]
+    is_sure = has_piles and (count == 0 or 2 * count < readings['z'][0] > len(boxes) // 2)
+    if not says_y and (up == 'z' or not is_sure):
+        return
+    if is_corner and not (taken.is_corner or is_asked):
+        finder.ask_origin(taken.place)
+    finder.ask(f'which axis is up, {up} or {"z" if up != "z" else "y"}?', '--up', up)
+
+
+def _fallen(boxes: Sequence[Box], centre: np.ndarray, half: np.ndarray) -> tuple[int, bool]:
+    """Return how many boxes hang or overlap others, by bounding boxes, and if one is on another.
+
+    centre, half: (n, 3) by a reading. What is at z = 0 stands, too; containers are apart.
+    """
+    stack = np.array([box.stack for box in boxes])
+    low, slack = centre[:, 2] - half[:, 2], SLACK * 2.0 * half.min(axis=1)
+    poses = np.hstack((centre, np.tile(UNTURNED, (len(boxes), 1))))
+    poses[:, 0] += 3.0 * (np.abs(centre[:, 0]) + half[:, 0]).max() * stack
+    try:
+        pairs, contacts = contacts_of(2.0 * half, poses, tolerance=slack,
+                                      most_near=most_near(len(boxes)))
+    except ValueError:  # too many near each other, or containers that reach too far
+        return len(boxes), False
+    rise = contacts.normal[:, 2]
+    upper = np.where(rise > 0.0, pairs[:, 1], pairs[:, 0])[np.abs(rise) > 0.5]
+    stands = np.abs(low) <= slack
+    stands[upper] = True
+    stands[pairs[-contacts.separation > slack[pairs].min(axis=1)].ravel()] = False
+    stands[low < -slack] = False
+    stands |= [box.fixed for box in boxes]
+    return len(boxes) - int(np.count_nonzero(stands)), len(upper) > 0
 
 
 def _formed(form: Form, given: Given) -> Taken:
@@ -494,12 +562,9 @@ def _loading(boxes: Sequence[Box], faults: list[Fault]) -> list[int] | None:
     free = [box for box in boxes if not box.fixed]
     if all(box.order is None for box in free):
         return None
-    lack = tuple(box.name for box in free if not _is_whole_number(box.order))
+    lack = tuple(box.name for box in free if box.order is None or not (
+        box.order.is_integer() and abs(box.order) <= MOST_STEPS))
     if lack:
         faults.append(Fault('order', lack, 'has no whole number: steps are not judged'))
         return None
     return [0 if box.fixed else int(box.order or 0) for box in boxes]
-
-
-def _is_whole_number(value: float | None) -> bool:
-    return value is not None and value.is_integer() and abs(value) <= MOST_STEPS

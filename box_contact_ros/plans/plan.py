@@ -24,10 +24,8 @@ from ..solver.checks import (
 )
 from ..solver.poses import PoseLike, as_boxes
 
-MOST_BYTES = 2**28
-"""Of a file: 256 MiB, some hundred times the largest ship's plan."""
-VERDICTS = ('not sound', 'not all judged', 'sound')
-"""On a plan, from the worst to the best."""
+MOST_BYTES = 2**28  # of a file: 256 MiB, some hundred times the largest ship's plan
+VERDICTS = ('not sound', 'not all judged', 'sound')  # on a plan, from the worst to the best
 FAULT_KINDS = {
     'origin': ('sound', ''), 'tolerance': ('sound', ''), 'unit': ('not all judged', 'unit'),
     'row': ('not all judged', 'place'), 'pose': ('not all judged', 'place'),
@@ -46,8 +44,7 @@ FAULT_KINDS = {
     'base': ('sound', ''), 'fixed': ('sound', ''), 'rounding': ('sound', '')}
 """What may be wrong with a row of a file: the best verdict with it, and what it lacks."""
 NO_ROOM = ((-np.inf,) * 3, (np.inf,) * 3)
-UNTURNED = (0.0, 0.0, 0.0, 1.0)
-"""The quaternion x y z w of a box that is not turned."""
+UNTURNED = (0.0, 0.0, 0.0, 1.0)  # the quaternion x y z w of a box that is not turned
 GROUND, GROUND_THICKNESS, GROUND_MARGIN = 'ground', 1.0, 1.0
 """The name of the ground as a box; its thickness, and how far it reaches beyond the others [m]."""
 LACKS = {

@@ -11,10 +11,9 @@ from __future__ import annotations
 import textwrap
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from ..solver.checks import printable
 from ..solver.contact_solver import ContactSolver
 from ..solver.pose import rotation_matrix
 from .plan import Plan
-from .room import are_walls
+from .room import are_walls, bounds
 from .verdict import GOES
 
 if TYPE_CHECKING:
@@ -34,43 +33,31 @@ COLOURS = {'sound': '#dde5ee', 'not judged': '#b8b8c8', 'overlap': '#000000',
            'tips under its load': '#cc79a7', 'slides': '#56b4e9', GOES: '#f7d9a0',
            'overloaded': '#f0e442', 'step': '#009e73', 'way': '#5b2a86', 'ground': '#f4f4f0'}
 """By verdict, in the order of the legend; they differ for who sees no red or no green, too."""
-QUIET = ('sound', 'not judged', 'ground', GOES)
-"""Verdicts without labels."""
+QUIET = ('sound', 'not judged', 'ground', GOES)  # verdicts without labels
 MOST_LABELS, MOST_LOOKED_AT = 6, 30
 """More labels would cover the boxes; and the faulty boxes that decide on the view, at most."""
 MOST_SORTED = 1000
 """More boxes are drawn by the depth of their centres alone, from the first corner."""
-SHADES = 1.0, 0.93, 0.86
-"""Of the faces along z, y and x of a box [share of its colour]."""
+SHADES = 1.0, 0.93, 0.86  # of the faces along z, y and x of a box [share of its colour]
 CORNERS = [np.array((x, y, 0.45)) for x, y in product((0.5, -0.5), (-0.75, 0.75))]
 """Directions to the viewer."""
 SPOTS = np.array([*product((-0.4, 0.0, 0.4), repeat=2)])
 """Of a face, which are looked at [of its edges]."""
-LONGEST, WIDEST = 24, 34
-"""Characters of a name, and of a line of a label."""
+LONGEST, WIDEST = 24, 34  # characters of a name, and of a line of a label
 ROUNDING = 1e-6  # of a box's diagonal, by which what touches it may seem to be before it
-HIDDEN = 0.5
-"""Share of its spots that are seen, below which a box is drawn through."""
+HIDDEN = 0.5  # share of its spots that are seen, below which a box is drawn through
 _RING = np.array([[-0.5, -0.5], [-0.5, 0.5], [0.5, 0.5], [0.5, -0.5]])
 
 
-@dataclass(frozen=True, eq=False)
-class View:
+class View(NamedTuple):
     """The boxes as they are seen from a corner."""
 
     viewer: np.ndarray
-    faces: np.ndarray
-    """(n, 3, 4, 2) corners in the picture, of the three faces of each box that are seen."""
-    shades: np.ndarray
-    """(n, 3)."""
-
-    @property
-    def edges(self) -> np.ndarray:
-        """Return the directions to the right and the upper edge of the picture (2, 3)."""
-        return _edges(self.viewer)
+    faces: np.ndarray  # (n, 3, 4, 2) corners in the picture, of the faces that are seen
 
 
-def _edges(viewer: np.ndarray) -> np.ndarray:
+def edges_of(viewer: np.ndarray) -> np.ndarray:
+    """Return the directions to the right and the upper edge of the picture (2, 3)."""
     right = np.cross((0.0, 0.0, 1.0), viewer) / np.hypot(*viewer[:2])
     return np.stack((right, np.cross(viewer / np.linalg.norm(viewer), right)))
 
@@ -95,6 +82,7 @@ def picture(plan: Plan, verdicts: np.ndarray, rows: Sequence[Any], title: str) -
     faulty = [*dict.fromkeys((*labels, *others))][:MOST_LOOKED_AT]
     view, spots, seen = _best_view(sizes, poses, faulty)
     order = _from_behind(sizes, poses, view)
+    shades = np.take(SHADES[::-1], np.abs(rotation_matrix(poses[:, 3:])).argmax(axis=1))
     colours = np.array([to_rgb(COLOURS[verdict]) for verdict in verdicts]).reshape(-1, 1, 3)
 
     figure = Figure(figsize=(10, 6))
@@ -103,7 +91,7 @@ def picture(plan: Plan, verdicts: np.ndarray, rows: Sequence[Any], title: str) -
     axes.set_aspect('equal')
     axes.add_collection(PolyCollection(
         view.faces[order].reshape(-1, 4, 2), edgecolors='0.35', linewidths=0.4,
-        facecolors=(colours * view.shades[:, :, None])[order].reshape(-1, 3)))
+        facecolors=(colours * shades[:, :, None])[order].reshape(-1, 3)))
     hidden = [n for n, some in zip(faulty, seen) if some.mean() < HIDDEN]
     axes.add_collection(LineCollection(
         [face for n in hidden for face in view.faces[n][:, (0, 1, 2, 3, 0)]], linewidths=1.2,
@@ -142,18 +130,15 @@ def _drawn(plan: Plan) -> np.ndarray:
     free = np.setdiff1d(np.arange(len(plan)), plan.ground)
     if not len(free):
         return ground
-    half = np.einsum('nij,nj->ni', np.abs(rotation_matrix(plan.poses[:, 3:])), plan.sizes) / 2.0
-    low, high = plan.poses[:, :3] - half, plan.poses[:, :3] + half
+    low, high = bounds(plan)
     reach = high[free].max(axis=0) - low[free].min(axis=0)
-    small = ground[(2.0 * half[ground] <= 2.0 * reach).all(axis=1)]
+    small = ground[((high - low)[ground] <= 2.0 * reach).all(axis=1)]
     return np.sort(np.concatenate((free, small)))
 
 
 def view_from(viewer: np.ndarray, sizes: np.ndarray, poses: np.ndarray) -> View:
     """Return boxes as they are seen from a direction."""
-    axes = rotation_matrix(poses[:, 3:])
-    faces = _on_faces(viewer, sizes, poses, _RING) @ _edges(viewer).T
-    return View(viewer, faces, np.take(SHADES[::-1], np.abs(axes).argmax(axis=1)))
+    return View(viewer, _on_faces(viewer, sizes, poses, _RING) @ edges_of(viewer).T)
 
 
 def _on_faces(viewer: np.ndarray, sizes: np.ndarray, poses: np.ndarray, places: np.ndarray,
@@ -188,7 +173,7 @@ def _best_view(sizes: np.ndarray, poses: np.ndarray, faulty: Sequence[int],
         area = np.abs(one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0]) / 2.0
         total = float((seen.reshape(len(faulty), 3, len(SPOTS)).mean(axis=2) * area).sum())
         if total > most:
-            best, most = (view, spots @ view.edges.T, seen), total
+            best, most = (view, spots @ edges_of(viewer).T, seen), total
     assert best is not None
     return best
 

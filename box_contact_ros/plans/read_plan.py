@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from ..resources import read_regular
 from ..solver.checks import short_repr
 from .baplie import read_baplie
-from .forms import is_header
+from .forms import FORMS
 from .packing import read_packing
 from .plan import MOST_BYTES, Plan
 from .roles import NOTHING, Given
@@ -23,18 +23,15 @@ from .table import Table, header_of, is_first, read_csv, read_tables
 FORMATS = 'SMDG BAPLIE, and packing plans as CSV or JSON'
 WORLDS = ('it is a world or a model of a simulator, which is no plan; fill a Plan from it, as '
           'docs/examples/mujoco_plan.py does')
-FEWEST = 4
-"""Columns of a table whose file's ending does not tell that it is one."""
+FEWEST = 4  # columns of a table whose file's ending does not tell that it is one
 
 
 class ReadPlan(NamedTuple):
     """A plan, and how its boxes stand on each other."""
 
     plan: Plan
-    bears: str
-    """'corners' of containers, else 'faces', as `inspect_plan` takes it."""
-    taken: str = ''
-    """What was taken of a table, for people; '' for other files."""
+    bears: str  # 'corners' of containers, else 'faces', as `inspect_plan` takes it
+    taken: str = ''  # what was taken of a table, for people; '' for other files
 
 
 def read_plan(path: str | os.PathLike[str], *, origin: str | None = None, unit: str | None = None,
@@ -79,11 +76,13 @@ def _read(file: Path, data: bytes, given: Given) -> ReadPlan:
     if start[:1] in ('{', '['):
         plan, taken = read_packing(_tables(data), given)
         return ReadPlan(plan, 'faces', taken)
-    first = next(filter(is_first, start.splitlines()), '')
-    is_edi = start[:4] in ('UNA:', 'UNB+') or start[:3] in ('UNA', 'UNB', 'UNH') or ending == '.edi'
-    if not is_edi and (ending in ('.csv', '.tsv') or _is_table(first)):
-        plan, taken = read_packing([read_csv(data.decode('utf-8'))], given)
-        return ReadPlan(plan, 'faces', taken)
+    is_edi = start[:3] in ('UNA', 'UNB', 'UNH') or ending == '.edi'
+    if not is_edi:
+        cells, delimiter = header_of(next(filter(is_first, start.splitlines()), ''))
+        if ending in ('.csv', '.tsv') or delimiter and len(cells) >= FEWEST or any(
+                form.header == tuple(cells) for form in FORMS):
+            plan, taken = read_packing([read_csv(data.decode('utf-8'))], given)
+            return ReadPlan(plan, 'faces', taken)
     for name, value in given._asdict().items():
         if value:
             raise ValueError(f'{name} must not be given: it is for CSV and JSON alone')
@@ -94,12 +93,6 @@ def _read(file: Path, data: bytes, given: Given) -> ReadPlan:
     shown = start.partition('\n')[0].strip()[:60].lower()
     raise ValueError(f'line 1: {shown!r} begins no format that is read: {FORMATS}' if shown else
                      f'it is empty; what is read: {FORMATS}')
-
-
-def _is_table(line: str) -> bool:
-    """Return whether a line is a header, whatever its file is called."""
-    cells, delimiter = header_of(line)
-    return is_header(cells) or bool(delimiter) and len(cells) >= FEWEST
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -116,29 +116,20 @@ ROLES = tuple(dict.fromkeys([*WORDS, *(
 UNIT_WORDS = ('unit', 'units', 'lengthunit', 'lengthunits', 'dimensionunit', 'uom')
 MINE = {*SIZE, 'lx', 'ly', 'lz', 'dx', 'dy', 'dz', *PLACE, *LEAST, *GREATEST}
 """With these names, and one that is `name`, lengths are metres unless told otherwise."""
-LONG = 20.0
-"""Half of the boxes are longer only where their unit is not the metre [m]."""
+LONG = 20.0  # half of the boxes are longer only where their unit is not the metre [m]
 
 
 class Given(NamedTuple):
     """What the caller tells of a table, where the file does not."""
 
-    origin: str | None = None
-    """One of ORIGINS: what `x y z` are."""
-    unit: str | None = None
-    """One of UNITS, of all lengths."""
-    container: Sequence[float] | None = None
-    """(3,) inner size, in the unit of the file."""
-    columns: Mapping[str, str] = {}
-    """Which column has a role of ROLES, by role."""
-    ignore: Sequence[str] = ()
-    """Columns, or the first words of dotted ones, that decide on nothing."""
-    up: str | None = None
-    """One of UPS: the axis of the file that is up."""
-    turns: str | None = None
-    """One of TURNS."""
-    frames: str | None = None
-    """One of FRAMES: whether each container has a frame of its own."""
+    origin: str | None = None  # one of ORIGINS: what `x y z` are
+    unit: str | None = None  # one of UNITS, of all lengths
+    container: Sequence[float] | None = None  # (3,) inner size, in the unit of the file
+    columns: Mapping[str, str] = {}  # which column has a role of ROLES, by role
+    ignore: Sequence[str] = ()  # columns, or the first words of dotted ones, that decide on nothing
+    up: str | None = None  # one of UPS: the axis of the file that is up
+    turns: str | None = None  # one of TURNS
+    frames: str | None = None  # one of FRAMES: whether each container has a frame of its own
 
     def check(self) -> None:
         """Raise ValueError for what is none of the words."""
@@ -181,23 +172,18 @@ class Taken:
     """Which columns have which role, and how their numbers are read."""
 
     size: tuple[str, ...] = ()
-    is_along_file: bool = True
-    """Whether sizes are along the file's axes; else along x, y and up."""
-    place: tuple[str, ...] = ()
-    """Three columns, or six of two corners."""
+    is_along_file: bool = True  # whether sizes are along the file's axes; else along x, y and up
+    place: tuple[str, ...] = ()  # three columns, or six of two corners
     is_corner: bool = False
-    turn: tuple[str, ...] = ()
-    """Four columns of a quaternion."""
-    single: Mapping[str, str] = field(default_factory=dict)
-    """The columns of other roles."""
+    turn: tuple[str, ...] = ()  # four columns of a quaternion
+    single: Mapping[str, str] = field(default_factory=dict)  # the columns of other roles
     room: tuple[str, ...] = ()
     is_room_along_file: bool = True
     unit: str = 'm'
     mass_unit: str = 'kg'
     turns: str = 'degrees'
     up: str = 'z'
-    quiet: frozenset[str] = frozenset()
-    """Other columns that decide on nothing."""
+    quiet: frozenset[str] = frozenset()  # other columns that decide on nothing
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -225,24 +211,6 @@ def _from(roles: Sequence[str], columns: Sequence[str]) -> str:
     return ' '.join(columns) if same else f'{" ".join(roles)} from {" ".join(columns)}'
 
 
-@dataclass
-class Open:
-    """What is open, and options that answer it."""
-
-    questions: list[str] = field(default_factory=list)
-    options: list[str] = field(default_factory=list)
-
-    def ask(self, question: str, *options: str) -> None:
-        """Add a question, with options as they are typed."""
-        self.questions.append(question)
-        self.options += options
-
-    def __str__(self) -> str:
-        """Return one message with all of it."""
-        hint = f'; if it is so, add {shlex.join(self.options)}' if self.options else ''
-        return f'{"; ".join(self.questions)}{hint}'
-
-
 def words_of(option: str, values: Iterable[str]) -> list[str]:
     """Return an option with each of its values, as they are typed."""
     return [word for value in values for word in (option, value)]
@@ -253,7 +221,9 @@ class Finder:
 
     def __init__(self, table: Table, given: Given) -> None:
         """Find them. Raises ValueError for what contradicts the file."""
-        self.table, self.given, self.open = table, given, Open()
+        self.table, self.given = table, given
+        self.questions: list[str] = []
+        self.options: list[str] = []
         told = {column: role for role, column in given.columns.items()}
         for column in told:
             if column not in table.columns:
@@ -269,8 +239,8 @@ class Finder:
         size, place, turn = (self._one(group) for group in GROUPS)
         single = self._singles()
         if place and place.kind == 'corners' and size:
-            self.open.ask(f'which tells the size, {" ".join(size.words)} or two corners?',
-                          *words_of('--ignore', size.words))
+            self.ask(f'which tells the size, {" ".join(size.words)} or two corners?',
+                     *words_of('--ignore', size.words))
             size = None
         kind = place.kind if place else ''
         if place and given.origin and kind in ('corner', 'corners') and given.origin != 'corner':
@@ -286,15 +256,29 @@ class Finder:
         self._ask_missing(size or kind == 'corners', place, taken)
         angles = [single[role] for role in ANGLES if role in single]
         if turn and angles:
-            self.open.ask(f'which is the turn, {" ".join(turn.words)} or {" ".join(angles)}?',
-                          *words_of('--ignore', angles))
+            self.ask(f'which is the turn, {" ".join(turn.words)} or {" ".join(angles)}?',
+                     *words_of('--ignore', angles))
         taken = replace(taken, unit=self._length_unit(taken), turns=self._angle_unit(angles))
-        is_low = kind == 'centre' and self.open.questions and place and min(
+        is_low = kind == 'centre' and self.questions and place and min(
             self.table.numbers(place.words['xyz'.index(taken.up)]), default=1.0) <= 0.0
         if place and not given.origin and (not kind or is_low):
-            self.open.ask(f'are {" ".join(place.words)} centres or least corners?', '--origin',
-                          'corner')
+            self.ask_origin(place.words)
         return taken
+
+    def ask(self, question: str, *options: str) -> None:
+        """Add a question, with options as they are typed."""
+        self.questions.append(question)
+        self.options += options
+
+    def check(self) -> None:
+        """Raise ValueError with all that is open, and options that answer it."""
+        if self.questions:
+            hint = f'; if it is so, add {shlex.join(self.options)}' if self.options else ''
+            raise ValueError(f'{"; ".join(self.questions)}{hint}')
+
+    def ask_origin(self, place: Sequence[str]) -> None:
+        """Ask what the columns of a place are."""
+        self.ask(f'are {" ".join(place)} centres or least corners?', '--origin', 'corner')
 
     def _lines(self, group: str) -> list[Line]:
         """Return the lines of a group whose columns are all there, with these; '' is another."""
@@ -319,7 +303,7 @@ class Finder:
         if len(found) > 1:
             ways = ' or '.join(' '.join(line.words) for line in found)
             others = {name for line in found[1:] for name in line.words} - {*found[0].words}
-            self.open.ask(f'which is the {group}, {ways}?', *words_of('--ignore', sorted(others)))
+            self.ask(f'which is the {group}, {ways}?', *words_of('--ignore', sorted(others)))
         return found[0] if found else None
 
     def _singles(self) -> dict[str, str]:
@@ -341,14 +325,14 @@ class Finder:
         for role, words in RIVALS.items():
             rivals = [name for name, word in self.words.items() if word.key in words.split()]
             if rivals and role not in found:
-                self.open.ask(f'is {rivals[0]} the {role}?', *words_of(
+                self.ask(f'is {rivals[0]} the {role}?', *words_of(
                     '--column', [f'{role}={rivals[0]}']), *words_of('--ignore', rivals[1:]))
             elif rivals and role not in self.given.columns:
                 found[role] += rivals
         for role, columns in found.items():
             if len(columns) > 1:
-                self.open.ask(f'which is the {role}, {" or ".join(columns)}?',
-                              *words_of('--ignore', columns[1:]))
+                self.ask(f'which is the {role}, {" or ".join(columns)}?',
+                         *words_of('--ignore', columns[1:]))
         return {role: columns[0] for role, columns in found.items()}
 
     def _room(self) -> Line | None:
@@ -389,8 +373,8 @@ class Finder:
         if 'name' in names and {name.lower() for name in (*taken.size, *taken.place)} <= MINE and (
                 middle <= LONG):
             return 'm'
-        self.open.ask('in which unit are lengths (m, cm, mm, in, ft)?', '--unit',
-                      'mm' if middle > 100.0 else 'cm' if middle > LONG / 4.0 else 'm')
+        self.ask('in which unit are lengths (m, cm, mm, in, ft)?', '--unit',
+                 'mm' if middle > 100.0 else 'cm' if middle > LONG / 4.0 else 'm')
         return 'm'
 
     def _angle_unit(self, columns: Sequence[str]) -> str:
@@ -400,7 +384,7 @@ class Finder:
             return unit or 'degrees'
         if any(abs(value) > 2.0 * math.pi for value in values):
             return 'degrees'
-        self.open.ask(f'is {" ".join(columns)} in degrees or radians?', '--turns', 'radians')
+        self.ask(f'is {" ".join(columns)} in degrees or radians?', '--turns', 'radians')
         return 'degrees'
 
     def _ask_missing(self, size: object, place: object, taken: Taken) -> None:
@@ -420,7 +404,7 @@ class Finder:
             if not there:
                 some = [names for names in whole if size or place or is_size == all(
                     value > 0.0 for name in names for value in self.table.numbers(name))][:1]
-                self.open.ask(f'which columns are {what} ({" ".join(roles)})?{hint}', *(
+                self.ask(f'which columns are {what} ({" ".join(roles)})?{hint}', *(
                     word for names in some for word in words_of(
                         '--column', map('='.join, zip(roles, names)))))
 

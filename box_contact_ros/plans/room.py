@@ -13,10 +13,8 @@ from .plan import Plan
 
 SIDES = (('-x', '-y', '-z'), ('+x', '+y', '+z'))
 """Of a room, at its least and at its greatest corner."""
-ROUNDING = 1e-6
-"""By how much a wall may miss its room, or reach into it [m]."""
-THICKNESS = 0.1
-"""Of a container's walls and floor [m]."""
+ROUNDING = 1e-6  # by how much a wall may miss its room, or reach into it [m]
+THICKNESS = 0.1  # of a container's walls and floor [m]
 
 
 def beyond(plan: Plan, fixed: np.ndarray, tolerances: np.ndarray) -> np.ndarray:
@@ -24,7 +22,7 @@ def beyond(plan: Plan, fixed: np.ndarray, tolerances: np.ndarray) -> np.ndarray:
 
     It is 0 of fixed boxes, and up to a box's tolerance. fixed, tolerances: (n,) by box.
     """
-    low, high = _bounds(plan)
+    low, high = bounds(plan)
     reach = np.stack((plan.room[:, 0] - low, high - plan.room[:, 1]), axis=1)
     return np.where(~fixed[:, None, None] & (reach > tolerances[:, None, None]), reach, 0.0)
 
@@ -35,7 +33,7 @@ def are_beyond(plan: Plan, pairs: np.ndarray, outside: np.ndarray, tolerances: n
 
     outside: of `beyond`. A wall is such a box.
     """
-    low, high = _bounds(plan)
+    low, high = bounds(plan)
     rows = np.zeros(len(pairs), bool)
     for box, other in pairs.T, pairs[:, ::-1].T:
         slack = tolerances[other, None]
@@ -47,7 +45,7 @@ def are_beyond(plan: Plan, pairs: np.ndarray, outside: np.ndarray, tolerances: n
 
 def are_walls(plan: Plan) -> np.ndarray:
     """Return which boxes (n,) are fixed, touch a room and are beside it, so that they hide it."""
-    low, high = _bounds(plan)
+    low, high = bounds(plan)
     rows = np.zeros(len(plan), bool)
     for least, greatest in np.unique(plan.room[np.isfinite(plan.room).all(axis=(1, 2))], axis=0):
         least, greatest = least + ROUNDING, greatest - ROUNDING
@@ -57,7 +55,7 @@ def are_walls(plan: Plan) -> np.ndarray:
     return rows & np.isin(np.arange(len(plan)), plan.ground)
 
 
-def _bounds(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
+def bounds(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
     """Return the least and the greatest corner (n, 3) of the bounding box of each box."""
     reach = np.einsum('nij,nj->ni', np.abs(rotation_matrix(plan.poses[:, 3:])), plan.sizes / 2.0)
     return plan.poses[:, :3] - reach, plan.poses[:, :3] + reach

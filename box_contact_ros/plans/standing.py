@@ -6,39 +6,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core import DEPTH_FLOOR, native
+from ..core import native
 from ..solver.pose import rotation_matrix
 
 EDGE = 1e-6
 """What boxes share across gravity at least where one is above the other [m]: rounding is less."""
 
 
-MOST_LOOKS = 200_000_000
-"""Of boxes that hang at what may be below them: some 5 s."""
-
-
-def across_of(direction: np.ndarray) -> np.ndarray:
-    """Return two unit vectors (2, 3) across a direction, and across each other."""
-    return np.linalg.svd(direction[None])[2][1:]
-
-
-def base_areas(sizes: np.ndarray, poses: np.ndarray, up: np.ndarray) -> np.ndarray:
-    """Return the areas (n,) of the faces most across `up`, as seen along it [m²]."""
-    turned = np.abs(up @ rotation_matrix(poses[:, 3:]))
-    face = turned.argmax(axis=1)
-    rows = np.arange(len(sizes))
-    return sizes.prod(axis=1) / sizes[rows, face] * turned[rows, face]
-
-
-def needs(sizes: np.ndarray, pairs: np.ndarray, separation: np.ndarray, tolerance: np.ndarray,
-          ) -> np.ndarray:
-    """Return how far inside its hull a centre must be that pairs carry (k,): tolerance + depth [m].
-
-    Boxes that merely touch count as pressed together by the solver's share of the larger one; those
-    that overlap, by the tolerance (k,).
-    """
-    longest = sizes.max(axis=1)[pairs].max(axis=1, initial=0.0)
-    return tolerance + np.maximum(np.minimum(-separation, tolerance), DEPTH_FLOOR * longest)
+MOST_LOOKS = 200_000_000  # of boxes that hang at what may be below them: some 5 s
 
 
 def heights(sizes: np.ndarray, poses: np.ndarray, frame: np.ndarray, body: np.ndarray,
@@ -80,14 +55,17 @@ def hull_margins(points: np.ndarray, upper: np.ndarray, at: np.ndarray) -> np.nd
                               first * points.shape[1], np.ascontiguousarray(at))
 
 
-def standing(lower: np.ndarray, upper: np.ndarray, inside: np.ndarray, on_ground: np.ndarray,
-             ) -> np.ndarray:
-    """Return which of n stand: from the ground up, so a ring does not."""
+def standing(lower: np.ndarray, upper: np.ndarray, holds: np.ndarray, on_ground: np.ndarray, *,
+             on_all: bool = True) -> np.ndarray:
+    """Return which of n stand: from the ground up, so a ring does not.
+
+    They hold by themselves, and all that carries them stands, or else one that does.
+    """
+    least = np.bincount(upper, minlength=len(holds)) if on_all else 1
     stands = on_ground
     while True:
-        leans = ~inside
-        leans[upper[~stands[lower]]] = True
-        higher = on_ground | ~leans
+        carriers = np.bincount(upper[stands[lower]], minlength=len(holds))
+        higher = on_ground | holds & (carriers >= least)
         if np.array_equal(higher, stands):
             return stands
         stands = higher

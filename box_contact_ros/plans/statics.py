@@ -29,61 +29,45 @@ from ..core import native
 from .bearings import Bearings
 from .standing import hull_margins
 
-FALLS = 1e-5
-"""Missing part of its weight from which a body falls [1]: above what the solver leaves."""
+FALLS = 1e-5  # missing part of its weight from which a body falls [1]: above what the solver leaves
 DOUBTFUL = 1e-2
 """Missing part up to which a body is asked again to hold, with the others falling [1]."""
-FELL = 1e-4
-"""Missing part from which a body that was asked again, and lacked some again, falls [1]."""
-LEVEL = 1e-9
-"""Up to 1 − LEVEL, a cosine is that of a normal that is not along gravity: 4e-5 rad."""
+FELL = 1e-4  # missing part from which a body that was asked again, and lacked some again, falls [1]
+LEVEL = 1e-9  # up to 1 − LEVEL, a cosine is that of a normal that is not along gravity: 4e-5 rad
 NEGLIGIBLE = 1e-9
 """Share of a patch's stiffness that a point may lack: of triangles with an edge of a micron."""
 SOFTNESS = 1e-7
 """Of beds while what falls is found [1]: the energy of loads in that of missing wrenches."""
 STIFFNESS = 1e9
 """Of a body's place while loads are found [1], so that they exist in spite of rounding."""
-PASSES_MAX = 50
-"""Of friction. What still lacks some of its weight then falls."""
-SETTLED = 1e-5
-"""Change of friction's bounds that ends the passes [of the mean weight]."""
-NOISE = 1e-6
-"""Load below which a patch does not press [of the mean weight]."""
+PASSES_MAX = 50  # of friction. What still lacks some of its weight then falls
+SETTLED = 1e-5  # change of friction's bounds that ends the passes [of the mean weight]
+NOISE = 1e-6  # load below which a patch does not press [of the mean weight]
 ROUGH = 0.9
 """Radius at which friction resists a spin, divided by that of gyration of a rectangle [1]."""
 SEEN = 2.0 * FALLS
 """How far a hull is pulled in at least [of a radius of gyration], so that what is missing tells."""
 MOVES, SLACK = 50, 0.1
 """Steps by which points are moved into a hull, and the part of the need that they may lack."""
-SAME_HEIGHT = 1e-3
-"""Step of heights [m]: friction at two of them can turn a body."""
+SAME_HEIGHT = 1e-3  # step of heights [m]: friction at two of them can turn a body
 SURE, ASKED, GRIPPING = 'sure', 'asked', 'gripping'
 """How loads are looked for: at once, as all bodies may be expected to hold; by both programmes; and
 by both, with friction at each point up to what presses there, which level patches bound."""
-MOST_GRIPPING = 200
-"""Bodies of a group that friction is asked for: a second's work."""
-PRECISION = 1e-8
-"""Of the solver: residuals and gap of duality."""
-BATCH = 300
-"""Patches of groups that are solved at a time."""
-MOST_ENTRIES = 2_000_000
-"""Of a programme's matrix: 300 bytes each."""
-MOST_WORK, STEPS = 3e9, 30
-"""Work of a plan, and steps that a programme is expected to take."""
+MOST_GRIPPING = 200  # bodies of a group that friction is asked for: a second's work
+PRECISION = 1e-8  # of the solver: residuals and gap of duality
+BATCH = 300  # patches of groups that are solved at a time
+MOST_ENTRIES = 2_000_000  # of a programme's matrix: 300 bytes each
+MOST_WORK, STEPS = 3e9, 30  # work of a plan, and steps that a programme is expected to take
 
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
     """n bodies; fixed ones have no weight that matters."""
 
-    weight: np.ndarray
-    """(n,) above 0 [N]."""
-    centre: np.ndarray
-    """(n, 3) of mass [m]."""
-    gyration: np.ndarray
-    """(n,) radius of gyration [m]."""
-    fixed: np.ndarray
-    """(n,) bool."""
+    weight: np.ndarray  # (n,) above 0 [N]
+    centre: np.ndarray  # (n, 3) of mass [m]
+    gyration: np.ndarray  # (n,) radius of gyration [m]
+    fixed: np.ndarray  # (n,) bool
     need: np.ndarray
     """(n,) how far the centre of pressure must be within the hull of what carries a body [m]."""
 
@@ -92,32 +76,22 @@ class Bodies:
 class Beds:
     """k patches. Each presses body b, along its normal, away from body a."""
 
-    pairs: np.ndarray
-    """(k, 2) bodies a and b; where one carries the other, the lower one first."""
-    carries: np.ndarray
-    """(k,) bool: a carries b; else they are beside each other."""
-    normal: np.ndarray
-    """(k, 3) from a to b."""
-    centre: np.ndarray
-    """(k, 3) [m]."""
-    radius: np.ndarray
-    """(k,) of gyration about the normal [m]."""
-    area: np.ndarray
-    """(k,) [m²]."""
-    friction: np.ndarray
-    """(k,) Coulomb's μ."""
-    bearings: Bearings
-    """(k,) where they press; between the points of the hull is all that they can."""
+    pairs: np.ndarray  # (k, 2) bodies a and b; where one carries the other, the lower one first
+    carries: np.ndarray  # (k,) bool: a carries b; else they are beside each other
+    normal: np.ndarray  # (k, 3) from a to b
+    centre: np.ndarray  # (k, 3) [m]
+    radius: np.ndarray  # (k,) of gyration about the normal [m]
+    area: np.ndarray  # (k,) [m²]
+    friction: np.ndarray  # (k,) Coulomb's μ
+    bearings: Bearings  # (k,) where they press; between the points of the hull is all that they can
 
 
 @dataclass(frozen=True, eq=False)
 class Rest:
     """What the patches carry, and what they cannot carry."""
 
-    load: np.ndarray
-    """(k,) along the normal [N]."""
-    centre: np.ndarray
-    """(k, 3) of pressure; of the patch where nothing presses [m]."""
+    load: np.ndarray  # (k,) along the normal [N]
+    centre: np.ndarray  # (k, 3) of pressure; of the patch where nothing presses [m]
     missing: np.ndarray
     """(n, 6) force and torque that nothing gives [of the weight]; NaN, as the loads: too much."""
     margin: np.ndarray
@@ -457,8 +431,6 @@ class _Programme:
 
         rubs = np.flatnonzero(bound > 0.0)
         share = csc_matrix((len(rubs), len(self.point)))
-        if not len(rubs):
-            return _Friction(csc_matrix((len(self.wanted), 0)), np.zeros(0), bound[rubs], share)
         rows = self.rows[rubs]
         normal, radius = self.beds.normal[rows], ROUGH * self.beds.radius[rows]
         aside = np.where(np.abs(normal[:, :1]) < 0.6, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
@@ -485,14 +457,10 @@ class _Programme:
 class _Friction:
     """Friction at r places, each up to a bound: |(t1, t2, …)| ≤ limit + share·f."""
 
-    wrenches: Any
-    """(equations, w·r) of unit t: first all t1."""
-    cost: np.ndarray
-    """(w·r,) of t²."""
-    limit: np.ndarray
-    """(r,)."""
-    share: Any
-    """(r, q) of what presses."""
+    wrenches: Any  # (equations, w·r) of unit t: first all t1
+    cost: np.ndarray  # (w·r,) of t²
+    limit: np.ndarray  # (r,)
+    share: Any  # (r, q) of what presses
 
     def of(self, points: np.ndarray) -> _Friction:
         """Return the friction where these points (p,) alone press."""

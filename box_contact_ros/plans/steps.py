@@ -22,8 +22,7 @@ from .plan import Plan
 from .statics import Bodies, Work, settle
 from .verdict import verdict_of
 
-ROW = 500.0
-"""Work of a patch among which a group is looked for, in the unit of `Work`."""
+ROW = 500.0  # work of a patch among which a group is looked for, in the unit of `Work`
 
 
 def falls_of(plan: Plan, meet: Meetings, bodies: Bodies, work: Work,

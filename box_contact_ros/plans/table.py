@@ -53,11 +53,9 @@ class Table:
     """Rows with the same columns."""
 
     path: str
-    columns: tuple[str, ...]
-    """Of the rows, then of what stands above them."""
+    columns: tuple[str, ...]  # of the rows, then of what stands above them
     records: list[Record]
-    mark: str = '.'
-    """The decimal mark; '': its texts tell it."""
+    mark: str = '.'  # the decimal mark; '': its texts tell it
     odd: dict[int, str] = field(default_factory=dict)
     """What is wrong with the cells of a row, by its number."""
     faults: list[Fault] = field(default_factory=list)

@@ -47,17 +47,16 @@ def verdict_of(plan: Plan, meet: Meetings, bodies: Bodies, rest: Rest | None) ->
         loaded, missing = rest.margin, np.abs(rest.missing)
         slides = np.hypot(missing[:, 0], missing[:, 1]) > missing[:, 2:].max(axis=1)
         beside = body[meet.pairs[~meet.carries & ~(rest.load <= 0.0)]]
-        carried_by = np.vstack((np.stack((lower, upper), axis=1), beside, beside[:, ::-1]))
+        carrier, carried = np.vstack((np.stack((lower, upper), axis=1), beside, beside[:, ::-1])).T
         unknown = np.isnan(missing).any(axis=1)
         # Whatever the loads are, a box falls that nothing carries, or that carries nothing and is
         # level, with its centre outside.
         tilted = upper[(meet.normal @ meet.frame[2])[meet.carries] <= 1.0 - LEVEL]
         is_in = partial(np.isin, np.arange(count))
-        surely = ~is_in(carried_by[:, 1]) | (margin <= bodies.need) & ~(
-            is_in(carried_by[:, 0]) | is_in(tilted))
+        surely = ~is_in(carried) | (margin <= bodies.need) & ~(is_in(carrier) | is_in(tilted))
         holds = ~rest.falls & ~(unknown & surely)
-        stands = _resting(carried_by, holds, fixed)
-        unknown = stands & ~_resting(carried_by, holds & ~unknown, fixed)
+        stands = standing(carrier, carried, holds, fixed, on_all=False)
+        unknown = stands & ~standing(carrier, carried, holds & ~unknown, fixed, on_all=False)
     falling = np.flatnonzero(~stands[lower])
     goes = np.bincount(upper[falling], minlength=count) > 0
     cause = np.select(
@@ -74,15 +73,3 @@ def verdict_of(plan: Plan, meet: Meetings, bodies: Bodies, rest: Rest | None) ->
     return Verdict(stands & ~unknown, unknown, cause, goes_with, hangs & ~stands,
                    np.where(fixed, np.inf, margin),
                    np.where(fixed & (rest is not None), np.inf, loaded))
-
-
-def _resting(carried_by: np.ndarray, holds: np.ndarray, fixed: np.ndarray) -> np.ndarray:
-    """Return which bodies (b,) hold by themselves and rest on one that stands."""
-    stands = fixed
-    while True:
-        rests = np.zeros(len(fixed), bool)
-        rests[carried_by[stands[carried_by[:, 0]], 1]] = True
-        higher = fixed | holds & rests
-        if np.array_equal(higher, stands):
-            return stands
-        stands = higher

@@ -53,7 +53,10 @@ def blocked_ways(plan: Plan, meet: Meetings, tolerances: np.ndarray, side: str) 
                            most_near=most_near(len(plan)))
     pairs = np.column_stack((movers[pairs[:, 0]], pairs[:, 1]))
     pairs = pairs[_may_block(plan, meet, fixed, pairs)]
-    pairs = pairs[~_is_open(plan, towards, 2.0 * place - top, pairs)]
+    axis = np.abs(towards).argmax()
+    end = plan.room[:, 1, axis] if towards[axis] > 0.0 else -plan.room[:, 0, axis]
+    near = 2.0 * place - top  # what is beyond the open side of a room is no obstacle
+    pairs = pairs[near[pairs[:, 1]] < end[pairs[:, 0]] - ROUNDING]
     turned = np.flatnonzero(is_turned[pairs[:, 0]])
     starts = plan.poses.copy()
     starts[:, :3] += travel[:, None] * towards
@@ -88,16 +91,6 @@ def _longer(plan: Plan, sizes: np.ndarray, axes: np.ndarray, is_turned: np.ndarr
     poses[:, :3] += travel[:, None] / 2.0 * towards
     poses[is_turned, 3:] = 0.0, 0.0, 0.0, 1.0
     return np.where(is_turned[:, None], around, longer), poses
-
-
-def _is_open(plan: Plan, towards: np.ndarray, near: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """Return of which pairs (k, 2) the second box is beyond the open side of the first one's room.
-
-    near: the nearest end of each box along the direction (n,) [m].
-    """
-    axis = np.abs(towards).argmax()
-    end = plan.room[:, 1, axis] if towards[axis] > 0.0 else -plan.room[:, 0, axis]
-    return near[pairs[:, 1]] >= end[pairs[:, 0]] - ROUNDING
 
 
 def _may_block(plan: Plan, meet: Meetings, fixed: np.ndarray, pairs: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ FILES = Path(__file__).resolve().parents[2] / 'docs' / 'examples'
 def depth_at(size, pose, point, view):
     """Return how near to the viewer a box is at a point of the picture; None: it is not there."""
     axes = rotation_matrix(pose[None, 3:])[0]
-    start = axes.T @ (point @ view.edges - pose[:3])
+    start = axes.T @ (point @ plot.edges_of(view.viewer) - pose[:3])
     along = axes.T @ (view.viewer / np.linalg.norm(view.viewer))
     ends = np.sort(np.stack(((-size / 2 - start) / along, (size / 2 - start) / along)), axis=0)
     near, far = ends[0].max(), ends[1].min()

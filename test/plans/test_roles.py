@@ -40,6 +40,12 @@ def centred(n, box):
     return n, *(low + side / 2 for low, side in zip(box, box[3:])), *box[3:]
 
 
+def aside(n, box, axes, unit=1):
+    """Return the centre of a box that is 70 mm further along y, with its axes in this order."""
+    centre = dict(zip('xyz', np.array(centred(n, box)[1:4]) + (0, 70, 0)))
+    return [float(centre[axis]) / unit for axis in axes]
+
+
 def corners(n, box):
     return *box[:3], *(low + side for low, side in zip(box, box[3:])), n
 
@@ -84,7 +90,18 @@ FORMS = {
     'in German': (rows('Artikel', 'X', 'Y', 'Z', 'Länge', 'Breite', 'Höhe'),
                   '--unit mm --origin corner'),
     'y is up': (rows('id', 'x', 'y', 'z', 'l', 'w', 'h', make=lambda n, box: (
-        n, *np.array(centred(n, box))[[1, 3, 2]], *box[3:])), '--unit mm --up y'),
+        n, *aside(n, box, 'xzy'), *box[3:])), '--unit mm --up y'),
+    'y is up in metres': (rows('name', 'x', 'y', 'z', 'length', 'width', 'height', make=(
+        lambda n, box: (n, *aside(n, box, 'xzy', 1e3), *np.array(box[3:]) / 1e3))), '--up y'),
+    'y is up of least corners': (rows('name', 'x', 'y', 'z', 'length', 'width', 'height', make=(
+        lambda n, box: (n, *np.array(box)[[0, 2, 1, 3, 4, 5]] / 1e3))), '--origin corner --up y'),
+    'width height depth': (rows('id', 'x', 'y', 'z', 'w', 'h', 'd', make=lambda n, box: (
+        n, *aside(n, box, 'xzy'), *np.array(box)[[3, 5, 4]])), '--unit mm --up y'),
+    'sizes of the file, y is up': (records(lambda n, box: {
+        'id': n, 'centre': aside(n, box, 'xzy'), 'size': [box[3], box[5], box[4]]}),
+        '--unit mm --up y'),
+    'x is up': (rows('id', 'cx', 'cy', 'cz', 'dx', 'dy', 'dz', make=lambda n, box: (
+        n, *aside(n, box, 'zxy'), box[5], box[3], box[4])), '--unit mm --up x'),
     'ends': (rows('id', 'start_x', 'start_y', 'start_z', 'end_x', 'end_y', 'end_z',
                   make=lambda n, box: (n, *corners(n, box)[:6])), '--unit mm'),
 }
@@ -92,24 +109,98 @@ FORMS = {
 
 @pytest.mark.parametrize('name', FORMS)
 def test_a_form_is_read_with_what_the_message_prints(name, tmp_path, capsys):
-    """At most once: --up alone is not asked, because y may be up where no word tells it."""
+    """At most once."""
     text, wanted = FORMS[name]
     path = str(written(tmp_path, 'a.json' if text[0] in '{[' else 'a.csv', text))
-    options = ['--up', 'y'] if '--up' in wanted else []
+    options = []
     if wanted:
-        assert inspect_files.main([path, *options]) == 2
+        assert inspect_files.main([path]) == 2
         message = capsys.readouterr().err
-        typed = shlex.split(message.partition('if it is so, add ')[2])
-        assert {*typed} == {*shlex.split(wanted)} - {*options}
-        options += typed
+        options = shlex.split(message.partition('if it is so, add ')[2])
+        assert {*options} == {*shlex.split(wanted)}
     assert inspect_files.main([path, *options]) == 0, capsys.readouterr().out
     given = dict(zip(options[::2], options[1::2]))
     plan = read_plan(path, origin=given.get('--origin'), unit=given.get('--unit'),
                      up=given.get('--up'), columns=dict(
                          word.split('=', 1) for word in options if '=' in word))
     least = 1e3 * (plan.poses[:3, :3] - plan.sizes[:3] / 2)
+    least[:, 1] -= least[0, 1]
     assert np.abs(np.hstack((least, 1e3 * plan.sizes[:3])) - BOXES).max() < 1e-6
     assert name != 'pounds' or plan.masses[:3] == pytest.approx(4.5359237)
+
+
+LAYER = ('a,1,1,1,.5,.5,.5', 'b,1,1,1,1.5,.5,.5', 'c,1,1,1,.5,1.5,.5', 'd,1,1,1,1.5,1.5,.5')
+
+
+@pytest.mark.parametrize(('cells', 'options', 'status'), [
+    (LAYER, [], 0),  # by y it would be a wall
+    ((*LAYER[:3], 'd,1,1,1,1.5,1.5,2'), [], 1), (('a,1,1,1,.5,.5,3',), [], 1),
+    (('a,1,1,1,3,.5,.7', 'b,1,1,1,3,1.5,.7'), ['--up', 'z'], 1),
+    (('a,1,1,1,3,.5,.7', 'b,1,1,1,3,1.5,.7'), ['--up', 'y'], 0),
+    (('a,1,1,1,3,.5,.7', 'b,1,1,1,3,1.5,.7'), [], 2),
+    (('a,1,1,1,3,.5,3', 'b,1,1,1,4,.5,4'), [], 1)])
+def test_the_axis_that_is_up_is_asked_only_where_most_stand_by_another(
+        cells, options, status, tmp_path, capsys):
+    """A layer on the floor, one box that hangs among others or alone, a row and a pile along y."""
+    assert inspect_files.main([str(written(tmp_path, 'a.csv', sheet(*cells))), *options]) == status
+    assert ('add --up y' in capsys.readouterr().err) == (status == 2)
+
+
+def pile(rng):
+    """Return least corners and sizes (n, 6) of boxes in columns, without a gap or with some."""
+    boxes, x = [], rng.choice((0, 0.4))
+    for width in rng.uniform(0.3, 0.9, rng.integers(1, 5)):
+        y = rng.choice((0, 0.3))
+        for depth in rng.uniform(0.3, 0.9, rng.integers(1, 4)):
+            heights = rng.uniform(0.1, 0.6, rng.integers(1, 5))
+            boxes += [(x, y, top - height, width, depth, height)
+                      for top, height in zip(heights.cumsum(), heights)]
+            y += depth
+        x += width
+    return np.array(boxes)
+
+
+@pytest.mark.parametrize('is_corner', [False, True])
+def test_piles_with_y_up_are_asked_and_others_are_read(is_corner, tmp_path):
+    """All that are sound with z up are read; of those with y up some are sound by both readings."""
+    place, answers = 'x_min,y_min,z_min' if is_corner else 'x,y,z', []
+    for seed in range(100):
+        boxes = pile(np.random.default_rng(seed))
+        boxes[:, :3] += 0 if is_corner else boxes[:, 3:] / 2
+        for order in ([0, 1, 2], [0, 2, 1]):
+            rows = np.hstack((boxes[:, order], boxes[:, 3:][:, order])).round(6).tolist()
+            path = written(tmp_path, 'a.csv', '\n'.join((f'name,{place},lx,ly,lz', *(
+                ','.join(map(str, (n, *row))) for n, row in enumerate(rows)), '')))
+            try:
+                answers.append(inspect_plan(read_plan(path)).verdict)
+            except ValueError as error:
+                answers.append(str(error).rpartition('add ')[2])
+    assert answers[::2] == ['sound'] * 100
+    by_y = [answer for answer in answers[1::2] if answer != 'sound']
+    assert by_y.count('--up y') > max(50, 0.9 * len(by_y))
+
+
+def test_a_height_between_the_other_sizes_tells_no_axis(tmp_path):
+    """As y is between x and z; boxes that stand by both readings would be sound by a guess."""
+    path = written(tmp_path, 'a.csv', 'name,x,y,z,width,height,depth\na,.5,.5,.5,1,1,1\n')
+    for up in 'yz':
+        assert len(read_plan(path, unit='m', up=up)) == 2
+    with pytest.raises(ValueError, match='which axis is up, y or z.; if it is so, add --up y'):
+        read_plan(path, unit='m')
+    path = written(tmp_path, 'a.csv', 'name,x,y,z,width,height,depth\na,.5,.5,.6,1,1.2,1\n')
+    with pytest.raises(ValueError, match='which axis is up, z or y.; if it is so, add --up z'):
+        read_plan(path, unit='m')
+
+
+def test_piles_along_y_in_two_containers_on_a_fixed_floor(tmp_path):
+    """Each is judged by itself, and what is fixed may be anywhere."""
+    text = sheet(*(f'{name},1,1,1,.5,{y},.7,{fixed},{pallet}' for pallet in '12' for name, y, fixed
+                   in (('floor', 3.5, 1), ('a', 4.5, 0), ('b', 5.5, 0), ('c', 6.5, 0))),
+                 more=',fixed,pallet')
+    path = written(tmp_path, 'a.csv', text)
+    with pytest.raises(ValueError, match='which axis is up, y or z.; if it is so, add --up y'):
+        read_plan(path)
+    assert inspect_plan(read_plan(path, up='y')).sound
 
 
 ASKED = {
