@@ -39,7 +39,7 @@ from box_contact_ros.processes import keep_to_this_host, program, running
 from box_contact_ros.scene.boxes import Box
 from box_contact_ros.scene.scene import Scene
 from box_contact_ros.scene.scene_file import read_scene
-from box_contact_ros.scene.scene_solver import SceneSolver
+from box_contact_ros.scene.scene_solver import SceneSolver, finished
 
 CUBE, COLUMNS, COUNT = (2.0, 2.0, 2.0), 50, 2000
 FRAME = 'yard'
@@ -97,7 +97,7 @@ class EchoNode(GuardedNode):
         super().__init__('echo', context=context)
         answerer = CheckAnswerer(SceneSolver(yard()))
         for name, question in QUESTIONS.items():
-            answerer.answer(question, kept := Check.Response(success=True))
+            finished(answerer.answer(question, kept := Check.Response(success=True)))
             response = deserialize_message(serialize_message(kept), Check.Response)
             self.create_service(Check, service_of(name), lambda *_, response=response: response)
 

@@ -41,7 +41,7 @@ def test_each_question_has_its_contact() -> None:
     """Of 2,001 boxes, one touches: an answer without a contact would be cheap."""
     answerer = service.CheckAnswerer(service.SceneSolver(service.yard()))
     for question in service.QUESTIONS.values():
-        answerer.answer(question, response := service.Check.Response())
+        service.finished(answerer.answer(question, response := service.Check.Response()))
         assert len(response.contacts.contacts) == 1
-    answerer.answer(service.PLAN, response := service.Check.Response())
+    service.finished(answerer.answer(service.PLAN, response := service.Check.Response()))
     assert len(response.contacts.contacts) == 4095
