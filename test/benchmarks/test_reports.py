@@ -90,7 +90,8 @@ def test_a_page_says_how_long_its_program_took(tmp_path: Path,
                                                monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(output, 'BEGIN', time.monotonic() - 440.0)
     text = output.write_page(tmp_path, 'stacks', ['--quick'], machine='M', rest='', both='',
-                             pushed='', engines='', missing='', times='', ways='', box3d='', scenes=54,
+                             pushed='', engines='', missing='', times='', ways='', box3d='',
+                             scenes=54,
                              cheaper=34)
     assert 'Made by `python -m benchmarks.stacks --quick` in 7 minutes on M' in text
     monkeypatch.setattr(output, 'BEGIN', time.monotonic() - 12.0)
