@@ -214,6 +214,22 @@ def test_boxes_of_one_body_are_never_a_pair(kind):
         movers(size, listed=np.array([[2, 1]]), bodies=np.zeros(41, np.int32))
 
 
+def test_who_is_box_a():
+    """Guests, whose numbers are behind those of the boxes; listed pairs; groups; the order."""
+    none, three = np.full(3, -1, np.int32), np.zeros(3, np.int32)
+    order = np.array([2, 0, 1], np.int32)
+    asked = np.array([(3, 0), (0, 3), (3, 4), (4, 3), (0, 1), (1, 0), (1, 2), (2, 1), (0, 2)])
+    for allowed, sides in ((0, [1, 2, 1, 2, 6, 5, 0, 0, 0]), (3, [1, 2, 1, 2, 6, 5, 1, 2, 2])):
+        wanted = native.Filter(np.array([(1, 0)]), three, np.full((1, 1), allowed, np.uint8), none,
+                               order)
+        assert wanted.sides(asked).tolist() == sides
+    one_body = native.Filter(NONE, three, ALL, np.array([0, 0, -1], np.int32), order)
+    assert one_body.sides(asked[-5:]).tolist() == [0, 0, 1, 2, 2]
+    one_way = native.Filter(NONE, np.array([0, 1, 1], np.int32),
+                            np.array([[0, 1], [2, 0]], np.uint8), none, order)
+    assert one_way.sides(asked[-5:]).tolist() == [1, 2, 0, 0, 1]
+
+
 def exact_touch(rng, n):
     """Return sizes and poses (2, n, …) of faces that touch exactly, moved rigidly, near and far."""
     size = np.exp(rng.uniform(-3, 3, (2, n, 3)))
