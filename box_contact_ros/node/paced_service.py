@@ -72,10 +72,11 @@ def refuse(response: Any, error: ValueError) -> None:
 class PacedService:
     """Serves requests, and keeps clients that ask costly ones without pause from stopping ticks.
 
-    After steps that took T in all, costly requests wait for PAUSE · T. A client that waits asks
-    nothing: a refusal would bring its request again, and ROS takes a millisecond to read it.
-    Whether a request is costly is judged by its kind, and by its size. Costly ones are answered in
-    turns of a SLICE each, small ones first, so that these never wait for the end of a long one.
+    After the last turn of a costly request, which took T, others wait for PAUSE · T. A client
+    that waits asks nothing: a refusal would bring its request again, and ROS takes a
+    millisecond to read it. Whether a request is costly is judged by its kind, and by its size.
+    Costly ones are answered in turns of a SLICE each, small ones first, so that these never
+    wait for the end of a long one.
     """
 
     def __init__(self, node: GuardedNode, counts: Counter[str], what: str, service: tuple[Any, str],

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from itertools import compress
 from random import randrange
@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ..scene.boxes import NOWHERE
-from ..scene.scene_check import Row
+from ..scene.scene_check import Pose, Row
 from ..scene.scene_solver import SceneSolver
 from ..solver.checks import absent_poses, are_poses, pose_fault
 from ..stream.cdr import NANOSECONDS, MessageError
@@ -124,7 +124,7 @@ class LastPoses:
             stamps[missing] = np.append(self._stamps, 0)[former]
         self._names, self._stamps, self._rows, self._newest = names, stamps, rows, poses.stamp
 
-    def within(self, max_age: int) -> dict[str, Sequence[float] | np.ndarray]:
+    def within(self, max_age: int) -> dict[str, Pose]:
         """Return the poses by name whose stamps are within max_age [ns] of the newest; 0: all."""
         most = max_age or np.iinfo(np.int64).max
         is_known = ~np.isnan(self._rows[:, 0]) & (np.abs(self._newest - self._stamps) <= most)
@@ -178,7 +178,7 @@ class TickAnswerer:
         self.pairing.reset()
         self._last.forget()
 
-    def last_poses(self) -> dict[str, Sequence[float] | np.ndarray]:
+    def last_poses(self) -> dict[str, Pose]:
         """Return by name the last poses of what moves, not older than `max_age`."""
         return self._last.within(self.pairing.max_age)
 

@@ -10,7 +10,7 @@ does not name are absent, or stand where they were last.
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 from itertools import chain, count, islice, product
 from typing import NamedTuple
 
@@ -226,7 +226,9 @@ class SceneCheck:
         guests.update(zip(sorted(guests), count(len(scene.boxes))))
         seen, movers = set(), dict[str, int]()
         moved: list[Row] = []
-        parts: list[tuple[int, Row, int]] = []  # number, size and mover of each box
+        numbers: list[int] = []
+        extents: list[Sequence[float]] = []
+        of: list[int] = []
         for number, (name, pose, size) in enumerate(zip(names, poses, sizes)):
             if fault := name_fault(name):
                 raise ValueError(f'boxes[{number}].name: {short_repr(name)} {fault}')
@@ -245,12 +247,13 @@ class SceneCheck:
                 continue
             mover = movers[name] = len(movers)
             moved.append(pose)
-            parts += ((box, scene.sizes[box] if is_body else size, mover)
-                      for box in ([guests[name]] if name in guests else self._boxes_of(name)))
-        of_parts = tuple(zip(*parts)) or ((), (), ())
+            boxes = [guests[name]] if name in guests else self._boxes_of(name)
+            numbers += boxes
+            extents += scene.sizes[boxes].tolist() if is_body else [size]
+            of += [mover] * len(boxes)
         return Question(movers, guests, np.array(moved).reshape(-1, 7),
-                        np.array(of_parts[0], np.int64), np.array(of_parts[1]).reshape(-1, 3),
-                        np.array(of_parts[2], np.int64))
+                        np.array(numbers, np.int64), np.array(extents).reshape(-1, 3),
+                        np.array(of, np.int64))
 
     def _boxes_of(self, name: str) -> list[int]:
         """Return the indices of the boxes of a box or body of the scene."""
@@ -258,7 +261,8 @@ class SceneCheck:
         if name not in scene.bodies:
             return [scene.index_of[name]]
         body = scene.row_of[name] - len(scene.boxes)
-        return [int(box) for box in np.flatnonzero(scene.body_of == body)]
+        boxes: list[int] = np.flatnonzero(scene.body_of == body).tolist()
+        return boxes
 
     def _standing(self, asked: Question, last: Mapping[str, Pose],
                   ) -> tuple[np.ndarray, native.Index | None]:
@@ -316,7 +320,7 @@ class SceneCheck:
         """Return the numbers (n, 2) of pairs that are listed by the names of boxes or bodies."""
         if len(pairs) > MOST_PAIRS:
             raise TooMuch(f'pairs: a request has at most {MOST_PAIRS}, not {len(pairs)}')
-        scene = self._scene
+        scene, of_scene = self._scene, cache(self._boxes_of)
 
         def boxes_of(name: str, field: str) -> list[int]:
             if name in asked.guests:
@@ -329,7 +333,7 @@ class SceneCheck:
                 raise ValueError(
                     f'{field}: {short_repr(name)} is neither a box of the request nor of the scene'
                     f'{nearest_name(name, chain(asked.movers, scene.row_of))}')
-            return self._boxes_of(name)
+            return of_scene(name)
 
         places: list[tuple[int, int]] = []
         for number, (a, b) in enumerate(pairs):

@@ -350,7 +350,7 @@ def test_what_is_wrong_comes_back_as_text(answerer: CheckAnswerer, boxes: list[A
 
 
 def test_boxes_that_are_apart_cost_no_pairs(answerer: CheckAnswerer) -> None:
-    """As many as a request takes: the broad phase leaves out their pairs."""
+    """As many as a request takes: their pairs are left out, as bounding boxes do not meet."""
     boxes = [a_box(f'{n}', (3 * n, 0, 0, 0, 0, 0, 1), CUBE) for n in range(MOST_BOXES)]
     assert MOST_BOXES * (MOST_BOXES - 1) // 2 > MOST_CONTACTS
     assert labels(asked(answerer, *boxes)) == []

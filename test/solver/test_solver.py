@@ -75,7 +75,7 @@ def test_touch_tolerance_follows_the_coordinates():
 
 
 def test_an_empty_batch():
-    """No rows, and no pairs, as a broad phase gives them that found nothing."""
+    """No rows, and no pairs, as a search gives them that found nothing."""
     for found in (SOLVER.batch(np.zeros((0, 7)), np.zeros((0, 7))), SOLVER.batch([], []),
                   SOLVER.batch([], sizes=[], pairs=[]),
                   SOLVER.batch([poses.IDENTITY, ABOVE], pairs=[])):

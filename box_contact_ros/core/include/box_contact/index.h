@@ -113,7 +113,7 @@ typedef struct bc_way {
   const bc_pose* poses; /* (times, count); centres of turning go on lines, axes turn the shortest way */
   const double* centres;      /* (count, 3) of turning, in the boxes' frames [m]; NULL: the boxes' own */
   const int64_t* numbers;     /* (count) by which the filter knows them; NULL: as guests */
-  const bc_index* around;     /* what stands, or NULL; */
+  const bc_index* around;     /* what stands, or NULL */
   const bc_index* beside;     /* what stands, too, or NULL */
   const bc_filter* filter;    /* NULL: all pairs */
   double clearance;           /* the distance from which on a pair counts [m] */
